@@ -1,0 +1,148 @@
+"""Starting values, found among a dictionary of shapes; the user gives none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.estimate.design import Design
+from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
+from gmwm.process import GaussMarkov, Model, Process, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm.process.base import Shape
+from gmwm.variance.covariance import haar_covariance
+from gmwm.variance.wavelet import WaveletVariance
+
+_EXCHANGES = 2
+_IMPROVEMENT = 1e-3  # of the objective, below which an exchange is not worth a refinement
+
+
+def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
+    """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
+
+    Each term with free shapes is first placed where on its grid it lowers the objective most,
+    all shapes are then refined together; at the end each term in turn is taken out and placed
+    anew. A model that extends another one is never worse, if started from that one's shapes.
+
+    Parameters
+    ----------
+    profile : Profile
+    known : list of Shape or None, optional
+        Shapes to start with, ``None`` for the terms still to be placed.
+    """
+    design = profile.design
+    shapes = list(known) if known is not None else design.fixed_shapes()
+    missing = [i for i in design.shaped if shapes[i] is None]
+    point = _present(profile, shapes)
+    for i in missing:
+        shapes = list(point.shapes)
+        point = _refine_present(profile, _place(profile, shapes, i))
+    if len(design.shaped) < 2:
+        return point
+    for _ in range(_EXCHANGES):
+        before = point.objective
+        for i in design.shaped:
+            shapes = list(point.shapes)
+            shapes[i] = None
+            moved = _place(profile, shapes, i)
+            if moved.objective < point.objective * (1.0 + _IMPROVEMENT):
+                moved = _refine_present(profile, moved)
+                point = min(point, moved, key=lambda p: p.objective)
+        if point.objective > before * (1.0 - _IMPROVEMENT):
+            break
+    return point
+
+
+def _columns(profile: Profile, shapes: Sequence[Shape | None]) -> tuple[FloatArray, FloatArray]:
+    """Weighted columns of the placed terms of free amplitude, and the weighted target."""
+    design = profile.design
+    target = profile.target.copy()
+    columns = []
+    for i, (term, shape) in enumerate(zip(design.terms, shapes, strict=True)):
+        if shape is None:
+            continue
+        curve = term.curve(shape, design.tau, design.dt)
+        if i in design.linear:
+            columns.append(profile.root @ curve)
+        else:
+            target -= curve
+    matrix = np.stack(columns, axis=1) if columns else np.zeros((target.size, 0))
+    return matrix, profile.root @ target
+
+
+def _present(profile: Profile, shapes: Sequence[Shape | None]) -> Point:
+    matrix, y = _columns(profile, shapes)
+    x, residual = solve_nonnegative(matrix, y)
+    return Point(shapes, x, float(residual @ residual))  # type: ignore[arg-type]
+
+
+def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
+    """Put term ``i`` at the grid shape that lowers the objective most."""
+    design = profile.design
+    matrix, y = _columns(profile, shapes)
+    candidates = profile.root @ design.grid_curves(i)
+    objective = np.empty(candidates.shape[1])
+    for g in range(candidates.shape[1]):
+        column = candidates[:, g]
+        if i in design.linear:
+            residual = solve_nonnegative(np.column_stack([matrix, column]), y)[1]
+        else:
+            residual = solve_nonnegative(matrix, y - column)[1]
+        objective[g] = residual @ residual
+    filled = list(shapes)
+    filled[i] = design.grid(i)[int(np.argmin(objective))]
+    return _present(profile, filled)
+
+
+def _refine_present(profile: Profile, point: Point) -> Point:
+    """Refine the shapes of the terms placed so far."""
+    design = profile.design
+    if all(shape is not None for shape in point.shapes):
+        return profile.refine(point)
+    present = [i for i, shape in enumerate(point.shapes) if shape is not None]
+    part = Model(tuple(design.terms[i].process for i in present))
+    reduced = Profile(
+        Design(part, design.tau, design.dt, design.n), profile.target, profile.root
+    )
+    found = reduced.refine(reduced.at([point.shapes[i] for i in present]))
+    shapes = list(point.shapes)
+    for i, shape in zip(present, found.shapes, strict=True):
+        shapes[i] = shape
+    return Point(shapes, found.x, found.objective)
+
+
+def dictionary_covariance(
+    wv: WaveletVariance, target: FloatArray, extra: tuple[Process, ...] = ()
+) -> FloatArray:
+    """Covariance of the wavelet variances under a rich non-negative mixture fitted to them.
+
+    White, quantization and random-walk noise, a grid of Gauss-Markov processes and the kinds of
+    ``extra`` together follow almost any wavelet variance; their non-negative least-squares fit is
+    a spectrum close enough for first weights, whatever model is to be fitted.
+    """
+    kinds = {type(process): process for process in extra}
+    kinds.pop(GaussMarkov, None)
+    processes: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), GaussMarkov())
+    processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
+    design = Design(Model(processes), wv.tau, wv.dt, wv.n)
+    owner, shapes, columns = [], [], []
+    for i in range(len(design.terms)):
+        if i not in design.linear:
+            continue
+        for shape, curve in zip(design.grid(i), design.grid_curves(i).T, strict=True):
+            owner.append(i)
+            shapes.append(shape)
+            columns.append(curve)
+    root = weight_root(wv.covariance)
+    x, _ = solve_nonnegative(root @ np.stack(columns, axis=1), root @ target)
+    mixture = []
+    for k in np.flatnonzero(x > 0.0):
+        term = design.terms[owner[k]]
+        linear = term.process.linear_parameter
+        assert linear is not None
+        value = float(x[k]) ** (1.0 / linear.power)
+        mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
+    if not mixture:
+        return wv.covariance
+    return haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)

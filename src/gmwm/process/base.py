@@ -1,0 +1,336 @@
+"""What every error process offers, and what it inherits from the few things it gives."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process import spectral, synthesis
+from gmwm.process.parameter import Parameter
+from gmwm.process.state_space import StateSpace
+
+Shape = tuple[float, ...]
+"""Values of a process's shape parameters, in the order of ``parameters``."""
+
+
+class Process(ABC):
+    """A zero-mean Gaussian error process with stationary Haar wavelet coefficients.
+
+    A subclass names its ``parameters`` and gives ``psd``; wavelet variance, simulation and
+    everything else follow. Where a closed form is known, it overrides ``haar_variance``,
+    ``autocovariance``, ``state_space`` or ``_draw``.
+
+    A parameter is *given* (a number) or *open* (``None``, to be estimated). Instances do not change.
+
+    Examples
+    --------
+    >>> from gmwm import Parameter, Process
+    >>> class PinkishNoise(Process):
+    ...     parameters = (Parameter("level", "u", role="scale"),
+    ...                   Parameter("slope", "-", lower=0.0, upper=2.0))
+    ...     def psd(self, f, dt):
+    ...         return self.level**2 * dt * (2 * f * dt) ** -self.slope
+    >>> PinkishNoise(level=2.0, slope=0.5)
+    PinkishNoise(level=2, slope=0.5)
+    """
+
+    parameters: tuple[Parameter, ...] = ()
+    """The parameters in constructor order; at most one of them linear, see `Parameter.role`."""
+
+    label: ClassVar[str] = ""
+    """Name for tables and legends; the class name where empty."""
+
+    prefix: ClassVar[str] = ""
+    """Put before parameter names in ``params`` of a model, e.g. ``"resonance_"``."""
+
+    repeatable: ClassVar[bool | None] = None
+    """Whether a model can hold two of them; by default if there is a shape parameter."""
+
+    separable_shape: ClassVar[bool] = True
+    """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
+
+    def __init__(self, *args: float | None, **kwargs: float | None) -> None:
+        names = [parameter.name for parameter in self.parameters]
+        if len(args) > len(names):
+            raise InputError(f"{type(self).__name__} takes {len(names)} parameters: {names}")
+        values: dict[str, float | None] = dict.fromkeys(names)
+        values.update(zip(names, args, strict=False))
+        for name, value in kwargs.items():
+            if name not in values or name in names[: len(args)]:
+                raise InputError(
+                    f"{type(self).__name__} has no parameter {name!r} left to give: "
+                    f"its parameters are {', '.join(names) or 'none'}"
+                )
+            values[name] = value
+        self._set(values)
+
+    def _set(self, values: Mapping[str, float | None]) -> None:
+        for parameter in self.parameters:
+            value = values[parameter.name]
+            if value is not None:
+                value = self._checked(parameter, value)
+            object.__setattr__(self, parameter.name, value)
+
+    def _checked(self, parameter: Parameter, value: Any) -> float:
+        where = f"{type(self).__name__}: {parameter.name}"
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise InputError(f"{where} is {value!r}: give a number, or None to estimate") from None
+        if not np.isfinite(number) or not parameter.admits(number):
+            raise InputError(
+                f"{where} = {number:g} is out of range: it must lie in "
+                f"({parameter.lower:g}, {parameter.upper:g})"
+            )
+        return number
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"{type(self).__name__} does not change: make a new one")
+
+    def __getattr__(self, name: str) -> Any:
+        # Only reached for names that are not set; tells type checkers that parameters are attributes.
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    # -- values ---------------------------------------------------------------------------------
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """Parameter name -> value, ``None`` where open."""
+        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether any parameter is left open."""
+        return any(value is None for value in self.values.values())
+
+    @property
+    def linear_parameter(self) -> Parameter | None:
+        """The parameter whose power is a factor of the wavelet variance, if there is one."""
+        return next((parameter for parameter in self.parameters if parameter.linear), None)
+
+    @property
+    def shape_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that enter the wavelet variance non-linearly."""
+        return tuple(parameter for parameter in self.parameters if parameter.role == "shape")
+
+    def with_values(self, **values: float | None) -> Self:
+        """A copy with other parameter values.
+
+        Raises
+        ------
+        InputError
+            For an unknown parameter or a value out of range.
+        """
+        return type(self)(**{**self.values, **values})
+
+    def _require_given(self) -> None:
+        missing = [name for name, value in self.values.items() if value is None]
+        if missing:
+            raise InputError(
+                f"{self!r} has open parameters ({', '.join(missing)}): give them a value first"
+            )
+
+    # -- primitives -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        """Two-sided power spectral density of the sampled process, without spectral lines.
+
+        Parameters
+        ----------
+        f : ndarray
+            Frequencies in Hz, 0 < f <= 1/(2 dt).
+        dt : float
+            Sampling interval in seconds.
+
+        Returns
+        -------
+        ndarray
+            In u^2/Hz; its integral over (-1/(2 dt), 1/(2 dt)) is the variance, where that exists.
+        """
+
+    def lines(self) -> tuple[tuple[float, float], ...]:
+        """Spectral lines as (frequency in Hz, amplitude in u)."""
+        return ()
+
+    def drift_rate(self) -> float:
+        """Deterministic slope in u/s."""
+        return 0.0
+
+    # -- what follows from them -------------------------------------------------------------------
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        """Haar MODWT wavelet variance, half the Allan variance.
+
+        Parameters
+        ----------
+        tau : array_like
+            Averaging times in seconds, multiples of ``dt``.
+        dt : float
+            Sampling interval in seconds.
+
+        Returns
+        -------
+        ndarray
+            Same shape as ``tau``, in u^2.
+        """
+        return spectral.haar_variance(self.psd, np.asarray(tau, dtype=float), dt)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        """Autocovariance in u^2 at lags in samples (non-negative integers).
+
+        Raises
+        ------
+        InputError
+            If none is known for this process.
+        """
+        raise InputError(f"no closed-form autocovariance is known for {type(self).__name__}")
+
+    def state_space(self, dt: float) -> StateSpace:
+        """State-space form at sampling interval ``dt`` (s), with stationary initial covariance.
+
+        Raises
+        ------
+        InputError
+            If the process has none.
+        """
+        raise InputError(
+            f"{type(self).__name__} has no state-space form: approximate it by Gauss-Markov "
+            "processes for use in a Kalman filter"
+        )
+
+    def simulate(
+        self, n: int, dt: float, seed: int | np.random.Generator | None = None
+    ) -> FloatArray:
+        """Draw ``n`` samples, in u; stationary processes start in their stationary state.
+
+        Parameters
+        ----------
+        n : int
+        dt : float
+            Sampling interval in seconds.
+        seed : int or numpy.random.Generator, optional
+
+        Returns
+        -------
+        (n,) ndarray
+
+        Raises
+        ------
+        InputError
+            If a parameter is open, or ``n`` or ``dt`` is not positive.
+        """
+        self._require_given()
+        if int(n) != n or n < 1:
+            raise InputError(f"n = {n!r}: give a positive whole number of samples")
+        if not dt > 0.0:
+            raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
+        return self._draw(int(n), float(dt), np.random.default_rng(seed))
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        return synthesis.from_psd(self.psd, n, dt, rng)
+
+    # -- for the estimator ------------------------------------------------------------------------
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        """Shapes among which the estimator looks for starting values.
+
+        The default is a logarithmic grid over each parameter's range where that is finite, with
+        times taken between ``dt`` and the length of the record and frequencies up to 1/(2 dt).
+        """
+        axes = [_grid_axis(parameter, dt, n) for parameter in self.shape_parameters]
+        mesh = np.meshgrid(*axes, indexing="ij")
+        return [tuple(float(v) for v in point) for point in np.stack(mesh, -1).reshape(-1, len(axes))]
+
+    def shape_to_free(self, shape: Shape) -> FloatArray:
+        """Map shape parameters to the whole real line."""
+        return np.array(
+            [
+                _to_free(parameter, value)
+                for parameter, value in zip(self.shape_parameters, shape, strict=True)
+            ]
+        )
+
+    def shape_from_free(self, free: FloatArray) -> Shape:
+        """Inverse of `shape_to_free`."""
+        return tuple(
+            _from_free(parameter, value)
+            for parameter, value in zip(self.shape_parameters, free, strict=True)
+        )
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        """Instances with given parameters, held to the laws of the test suite."""
+        return ()
+
+    # -- sums, looks, equality --------------------------------------------------------------------
+
+    def __add__(self, other: Any) -> Any:
+        from gmwm.process.model import Model
+
+        return Model((self,)) + other
+
+    def __rmul__(self, times: int) -> Any:
+        from gmwm.process.model import Model
+
+        return times * Model((self,))
+
+    def __repr__(self) -> str:
+        given = ", ".join(f"{k}={v:.12g}" for k, v in self.values.items() if v is not None)
+        return f"{type(self).__name__}({given})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((type(self), *self.values.items()))
+
+    @classmethod
+    def is_repeatable(cls, instance: Process) -> bool:
+        """Whether two of this kind in one model can be told apart."""
+        if cls.repeatable is not None:
+            return cls.repeatable
+        return bool(instance.shape_parameters)
+
+    @classmethod
+    def title(cls) -> str:
+        """Name for tables and legends."""
+        return cls.label or cls.__name__
+
+
+def _grid_axis(parameter: Parameter, dt: float, n: int, points: int = 16) -> FloatArray:
+    lower, upper = parameter.lower, parameter.upper
+    if parameter.unit == "s":
+        lower, upper = max(lower, 0.5 * dt), min(upper, n * dt)
+    elif parameter.unit == "Hz":
+        lower, upper = max(lower, 1.0 / (n * dt)), min(upper, 0.5 / dt)
+    if not np.isfinite(upper):
+        upper = max(1e3 * lower, 1e3)
+    if lower < 0.0:
+        return np.linspace(lower, upper, points + 2)[1:-1]
+    if lower == 0.0:
+        lower = 1e-3 * upper
+    return np.geomspace(lower, upper, points + 2)[1:-1]
+
+
+def _to_free(parameter: Parameter, value: float) -> float:
+    lower, upper = parameter.lower, parameter.upper
+    if np.isfinite(lower) and np.isfinite(upper):
+        return float(np.log((value - lower) / (upper - value)))
+    if np.isfinite(lower):
+        return float(np.log(value - lower))
+    return float(value)
+
+
+def _from_free(parameter: Parameter, free: float) -> float:
+    lower, upper = parameter.lower, parameter.upper
+    if np.isfinite(lower) and np.isfinite(upper):
+        return float(lower + (upper - lower) / (1.0 + np.exp(-free)))
+    if np.isfinite(lower):
+        return float(lower + np.exp(free))
+    return float(free)

@@ -1,0 +1,186 @@
+"""Gauss-Markov processes of first and second order."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.process import synthesis
+from gmwm.process.base import Process, Shape
+from gmwm.process.exponential import exponential_haar, exponential_psd
+from gmwm.process.parameter import Parameter
+from gmwm.process.state_space import StateSpace
+
+_GRID_PER_DECADE = 8
+
+
+class GaussMarkov(Process):
+    """First-order Gauss-Markov process, sampled exactly.
+
+    Parameters
+    ----------
+    sigma : float, optional
+        Stationary standard deviation, u.
+    tau : float, optional
+        Correlation time, s. At sampling interval dt it is an AR(1) with phi = exp(-dt/tau).
+    """
+
+    parameters = (
+        Parameter("sigma", "u", "scale", meaning="Gauss-Markov standard deviation"),
+        Parameter("tau", "s", meaning="Gauss-Markov correlation time"),
+    )
+    label: ClassVar[str] = "Gauss-Markov"
+    sigma: float | None
+    tau: float | None
+
+    def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
+        super().__init__(sigma, tau)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return self.sigma**2 * exponential_psd(dt / self.tau, f, dt)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        m = np.asarray(tau, dtype=float) / dt
+        return self.sigma**2 * exponential_haar(dt / self.tau, m)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        variance = self.sigma**2
+        q = -variance * np.expm1(-2.0 * dt / self.tau)
+        return StateSpace.scalar("Gauss-Markov", float(np.exp(-dt / self.tau)), float(q), variance)
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        series = rng.standard_normal(n)
+        driving = self.sigma * np.sqrt(-np.expm1(-2.0 * dt / self.tau))
+        synthesis.first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
+        return series
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        # Below a third of dt it is white noise; beyond a third of the record a random walk.
+        low, high = np.log10(0.3 * dt), np.log10(max(n * dt / 3.0, dt))
+        points = max(int(np.ceil((high - low) * _GRID_PER_DECADE)), 2)
+        return [(float(tau),) for tau in np.logspace(low, high, points)]
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        pairs = ((0.5, 125.0), (1.5811388e-3, 125.0), (1.0, 0.5), (1.0, 20.0))
+        slow = ((1.0, 1e5), (1.0, 1e7), (1.0, 1e9))
+        return tuple(cls(sigma, tau) for sigma, tau in pairs + slow)
+
+
+class Resonance(Process):
+    """Second-order Gauss-Markov process with complex poles (a damped resonance).
+
+    Parameters
+    ----------
+    sigma : float, optional
+        Stationary standard deviation, u.
+    frequency : float, optional
+        Undamped natural frequency f0, Hz.
+    damping : float, optional
+        Damping ratio zeta, between 0 and 1.
+
+    Notes
+    -----
+    Autocovariance sigma^2 exp(-zeta w0 |t|) [cos(wd t) + (zeta w0/wd) sin(wd |t|)] with w0 = 2 pi
+    f0, wd = w0 sqrt(1 - zeta^2) (Gelb, *Applied Optimal Estimation*, 1974, sec. 2.2): two
+    exponentials of complex rate, to which the formulas of the first order apply.
+    """
+
+    parameters = (
+        Parameter("sigma", "u", "scale", meaning="resonance standard deviation"),
+        Parameter("frequency", "Hz", meaning="resonance frequency"),
+        Parameter("damping", "-", upper=1.0, meaning="resonance damping ratio"),
+    )
+    label: ClassVar[str] = "resonance"
+    prefix: ClassVar[str] = "resonance_"
+    sigma: float | None
+    frequency: float | None
+    damping: float | None
+
+    def __init__(
+        self,
+        sigma: float | None = None,
+        frequency: float | None = None,
+        damping: float | None = None,
+    ) -> None:
+        super().__init__(sigma, frequency, damping)
+
+    def _exponential(self, dt: float) -> tuple[complex, complex]:
+        """Rate per sample and weight of one of the two conjugate exponentials."""
+        root = np.sqrt(1.0 - self.damping**2)
+        rate = 2.0 * np.pi * self.frequency * dt * complex(self.damping, -root)
+        return rate, complex(1.0, -self.damping / root)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        rate, weight = self._exponential(dt)
+        return self.sigma**2 * np.real(weight * exponential_psd(rate, f, dt))
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        rate, weight = self._exponential(dt)
+        m = np.asarray(tau, dtype=float) / dt
+        direct = np.real(weight * exponential_haar(rate, m))
+        return self.sigma**2 * np.where(m * abs(rate) < 1e-3, self._slow_haar(m, dt), direct)
+
+    def _slow_haar(self, m: FloatArray, dt: float) -> FloatArray:
+        """Expansion for m |rate| << 1, where the linear terms of the conjugates cancel.
+
+        With the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k, the wavelet variance is a polynomial
+        in m by Faulhaber's sums.
+        """
+        rate, weight = self._exponential(dt)
+        v2, v3, v4 = (
+            -2.0 * np.real(weight * (-rate) ** p) / factorial
+            for p, factorial in ((2, 2.0), (3, 6.0), (4, 24.0))
+        )
+        cubic = 2.8 * m**3 - 2.0 / 3.0 * m - 2.0 / (15.0 * m)
+        quartic = 4.0 * m**4 - 2.0 * m**2
+        return np.asarray(v2 * m**2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        rate, weight = self._exponential(dt)
+        return self.sigma**2 * np.real(weight * np.exp(-rate * np.asarray(lag)))
+
+    def state_space(self, dt: float) -> StateSpace:
+        """States are the output and its derivative divided by 2 pi f0."""
+        self._require_given()
+        zeta, w0 = self.damping, 2.0 * np.pi * self.frequency
+        wd = w0 * np.sqrt(1.0 - zeta**2)
+        sine = np.sin(wd * dt) * w0 / wd
+        cosine = np.cos(wd * dt)
+        decay = np.exp(-zeta * w0 * dt)
+        transition = decay * np.array(
+            [[cosine + zeta * sine, sine], [-sine, cosine - zeta * sine]]
+        )
+        stationary = self.sigma**2 * np.eye(2)
+        noise = stationary - transition @ stationary @ transition.T
+        return StateSpace(
+            transition=transition,
+            process_noise=0.5 * (noise + noise.T),
+            output=np.array([1.0, 0.0]),
+            measurement_noise=0.0,
+            initial_mean=np.zeros(2),
+            initial_covariance=stationary,
+            names=("resonance", "resonance rate"),
+        )
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        return synthesis.from_state_space(self.state_space(dt), n, rng)
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        low, high = np.log10(4.0 / (n * dt)), np.log10(0.45 / dt)
+        points = max(int(np.ceil((high - low) * _GRID_PER_DECADE)), 2)
+        return [
+            (float(frequency), damping)
+            for frequency in np.logspace(low, high, points)
+            for damping in (0.01, 0.1, 0.5)
+        ]
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.4, 0.2, 0.05), cls(2e-3, 0.01, 0.5), cls(1.0, 1e-4, 0.3), cls(1.0, 0.45, 0.9))

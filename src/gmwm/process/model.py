@@ -1,0 +1,286 @@
+"""A composite error model: the flat sum of independent processes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process.base import Process
+from gmwm.process.gauss_markov import GaussMarkov
+from gmwm.process.parameter import Parameter
+from gmwm.process.state_space import StateSpace
+
+
+@dataclass(frozen=True)
+class ModelParameter:
+    """A parameter of one term of a model.
+
+    Attributes
+    ----------
+    key : str
+        Its name in ``model.params``, e.g. ``"sigma_2"``.
+    term : int
+        Index of the term in ``model.terms``.
+    parameter : Parameter
+    value : float or None
+        ``None`` where open.
+    """
+
+    key: str
+    term: int
+    parameter: Parameter
+    value: float | None
+
+
+class Model:
+    """Sum of independent error processes.
+
+    Made with ``+`` and ``2 * process``. Gauss-Markov terms whose correlation times are given are
+    put in the order of rising time.
+
+    Parameters
+    ----------
+    terms : iterable of Process
+
+    Raises
+    ------
+    InputError
+        If two terms cannot be told apart: two of a kind without a shape parameter, or two of
+        equal given shape.
+
+    Examples
+    --------
+    >>> from gmwm import GaussMarkov, WhiteNoise
+    >>> WhiteNoise() + 2 * GaussMarkov()
+    WhiteNoise() + 2 * GaussMarkov()
+    >>> (WhiteNoise(N=0.2) + GaussMarkov(sigma=1, tau=5)).params
+    {'N': 0.2, 'sigma': 1.0, 'tau': 5.0}
+    """
+
+    terms: tuple[Process, ...]
+
+    def __init__(self, terms: tuple[Process, ...]) -> None:
+        terms = _in_order(tuple(terms))
+        if not terms:
+            raise InputError("a model needs at least one process")
+        _check_distinct(terms)
+        object.__setattr__(self, "terms", terms)
+        object.__setattr__(self, "_parameters", _number(terms))
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError("a Model does not change: make a new one")
+
+    # -- parameters -------------------------------------------------------------------------------
+
+    @property
+    def parameters(self) -> tuple[ModelParameter, ...]:
+        """All parameters, term by term."""
+        return self._parameters  # type: ignore[no-any-return, attr-defined]
+
+    @property
+    def params(self) -> dict[str, float | None]:
+        """Key -> value, ``None`` where open; see `ModelParameter.key`."""
+        return {item.key: item.value for item in self.parameters}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether any parameter is left open."""
+        return any(term.is_open for term in self.terms)
+
+    def with_params(self, params: Mapping[str, float | None]) -> Model:
+        """A copy with other parameter values, by key.
+
+        Raises
+        ------
+        InputError
+            For an unknown key or a value out of range.
+        """
+        known = self.params
+        unknown = [key for key in params if key not in known]
+        if unknown:
+            raise InputError(
+                f"the model {self!r} has no parameter {unknown[0]!r}: it has {', '.join(known)}"
+            )
+        changes: list[dict[str, float | None]] = [{} for _ in self.terms]
+        for item in self.parameters:
+            if item.key in params:
+                changes[item.term][item.parameter.name] = params[item.key]
+        return Model(
+            tuple(
+                term.with_values(**change)
+                for term, change in zip(self.terms, changes, strict=True)
+            )
+        )
+
+    def opened(self) -> Model:
+        """A copy with every parameter open."""
+        return self.with_params(dict.fromkeys(self.params))
+
+    # -- moments ----------------------------------------------------------------------------------
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        """Two-sided power spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
+        self._require_given()
+        f = np.asarray(f, dtype=float)
+        total = np.zeros_like(f)
+        for term in self.terms:
+            total += term.psd(f, dt)
+        return total
+
+    def lines(self) -> tuple[tuple[float, float], ...]:
+        """Spectral lines of all terms as (frequency in Hz, amplitude in u)."""
+        return tuple(line for term in self.terms for line in term.lines())
+
+    def drift_rate(self) -> float:
+        """Deterministic slope, u/s."""
+        return float(sum(term.drift_rate() for term in self.terms))
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        """Haar wavelet variance (u^2) at averaging times ``tau`` (s); see `Process.haar_variance`."""
+        return np.sum(self.component_variances(tau, dt), axis=0)  # type: ignore[no-any-return]
+
+    def component_variances(self, tau: FloatArray, dt: float) -> FloatArray:
+        """Haar wavelet variance of each term, shape (terms, *tau.shape), in u^2."""
+        self._require_given()
+        tau = np.asarray(tau, dtype=float)
+        return np.stack([np.asarray(term.haar_variance(tau, dt)) for term in self.terms])
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        """Autocovariance (u^2) at lags in samples, of stationary models."""
+        self._require_given()
+        return np.sum([term.autocovariance(lag, dt) for term in self.terms], axis=0)  # type: ignore[no-any-return]
+
+    def state_space(self, dt: float) -> StateSpace:
+        """State-space form: the terms' states stacked, white noise as measurement noise."""
+        return StateSpace.stack([term.state_space(dt) for term in self.terms])
+
+    def simulate(
+        self, n: int, dt: float, seed: int | np.random.Generator | None = None
+    ) -> FloatArray:
+        """Draw ``n`` samples, in u; see `Process.simulate`."""
+        self._require_given()
+        rng = np.random.default_rng(seed)
+        total = self.terms[0].simulate(n, dt, rng)
+        for term in self.terms[1:]:
+            total += term.simulate(n, dt, rng)
+        return total
+
+    def _require_given(self) -> None:
+        missing = [key for key, value in self.params.items() if value is None]
+        if missing:
+            raise InputError(
+                f"the model {self!r} has open parameters ({', '.join(missing)}): "
+                "give them a value, or estimate them with gmwm.fit"
+            )
+
+    # -- looks ------------------------------------------------------------------------------------
+
+    def term_labels(self) -> list[str]:
+        """One label per term, numbered where a kind occurs more than once."""
+        counts = Counter(term.title() for term in self.terms)
+        seen: Counter[str] = Counter()
+        labels = []
+        for term in self.terms:
+            title = term.title()
+            seen[title] += 1
+            labels.append(f"{title} {seen[title]}" if counts[title] > 1 else title)
+        return labels
+
+    def __add__(self, other: Any) -> Model:
+        if isinstance(other, Process):
+            return Model((*self.terms, other))
+        if isinstance(other, Model):
+            return Model((*self.terms, *other.terms))
+        return NotImplemented
+
+    def __rmul__(self, times: int) -> Model:
+        if isinstance(times, bool) or not isinstance(times, int):
+            return NotImplemented
+        if times < 1:
+            raise InputError(f"{times} * process: the number of terms must be 1 or more")
+        return Model(self.terms * times)
+
+    def __repr__(self) -> str:
+        counts = Counter(repr(term) for term in self.terms)
+        return " + ".join(f"{n} * {text}" if n > 1 else text for text, n in counts.items())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Model) and self.terms == other.terms
+
+    def __hash__(self) -> int:
+        return hash(self.terms)
+
+
+def as_model(model: Process | Model) -> Model:
+    """A model of one term from a process; a model as it is.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    if isinstance(model, Model):
+        return model
+    if isinstance(model, Process):
+        return Model((model,))
+    raise InputError(
+        f"{model!r} is no error model: build one like WhiteNoise() + 2 * GaussMarkov()"
+    )
+
+
+def _in_order(terms: tuple[Process, ...]) -> tuple[Process, ...]:
+    """Sort Gauss-Markov terms by correlation time, in the places they have."""
+    places = [i for i, term in enumerate(terms) if isinstance(term, GaussMarkov)]
+    times = [terms[i].values["tau"] for i in places]
+    if any(tau is None for tau in times):
+        return terms
+    ordered = list(terms)
+    ranked = sorted(places, key=lambda i: terms[i].values["tau"] or 0.0)
+    for place, source in zip(places, ranked, strict=True):
+        ordered[place] = terms[source]
+    return tuple(ordered)
+
+
+def _check_distinct(terms: tuple[Process, ...]) -> None:
+    for i, term in enumerate(terms):
+        for other in terms[:i]:
+            if type(term) is not type(other):
+                continue
+            name = type(term).__name__
+            if not term.is_repeatable(term):
+                raise InputError(
+                    f"two {name} in one model cannot be told apart: keep one (variances add up)"
+                )
+            shapes = [
+                tuple(t.values[p.name] for p in t.shape_parameters) for t in (term, other)
+            ]
+            if shapes[0] == shapes[1] and None not in shapes[0]:
+                values = ", ".join(
+                    f"{p.name} = {v:g}"
+                    for p, v in zip(term.shape_parameters, shapes[0], strict=True)
+                )
+                raise InputError(
+                    f"two {name} of equal {values} in one model cannot be told apart: keep one "
+                    "(variances add up)"
+                )
+
+
+def _number(terms: tuple[Process, ...]) -> tuple[ModelParameter, ...]:
+    """Keys: prefix and name, with _1, _2, ... where several terms would share one."""
+    counts = Counter(term.prefix + p.name for term in terms for p in term.parameters)
+    seen: Counter[str] = Counter()
+    result = []
+    for index, term in enumerate(terms):
+        for parameter in term.parameters:
+            key = term.prefix + parameter.name
+            if counts[key] > 1:
+                seen[key] += 1
+                key = f"{key}_{seen[key]}"
+            result.append(ModelParameter(key, index, parameter, getattr(term, parameter.name)))
+    return tuple(result)

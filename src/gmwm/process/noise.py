@@ -1,0 +1,275 @@
+"""The noises with one parameter: white, quantization, random walk, rate ramp, bias instability.
+
+Letters and definitions follow IEEE Std 952-2020, annex C. The spectra are those of the sampled
+processes, so that closed forms and simulations agree at every averaging time, not only in the
+limit of many samples.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.special import digamma
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process import synthesis
+from gmwm.process.base import Process
+from gmwm.process.parameter import Parameter
+from gmwm.process.state_space import StateSpace
+
+
+class WhiteNoise(Process):
+    """White noise (angle or velocity random walk).
+
+    Parameters
+    ----------
+    N : float, optional
+        Root power spectral density, u/sqrt(Hz). At sampling interval dt the variance is N^2/dt.
+    """
+
+    parameters = (Parameter("N", "u/sqrt(Hz)", "scale", meaning="white noise"),)
+    label: ClassVar[str] = "white noise"
+    N: float | None
+
+    def __init__(self, N: float | None = None) -> None:
+        super().__init__(N)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return np.full_like(f, self.N**2)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        return 0.5 * self.N**2 / np.asarray(tau, dtype=float)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        return np.where(np.asarray(lag) == 0, self.N**2 / dt, 0.0)
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        return StateSpace.white(self.N**2 / dt)
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        series = rng.standard_normal(n)
+        series *= self.N / np.sqrt(dt)
+        return series
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.2), cls(1e-4))
+
+
+class QuantizationNoise(Process):
+    """Quantization noise: the first difference of a white sequence.
+
+    Parameters
+    ----------
+    Q : float, optional
+        Root mean square of the quantized angle or velocity, u s. The series is Q/dt times the
+        first difference of sqrt(12) U(0, 1); its Allan variance is 3 Q^2/tau^2.
+    """
+
+    parameters = (Parameter("Q", "u s", "scale", meaning="quantization noise"),)
+    label: ClassVar[str] = "quantization noise"
+    Q: float | None
+
+    def __init__(self, Q: float | None = None) -> None:
+        super().__init__(Q)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return 4.0 * self.Q**2 / dt * np.sin(np.pi * f * dt) ** 2
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        return 1.5 * self.Q**2 / np.asarray(tau, dtype=float) ** 2
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        lag = np.asarray(lag)
+        return (self.Q / dt) ** 2 * np.where(lag == 0, 2.0, np.where(lag == 1, -1.0, 0.0))
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        return StateSpace(
+            transition=np.array([[0.0, 0.0], [1.0, 0.0]]),
+            process_noise=np.diag([1.0, 0.0]),
+            output=np.array([1.0, -1.0]) * self.Q / dt,
+            measurement_noise=0.0,
+            initial_mean=np.zeros(2),
+            initial_covariance=np.eye(2),
+            names=("quantization", "quantization, previous"),
+        )
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        return np.sqrt(12.0) * self.Q / dt * np.diff(rng.random(n + 1))
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.7), cls(3e-5))
+
+
+class RandomWalk(Process):
+    """Random walk (rate or acceleration random walk); starts at zero.
+
+    Parameters
+    ----------
+    K : float, optional
+        u/s/sqrt(Hz). The variance of the increment over dt is K^2 dt.
+    """
+
+    parameters = (Parameter("K", "u/s/sqrt(Hz)", "scale", meaning="random walk"),)
+    label: ClassVar[str] = "random walk"
+    K: float | None
+
+    def __init__(self, K: float | None = None) -> None:
+        super().__init__(K)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return 0.25 * (self.K * dt) ** 2 / np.sin(np.pi * f * dt) ** 2
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        tau = np.asarray(tau, dtype=float)
+        return self.K**2 * (tau / 6.0 + dt * (dt / tau) / 12.0)
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        return StateSpace.scalar("random walk", 1.0, self.K**2 * dt, 0.0)
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        steps = rng.standard_normal(n)
+        steps[0] = 0.0
+        return self.K * np.sqrt(dt) * np.cumsum(steps)
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.02), cls(5e-7))
+
+
+class RateRamp(Process):
+    """Rate ramp: a deterministic drift, zero at the first sample.
+
+    Parameters
+    ----------
+    R : float, optional
+        Slope, u/s, signed.
+    """
+
+    parameters = (Parameter("R", "u/s", "slope", lower=-np.inf, meaning="rate ramp"),)
+    label: ClassVar[str] = "rate ramp"
+    R: float | None
+
+    def __init__(self, R: float | None = None) -> None:
+        super().__init__(R)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return np.zeros_like(f)
+
+    def drift_rate(self) -> float:
+        return float(self.R)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        return 0.25 * (self.R * np.asarray(tau, dtype=float)) ** 2
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        return StateSpace(
+            transition=np.array([[1.0, dt], [0.0, 1.0]]),
+            process_noise=np.zeros((2, 2)),
+            output=np.array([1.0, 0.0]),
+            measurement_noise=0.0,
+            initial_mean=np.array([0.0, self.R]),
+            initial_covariance=np.zeros((2, 2)),
+            names=("ramp", "ramp rate"),
+        )
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        return self.R * dt * np.arange(n)
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.003), cls(-1e-8))
+
+
+class BiasInstability(Process):
+    """Bias instability: flicker noise, S(f) = B^2/(2 pi f) at low frequencies; starts at zero.
+
+    Parameters
+    ----------
+    B : float, optional
+        u. The Allan variance levels off at (2 ln 2/pi) B^2.
+
+    Notes
+    -----
+    The sampled process is fractionally integrated white noise of order 1/2 (Hosking 1981,
+    *Biometrika* 68, 165-176; Kasdin 1995, *Proc. IEEE* 83, 802-827), S(f) = B^2 dt / (2 sin(pi f
+    dt)). Its variogram is the finite sum (4 B^2/pi) O(k), O(k) = 1 + 1/3 + ... + 1/(2k - 1), from
+    which the wavelet variance of averaging time m dt follows as (B^2/pi) [2 (O(2m) - O(m)) +
+    (4 O(m) - O(2m))/(8 m^2)]: B^2/pi at m = 1, (ln 2/pi) B^2 in the limit.
+    """
+
+    parameters = (Parameter("B", "u", "scale", meaning="bias instability"),)
+    label: ClassVar[str] = "bias instability"
+    B: float | None
+
+    states_per_decade: ClassVar[int] = 2
+    """Density of the Gauss-Markov bank in the state-space form."""
+
+    def __init__(self, B: float | None = None) -> None:
+        super().__init__(B)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        return 0.5 * self.B**2 * dt / np.sin(np.pi * f * dt)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        m = np.asarray(tau, dtype=float) / dt
+        single, double = _odd_harmonic(m), _odd_harmonic(2.0 * m)
+        bracket = 2.0 * (double - single) + (4.0 * single - double) / (8.0 * m**2)
+        return self.B**2 / np.pi * bracket
+
+    def state_space(self, dt: float, *, span: float = 1e6) -> StateSpace:
+        """A bank of Gauss-Markov processes that stands for 1/f over ``span * dt``.
+
+        Flicker noise has no finite state space. A continuum of Gauss-Markov processes with
+        variance B^2/pi per unit of ln(tau) has exactly its low-frequency spectrum; here it is
+        sampled at ``states_per_decade`` correlation times per decade.
+        """
+        self._require_given()
+        n_states = int(np.ceil(np.log10(span) * self.states_per_decade)) + 1
+        tau = dt * np.logspace(-0.5, np.log10(span), n_states)
+        variance = self.B**2 / np.pi * np.log(tau[1] / tau[0])
+        return StateSpace.stack(
+            [
+                StateSpace.scalar(
+                    f"flicker {value:.3g} s",
+                    float(np.exp(-dt / value)),
+                    float(-variance * np.expm1(-2.0 * dt / value)),
+                    float(variance),
+                )
+                for value in tau
+            ]
+        )
+
+    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        # Exact: the increments are stationary with autocovariance -(4 B^2/pi)/(4 k^2 - 1).
+        lag = np.arange(n + 1)
+        covariance = -4.0 / np.pi / (4.0 * lag**2 - 1.0)
+        eigenvalues = np.fft.rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real
+        if n == 1:
+            return np.zeros(1)
+        path = np.cumsum(synthesis.circulant(np.maximum(eigenvalues, 0.0), n, rng))
+        return self.B * (path - path[0])
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.3), cls(2e-5))
+
+
+def _odd_harmonic(k: FloatArray) -> FloatArray:
+    """1 + 1/3 + ... + 1/(2k - 1), continued to real k."""
+    return np.asarray(0.5 * (digamma(k + 0.5) - digamma(0.5)))
+
+
+def require_haar_order(order: int, name: str) -> None:
+    """Raise where the Haar wavelet variance of an ``order``-fold integrated process is infinite."""
+    if order > 1:
+        raise InputError(
+            f"{name}: the Haar wavelet variance exists up to one integration, d = {order} is more"
+        )

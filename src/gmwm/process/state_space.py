@@ -1,0 +1,94 @@
+"""Linear state-space form of an error process, as a Kalman filter wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from gmwm._typing import FloatArray
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """``x[k+1] = F x[k] + w[k]``, ``y[k] = h' x[k] + v[k]`` at a fixed sampling interval.
+
+    Attributes
+    ----------
+    transition : (p, p) ndarray
+        F.
+    process_noise : (p, p) ndarray
+        Covariance of w.
+    output : (p,) ndarray
+        h.
+    measurement_noise : float
+        Variance of v (white noise of the channel), in u^2.
+    initial_mean : (p,) ndarray
+        Mean of x[0]; not zero only for a rate ramp.
+    initial_covariance : (p, p) ndarray
+        Stationary covariance of the stationary states; zero for a random walk and a rate ramp,
+        which start at zero.
+    names : tuple of str
+        One name per state.
+    """
+
+    transition: FloatArray
+    process_noise: FloatArray
+    output: FloatArray
+    measurement_noise: float
+    initial_mean: FloatArray
+    initial_covariance: FloatArray
+    names: tuple[str, ...]
+
+    @property
+    def n_states(self) -> int:
+        """Number of states p."""
+        return len(self.names)
+
+    @classmethod
+    def white(cls, variance: float) -> StateSpace:
+        """No states, measurement noise only."""
+        empty = np.zeros((0, 0))
+        return cls(empty, empty, np.zeros(0), variance, np.zeros(0), empty, ())
+
+    @classmethod
+    def scalar(cls, name: str, phi: float, q: float, p0: float) -> StateSpace:
+        """One state with transition ``phi``, driving variance ``q``, initial variance ``p0``."""
+        return cls(
+            np.array([[phi]]),
+            np.array([[q]]),
+            np.ones(1),
+            0.0,
+            np.zeros(1),
+            np.array([[p0]]),
+            (name,),
+        )
+
+    @classmethod
+    def stack(cls, parts: Sequence[StateSpace]) -> StateSpace:
+        """The state space of a sum of independent processes."""
+
+        def diagonal(blocks: list[FloatArray]) -> FloatArray:
+            kept = [block for block in blocks if block.size]
+            return block_diag(*kept) if kept else np.zeros((0, 0))
+
+        return cls(
+            diagonal([part.transition for part in parts]),
+            diagonal([part.process_noise for part in parts]),
+            np.concatenate([part.output for part in parts]),
+            float(sum(part.measurement_noise for part in parts)),
+            np.concatenate([part.initial_mean for part in parts]),
+            diagonal([part.initial_covariance for part in parts]),
+            tuple(name for part in parts for name in part.names),
+        )
+
+    def output_variance(self, n: int) -> FloatArray:
+        """Variance of ``y[0..n-1]`` about its mean, shape (n,), in u^2."""
+        covariance = self.initial_covariance.copy()
+        variance = np.empty(n)
+        for k in range(n):
+            variance[k] = self.output @ covariance @ self.output + self.measurement_noise
+            covariance = self.transition @ covariance @ self.transition.T + self.process_noise
+        return variance

@@ -1,0 +1,179 @@
+"""Units at the edges of the package: strings a person writes, SI inside.
+
+A *quantity* is what a channel measures, ``"gyro"`` (rad/s) or ``"accel"`` (m/s^2). Parameters of
+error processes have units derived from it (``rad/s/sqrt(Hz)``, ``rad/s/sqrt(s)``, ...), written
+here with the placeholder ``u`` for the channel's own unit.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    import pint
+
+SI_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
+"""The SI unit of each quantity."""
+
+DEFAULT_UNIT_CHOICES = {
+    "gyro": ("rad/s", "deg/s", "deg/h", "mdeg/s"),
+    "accel": ("m/s^2", "g", "mg", "ug"),
+}
+"""Units named in error messages and help texts."""
+
+# Own registry with just these lines: it loads in milliseconds, keeps the angle as a dimension
+# (deg/s must not pass for 1/s) and lets "g" mean standard gravity, not gram.
+_DEFINITIONS = (
+    "nano- = 1e-9 = n-",
+    "micro- = 1e-6 = u- = µ-",
+    "milli- = 1e-3 = m-",
+    "kilo- = 1e3 = k-",
+    "radian = [angle] = rad",
+    "degree = 0.017453292519943295 * radian = deg",
+    "arcminute = degree / 60 = arcmin",
+    "arcsecond = degree / 3600 = arcsec",
+    "second = [time] = s",
+    "minute = 60 * second = min",
+    "hour = 3600 * second = h = hr",
+    "hertz = 1 / second = Hz",
+    "meter = [length] = m",
+    "standard_gravity = 9.80665 * meter / second ** 2 = g = g0",
+    "degree_per_second = degree / second = dps",
+)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry:
+    import pint
+
+    registry: pint.UnitRegistry = pint.UnitRegistry(None)
+    for line in _DEFINITIONS:
+        registry.define(line)
+    return registry
+
+
+def _quantity(text: str) -> pint.Quantity:
+    """Parse a unit such as ``deg/h/sqrt(Hz)`` or ``m/s2``."""
+    source = text.strip()
+    expression = re.sub(r"sqrt\(([^()]*)\)|√\(?(\w+)\)?", r"((\1\2)**0.5)", source)
+    expression = expression.replace("²", "**2").replace("^", "**").replace("·", "*")
+    expression = re.sub(r"\b(s|sec)2\b", r"s**2", expression)
+    try:
+        if not source:
+            raise ValueError("empty")
+        return 1.0 * _registry().parse_expression(expression)
+    except Exception as error:  # pint raises a dozen types, some of them from the tokenizer
+        raise InputError(
+            f"unknown unit {text!r}: write it like deg/s, rad/s, g, m/s^2, deg/h/sqrt(Hz)"
+        ) from error
+
+
+@lru_cache(maxsize=512)
+def factor(unit: str, si_unit: str) -> float:
+    """How many ``si_unit`` one ``unit`` is.
+
+    Parameters
+    ----------
+    unit, si_unit : str
+        Two units of the same dimension, such as ``"deg/s"`` and ``"rad/s"``.
+
+    Returns
+    -------
+    float
+        Multiply a number in ``unit`` by this to have it in ``si_unit``.
+
+    Raises
+    ------
+    InputError
+        If a unit is unknown or the two do not measure the same thing.
+    """
+    import pint
+
+    value, target = _quantity(unit), _quantity(si_unit)
+    try:
+        return float((value / target).to("dimensionless").magnitude)
+    except pint.DimensionalityError as error:
+        raise InputError(
+            f"unit {unit!r} does not measure the same as {si_unit}: use a unit of that kind"
+        ) from error
+
+
+def quantity_of(unit: str) -> str:
+    """``"gyro"`` for an angular rate, ``"accel"`` for a specific force.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown or neither of the two.
+    """
+    for quantity, si_unit in SI_UNIT.items():
+        try:
+            factor(unit, si_unit)
+        except InputError:
+            _quantity(unit)
+        else:
+            return quantity
+    raise InputError(f"unit {unit!r} is neither an angular rate nor a specific force")
+
+
+@dataclass(frozen=True)
+class FieldUnit:
+    """A unit in which the field quotes a parameter.
+
+    Attributes
+    ----------
+    unit : str
+        As printed, e.g. ``"deg/sqrt(h)"``.
+    per_si : float
+        Multiply the SI value by this to have it in ``unit``.
+    """
+
+    unit: str
+    per_si: float
+
+
+# What data sheets and IEEE Std 952 / 1554 use for each parameter unit.
+_FIELD_UNITS = {
+    ("gyro", "u/sqrt(Hz)"): ("deg/sqrt(h)", "deg/h/sqrt(Hz)"),
+    ("gyro", "u"): ("deg/h",),
+    ("gyro", "u s"): ("arcsec",),
+    ("gyro", "u/s/sqrt(Hz)"): ("deg/h/sqrt(h)",),
+    ("gyro", "u/s"): ("deg/h/h",),
+    ("accel", "u/sqrt(Hz)"): ("ug/sqrt(Hz)", "m/s/sqrt(h)"),
+    ("accel", "u"): ("ug",),
+    ("accel", "u s"): ("m/s",),
+    ("accel", "u/s/sqrt(Hz)"): ("ug/sqrt(h)",),
+    ("accel", "u/s"): ("ug/h",),
+}
+
+
+def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
+    """Spell a parameter's unit for a channel, e.g. ``u/sqrt(Hz)`` -> ``rad/s/sqrt(Hz)``."""
+    base = SI_UNIT.get(quantity or "", "u")
+    if not parameter_unit.startswith("u"):
+        return parameter_unit
+    return {"u s": f"{base} s", "u": base}.get(parameter_unit, base + parameter_unit[1:])
+
+
+def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:
+    """The units in which the field quotes a parameter; empty where SI is what people use.
+
+    Parameters
+    ----------
+    parameter_unit : str
+        With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
+    quantity : {"gyro", "accel", None}
+
+    Returns
+    -------
+    tuple of FieldUnit
+        The customary one first.
+    """
+    names = _FIELD_UNITS.get((quantity or "", parameter_unit), ())
+    si_unit = si_parameter_unit(parameter_unit, quantity).replace(" s", "*s")
+    return tuple(FieldUnit(name, 1.0 / factor(name, si_unit)) for name in names)

@@ -1,0 +1,223 @@
+"""Covariance of the wavelet variance estimates of a Gaussian process, from its spectrum.
+
+For two levels j, k with M_j, M_k coefficients W free of end effects,
+
+    cov(nu2_j, nu2_k) = 2 / (M_j M_k) sum_h c_jk(h) g_jk(h)^2,
+
+where g_jk is the cross-covariance of W_j and W_k at lag h and c_jk(h) the number of pairs at that
+lag (Percival 1995, *Biometrika* 82, 619-631; Serroukh, Walden & Percival 2000, *JASA* 95, 184-196).
+With c_jk(h) replaced by min(M_j, M_k), which is what it is at the lags that matter unless both
+levels are coarse, the sum is by Parseval's theorem
+
+    2 / max(M_j, M_k) int |H_j|^2 |H_k|^2 S^2 df.
+
+For the coarse levels, whose few coefficients make the counts matter, this is multiplied by the
+ratio of the two sums, with g_jk by FFT from the spectrum; in records of more than
+``_EXACT_SAMPLES`` samples the ratio is taken on means of blocks of samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy import fft
+
+from gmwm._typing import FloatArray
+from gmwm.process.spectral import PSD, haar_gain, quadrature
+
+_EXACT_SAMPLES = 2048
+_BLOCKS = 1024
+_BLOCKS_PER_AVERAGE = 8  # averaging times of fewer blocks are left to the spectral integral
+_FOLDS = 2
+# Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
+_MEAN_PRODUCT_EXCESS = {0: 35.0 / 128.0 - 9.0 / 64.0, 1: 7.0 / 64.0 - 9.0 / 64.0}
+
+
+def haar_counts(n: int, m: FloatArray) -> FloatArray:
+    """Number of Haar coefficients free of end effects: n - 2 m + 1."""
+    return n - 2.0 * np.asarray(m, dtype=float) + 1.0
+
+
+def dyadic_levels(n: int) -> FloatArray:
+    """Averaging times 1, 2, 4, ... in samples with at least one coefficient."""
+    return 2.0 ** np.arange(int(np.log2(n)))
+
+
+@dataclass(frozen=True)
+class _LagSums:
+    """Everything about the coarse levels that does not depend on the spectrum."""
+
+    first: int
+    block: int
+    frequency: FloatArray
+    amplitude: FloatArray
+    counts: FloatArray
+    size: int
+
+
+@lru_cache(maxsize=2)
+def _lag_sums(n: int) -> _LagSums:
+    """Set-up of the sums over lags, on means of blocks of samples."""
+    m = dyadic_levels(n)
+    block = 1 if n <= _EXACT_SAMPLES else 2 ** int(np.floor(np.log2(n / _BLOCKS)))
+    first = 0 if block == 1 else int(np.log2(block * _BLOCKS_PER_AVERAGE))
+    coarse = m[first:] / block
+    length = n / block
+    size = fft.next_fast_len(int(3 * length), real=True)
+    size += size % 2
+    frequency = np.arange(size // 2 + 1) / size
+    frequency[0] = 1e-4 / size
+    amplitude = np.sin(np.pi * coarse[:, None] * frequency) ** 2
+    amplitude /= coarse[:, None] * np.sin(np.pi * frequency)
+    available = length - 2.0 * coarse + 1.0
+    lag = np.arange(size, dtype=float)
+    lag[size // 2 + 1 :] -= size
+    counts = np.empty((coarse.size, coarse.size, size))
+    for j, m_j in enumerate(coarse):
+        for k, m_k in enumerate(coarse):
+            # s from 2 m_j - 1 and t from 2 m_k - 1 up to the end; h = s - t. The cross-covariance
+            # is even about h = m_j - m_k.
+            h = lag + (m_j - m_k)
+            low = np.maximum(2.0 * m_k - 1.0, 2.0 * m_j - 1.0 - h)
+            high = np.minimum(length - 1.0, length - 1.0 - h)
+            counts[j, k] = np.maximum(high - low + 1.0, 0.0)
+    counts /= np.minimum.outer(available, available)[:, :, None]
+    return _LagSums(first, block, frequency, amplitude, counts, size)
+
+
+def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> FloatArray:
+    """Spectrum of means over blocks of samples, in u^2 per cycle per block.
+
+    The spectrum of block means is that of the running mean, folded ``block`` times. The nearest
+    folds are summed; the smoothing of all others shares the factor sin^2(pi f), and their sum is
+    an integral over the rest of the band.
+    """
+    if block == 1:
+        return np.asarray(psd(frequency / dt, dt)) / dt
+    total = np.zeros_like(frequency)
+    folds = min(_FOLDS, block // 2)
+    for fold in range(-folds, folds + 1):
+        f = np.abs(frequency + fold) / block
+        smoothing = (np.sin(np.pi * block * f) / (block * np.sin(np.pi * f))) ** 2
+        # With an even number of folds the outermost one is half of the fold on either side.
+        share = 0.5 if 2 * abs(fold) == block else 1.0
+        total += share * smoothing * np.asarray(psd(f / dt, dt)) / (block * dt)
+    x, w = np.polynomial.legendre.leggauss(256)
+    low = (folds + 0.5) / block
+    if low < 0.5:
+        rest = low * (0.5 / low) ** (0.5 * (x + 1.0))
+        weight = 0.5 * w * rest * np.log(0.5 / low)
+        integral = 2.0 * weight @ (np.asarray(psd(rest / dt, dt)) / dt / np.sin(np.pi * rest) ** 2)
+        total += (np.sin(np.pi * frequency) / block) ** 2 * integral
+    return total
+
+
+def _block_spectrum(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
+    """`block_density` at the Fourier frequencies of the lag sums.
+
+    The product of two gains and the spectrum is f^2 S(f) near zero frequency. What stands for
+    its bin at zero is its mean over the bin less what a smooth function would have curved there:
+    exact for short memory, where it vanishes, and for a random walk, where it is constant.
+    """
+    result = block_density(psd, dt, sums.frequency, sums.block)
+    x, w = np.polynomial.legendre.leggauss(8)
+    f = 0.25 / sums.size * (x + 1.0)
+    mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, sums.block))
+    bin_value = (12.0 * mean - sums.frequency[1] ** 2 * result[1]) / 11.0
+    result[0] = max(bin_value, 0.0) / sums.frequency[0] ** 2
+    return result
+
+
+def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
+    """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
+    spectrum = _block_spectrum(psd, dt, sums)
+    levels = sums.amplitude.shape[0]
+    result = np.empty((levels, levels))
+    for j in range(levels):
+        cross = fft.irfft(sums.amplitude[j] * sums.amplitude[j:] * spectrum, sums.size, axis=-1)
+        cross *= cross
+        result[j, j:] = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.sum(cross, axis=-1)
+        result[j:, j] = result[j, j:]
+    return result
+
+
+def _integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
+    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
+    grid = quadrature(tuple(m.tolist()))
+    power = grid.weight * grid.sampled(psd, dt) ** 2
+    integral = (grid.gain * power) @ grid.gain.T
+    # Where lobes were replaced by their mean, the mean of a product of two gains is not the
+    # product of the means if the averaging times are equal or differ by a factor of two.
+    tail = power / np.sin(np.pi * grid.frequency) ** 4
+    for step, excess in _MEAN_PRODUCT_EXCESS.items():
+        for j in range(m.size - step):
+            k = j + step
+            averaged = 1.0 - grid.resolved[j] * grid.resolved[k]
+            correction = excess * (averaged @ tail) / (m[j] * m[k]) ** 2
+            integral[j, k] += correction
+            integral[k, j] = integral[j, k]
+    return np.asarray(4.0 * integral)
+
+
+def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
+    """Covariance of the means over time of the Haar coefficients of the levels, (J, J), in u^2.
+
+    It scales what a drift adds to the covariance of the wavelet variances. At fine levels, where
+    a drift that the record can show is far below the noise, it is left at zero.
+    """
+    sums = _lag_sums(n)
+    spectrum = _block_spectrum(psd, dt, sums)
+    m = dyadic_levels(n)
+    counts = haar_counts(n, m)[sums.first :] / sums.block
+    result = np.zeros((m.size, m.size))
+    for j in range(counts.size):
+        cross = fft.irfft(sums.amplitude[j] * sums.amplitude[j:] * spectrum, sums.size, axis=-1)
+        row = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.maximum(counts[j], counts[j:])
+        result[sums.first + j, sums.first + j :] = row
+        result[sums.first + j :, sums.first + j] = row
+    return result
+
+
+def haar_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
+    """Covariance of the Haar wavelet variance estimates of a Gaussian series.
+
+    Parameters
+    ----------
+    psd : callable
+        ``psd(f, dt)``, two-sided, in u^2/Hz.
+    n : int
+        Number of samples.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    (J, J) ndarray
+        In u^4, for the levels of `dyadic_levels`.
+    """
+    m = dyadic_levels(n)
+    counts = haar_counts(n, m)
+    covariance = _integrals(psd, dt, m) / np.maximum.outer(counts, counts)
+    sums = _lag_sums(n)
+    covariance[sums.first :, sums.first :] *= _end_effects(psd, dt, sums)
+    return covariance
+
+
+def line_covariance(
+    lines: tuple[tuple[float, float], ...], psd: PSD, n: int, dt: float
+) -> FloatArray:
+    """What spectral lines add to the covariance: their product with the noise around them.
+
+    A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
+    """
+    m = dyadic_levels(n)
+    counts = haar_counts(n, m)
+    total = np.zeros((m.size, m.size))
+    for frequency, amplitude in lines:
+        f = np.array([abs(frequency * dt - np.rint(frequency * dt))])
+        gain = np.array([haar_gain(value, f)[0] for value in m])
+        density = float(np.asarray(psd(f / dt, dt))[0]) / dt
+        total += 2.0 * amplitude**2 * density * np.outer(gain, gain) / np.maximum.outer(counts, counts)
+    return total
