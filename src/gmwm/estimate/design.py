@@ -219,8 +219,8 @@ class Design:
     def fitted_processes(self, x: FloatArray, shapes: Sequence[Shape]) -> list[Process]:
         """The terms with estimated values."""
         amplitude = self.amplitudes(x)
-        result = []
-        for i, (term, shape) in enumerate(zip(self.terms, shapes, strict=True)):
+        result: list[Process] = []
+        for i, (term, shape) in enumerate(zip(self.terms, _distinct(self.terms, shapes), strict=True)):
             process = term.with_shape(shape)
             linear = process.linear_parameter
             if linear is not None and term.free_scale:
@@ -228,6 +228,13 @@ class Design:
                 process = process.with_values(**{linear.name: value})
             result.append(process)
         return result
+
+    def fitted_noise(self, x: FloatArray, shapes: Sequence[Shape]) -> Model:
+        """The model of the terms that have an amplitude; of the first one if none has."""
+        fitted = self.fitted_processes(x, shapes)
+        amplitude = self.amplitudes(x)
+        present = [process for process, a in zip(fitted, amplitude, strict=True) if a > 0.0]
+        return Model(tuple(present or fitted[:1]))
 
     def ordered(self, shapes: Sequence[Shape]) -> list[int]:
         """Order of the terms in which Gauss-Markov terms stand by rising correlation time."""
@@ -237,3 +244,15 @@ class Design:
         for place, source in zip(places, ranked, strict=True):
             order[place] = source
         return order
+
+
+def _distinct(terms: Sequence[Term], shapes: Sequence[Shape]) -> list[Shape]:
+    """Shapes with those moved apart that came out equal, as terms without amplitude do."""
+    seen: set[tuple[type, Shape]] = set()
+    result = []
+    for term, shape in zip(terms, shapes, strict=True):
+        while shape and (type(term.process), shape) in seen:
+            shape = (shape[0] * (1.0 + 1e-9), *shape[1:])
+        seen.add((type(term.process), shape))
+        result.append(shape)
+    return result

@@ -36,7 +36,7 @@ class Slope:
     variance: float
 
 
-def endpoint_slope(wv: WaveletVariance) -> Slope:
+def ols_slope(wv: WaveletVariance) -> Slope:
     """Ordinary least-squares slope of the block means, its variance left at zero: a first value."""
     t = np.arange(wv.blocks.size) * (wv.block * wv.dt)
     return Slope(float(np.polynomial.polynomial.polyfit(t, wv.blocks, 1)[1]), 0.0)

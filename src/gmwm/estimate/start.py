@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -112,14 +113,33 @@ def _refine_present(profile: Profile, point: Point) -> Point:
     return Point(shapes, found.x, found.objective)
 
 
-def dictionary_covariance(
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A rich mixture fitted to the wavelet variances.
+
+    Attributes
+    ----------
+    covariance : (J, J) ndarray
+        Of the wavelet variances under it, u^4.
+    residual : (J,) ndarray
+        What it leaves of them, u^2.
+    dof : int
+        Levels less the processes it uses.
+    """
+
+    covariance: FloatArray
+    residual: FloatArray
+    dof: int
+
+
+def dictionary_fit(
     wv: WaveletVariance, target: FloatArray, extra: tuple[Process, ...] = ()
-) -> FloatArray:
-    """Covariance of the wavelet variances under a rich non-negative mixture fitted to them.
+) -> Reference:
+    """Non-negative least-squares fit of a dictionary of processes.
 
     White, quantization and random-walk noise, a grid of Gauss-Markov processes and the kinds of
-    ``extra`` together follow almost any wavelet variance; their non-negative least-squares fit is
-    a spectrum close enough for first weights, whatever model is to be fitted.
+    ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
+    first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
     kinds = {type(process): process for process in extra}
     kinds.pop(GaussMarkov, None)
@@ -127,15 +147,14 @@ def dictionary_covariance(
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
     design = Design(Model(processes), wv.tau, wv.dt, wv.n)
     owner, shapes, columns = [], [], []
-    for i in range(len(design.terms)):
-        if i not in design.linear:
-            continue
+    for i in design.linear:
         for shape, curve in zip(design.grid(i), design.grid_curves(i).T, strict=True):
             owner.append(i)
             shapes.append(shape)
             columns.append(curve)
+    matrix = np.stack(columns, axis=1)
     root = weight_root(wv.covariance)
-    x, _ = solve_nonnegative(root @ np.stack(columns, axis=1), root @ target)
+    x, _ = solve_nonnegative(root @ matrix, root @ target)
     mixture = []
     for k in np.flatnonzero(x > 0.0):
         term = design.terms[owner[k]]
@@ -143,6 +162,7 @@ def dictionary_covariance(
         assert linear is not None
         value = float(x[k]) ** (1.0 / linear.power)
         mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
-    if not mixture:
-        return wv.covariance
-    return haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
+    covariance = wv.covariance
+    if mixture:
+        covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
+    return Reference(covariance, target - matrix @ x, max(wv.tau.size - len(mixture), 3))

@@ -1,5 +1,9 @@
 """What an error process is: parameters, spectrum, wavelet variance, state space, simulation."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from gmwm.errors import InputError
 from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process
 from gmwm.process.gauss_markov import GaussMarkov, Resonance
@@ -31,6 +35,30 @@ CATALOGUE: tuple[type[Process], ...] = (
 )
 """Every built-in process."""
 
+
+
+def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
+    """The model whose terms were written with ``to_dict``.
+
+    Raises
+    ------
+    InputError
+        For a process that is not built in, or parameters it does not have.
+    """
+    kinds = {kind.__name__: kind for kind in CATALOGUE}
+    terms = []
+    for item in content:
+        arguments = dict(item)
+        name = arguments.pop("process", None)
+        if name not in kinds:
+            raise InputError(f"unknown process {name!r}: built in are {', '.join(kinds)}")
+        try:
+            terms.append(kinds[name](**arguments))
+        except TypeError as error:
+            raise InputError(f"{name}: {error}") from None
+    return Model(tuple(terms))
+
+
 __all__ = [
     "AR",
     "ARIMA",
@@ -50,4 +78,5 @@ __all__ = [
     "StateSpace",
     "WhiteNoise",
     "as_model",
+    "model_from_list",
 ]

@@ -103,6 +103,13 @@ class ARIMA(Process):
             raise InputError(f"{type(self).__name__} has no parameter {sorted(unknown)[0]!r}")
         return self._build(self._arguments({**self.values, **values}))
 
+    def to_dict(self) -> dict[str, Any]:
+        arguments = self._arguments(self.values)
+        if type(self) is not ARIMA:
+            kept = {"AR": ("ar",), "MA": ("ma",)}.get(type(self).__name__, ("ar", "ma"))
+            arguments = {name: arguments[name] for name in (*kept, "sigma2")}
+        return {"process": type(self).__name__, **arguments}
+
     def _build(self, arguments: dict[str, Any]) -> Self:
         return type(self)(**arguments)
 

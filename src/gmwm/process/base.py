@@ -268,6 +268,10 @@ class Process(ABC):
         """Instances with given parameters, held to the laws of the test suite."""
         return ()
 
+    def to_dict(self) -> dict[str, Any]:
+        """Kind and constructor arguments in JSON types."""
+        return {"process": type(self).__name__, **self.values}
+
     # -- sums, looks, equality --------------------------------------------------------------------
 
     def __add__(self, other: Any) -> Any:

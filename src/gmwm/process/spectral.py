@@ -72,6 +72,13 @@ def haar_gain(m: float, frequency: FloatArray) -> FloatArray:
     return np.sin(np.pi * m * frequency) ** 4 / (m * np.sin(np.pi * frequency)) ** 2
 
 
+@lru_cache(maxsize=8)
+def legendre(order: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes and weights on [-1, 1]."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    return x, w
+
+
 def _smooth_cut(u: FloatArray) -> FloatArray:
     """1 at u <= 0, 0 at u >= 1, infinitely differentiable."""
     u = np.clip(u, 1e-9, 1.0 - 1e-9)
@@ -80,7 +87,7 @@ def _smooth_cut(u: FloatArray) -> FloatArray:
 
 def _nodes(m_max: float) -> tuple[FloatArray, FloatArray]:
     """Gauss-Legendre nodes and weights on [0, 1/2], panels graded by octave."""
-    x, w = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
+    x, w = legendre(_NODES_PER_PANEL)
     n_octaves = int(np.ceil(np.log2(max(m_max, 1.0)))) + _OCTAVES_BELOW
     edges = [np.array([0.0])]
     for octave in range(n_octaves, -1, -1):

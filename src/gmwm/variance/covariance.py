@@ -25,7 +25,7 @@ import numpy as np
 from scipy import fft
 
 from gmwm._typing import FloatArray
-from gmwm.process.spectral import PSD, haar_gain, quadrature
+from gmwm.process.spectral import PSD, haar_gain, legendre, quadrature
 
 _EXACT_SAMPLES = 2048
 _BLOCKS = 1024
@@ -104,7 +104,7 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
         # With an even number of folds the outermost one is half of the fold on either side.
         share = 0.5 if 2 * abs(fold) == block else 1.0
         total += share * smoothing * np.asarray(psd(f / dt, dt)) / (block * dt)
-    x, w = np.polynomial.legendre.leggauss(256)
+    x, w = legendre(256)
     low = (folds + 0.5) / block
     if low < 0.5:
         rest = low * (0.5 / low) ** (0.5 * (x + 1.0))
@@ -122,7 +122,7 @@ def _block_spectrum(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     exact for short memory, where it vanishes, and for a random walk, where it is constant.
     """
     result = block_density(psd, dt, sums.frequency, sums.block)
-    x, w = np.polynomial.legendre.leggauss(8)
+    x, w = legendre(8)
     f = 0.25 / sums.size * (x + 1.0)
     mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, sums.block))
     bin_value = (12.0 * mean - sums.frequency[1] ** 2 * result[1]) / 11.0

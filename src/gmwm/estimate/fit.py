@@ -1,0 +1,271 @@
+"""The result of an estimation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import norm
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process import Model, model_from_list
+from gmwm.process.model import ModelParameter
+from gmwm.units import field_units, si_parameter_unit
+from gmwm.variance.wavelet import WaveletVariance
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An estimated error model of one channel.
+
+    Attributes
+    ----------
+    model : Model
+        With the estimated (and the given) values.
+    wv : WaveletVariance
+        The data.
+    keys : tuple of str
+        Names of the estimated parameters, without those at their bound.
+    covariance : (p, p) ndarray
+        Covariance of the estimates, in the order of ``keys``, in products of their SI units.
+    upper_bounds : dict
+        95 % upper bound of each parameter that was estimated as zero.
+    objective : float
+        Weighted sum of squares (nu_hat - nu)' Sigma^-1 (nu_hat - nu) at the estimate; chi-square
+        with ``dof`` degrees of freedom if the model is right.
+    dof : int
+        Levels less estimated parameters.
+    discrepancy : float
+        Relative error granted to the model at each level, as a share of the variance; zero where
+        it describes the data to within their statistical errors.
+    p_value : float
+        Of the chi-square test, taken on the cube roots of the wavelet variances, which are close
+        to normal at coarse levels too; NaN without degrees of freedom.
+    method, omega : str
+        How it was estimated.
+    valid : bool
+        Whether every parameter is supported by the data and the model describes them.
+    remarks : tuple of str
+        What is off, one sentence each.
+    """
+
+    model: Model
+    wv: WaveletVariance
+    keys: tuple[str, ...]
+    covariance: FloatArray
+    upper_bounds: dict[str, float]
+    objective: float
+    dof: int
+    discrepancy: float
+    p_value: float
+    method: str
+    omega: str
+    valid: bool
+    remarks: tuple[str, ...]
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Parameter values in SI units; Gauss-Markov terms by rising correlation time."""
+        return {key: float(value or 0.0) for key, value in self.model.params.items()}
+
+    @property
+    def stderr(self) -> dict[str, float]:
+        """Standard errors of the estimated parameters, in SI units."""
+        errors = np.sqrt(np.diag(self.covariance))
+        return dict(zip(self.keys, map(float, errors), strict=True))
+
+    @property
+    def message(self) -> str:
+        """What is off, in sentences; empty if nothing is."""
+        return "; ".join(self.remarks)
+
+    def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Confidence intervals that keep to the parameters' ranges.
+
+        Positive parameters have intervals symmetric in the logarithm; a parameter estimated as zero
+        goes from zero to its upper bound (which is one of 95 %).
+
+        Parameters
+        ----------
+        level : float, optional
+
+        Returns
+        -------
+        dict
+            Key -> (lower, upper), in SI units, for every estimated parameter.
+
+        Raises
+        ------
+        InputError
+            If ``level`` is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise InputError(f"level = {level!r}: give a number between 0 and 1, e.g. 0.95")
+        quantile = float(norm.ppf(0.5 + 0.5 * level))
+        params, errors = self.params, self.stderr
+        result = {}
+        for item in self.model.parameters:
+            key, value = item.key, params[item.key]
+            if key in self.upper_bounds:
+                result[key] = (0.0, self.upper_bounds[key])
+            elif key in errors:
+                result[key] = _interval(item, value, quantile * errors[key])
+        return result
+
+    @property
+    def n_estimated(self) -> int:
+        """Number of parameters that were left open."""
+        return len(self.keys) + len(self.upper_bounds)
+
+    # -- curves -----------------------------------------------------------------------------------
+
+    @property
+    def implied(self) -> FloatArray:
+        """Wavelet variance of the fitted model at the data's averaging times, u^2, (J,)."""
+        return self.model.haar_variance(self.wv.tau, self.wv.dt)
+
+    @property
+    def components(self) -> dict[str, FloatArray]:
+        """Wavelet variance of each term, u^2, (J,)."""
+        curves = self.model.component_variances(self.wv.tau, self.wv.dt)
+        return dict(zip(self.model.term_labels(), curves, strict=True))
+
+    # -- looks ------------------------------------------------------------------------------------
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One dict a parameter: key, value, stderr, lower, upper (SI), unit, meaning, field units.
+
+        ``field`` is a list of (value, lower, upper, unit); ``kind`` is "estimated", "given" or
+        "bound".
+        """
+        params, errors, intervals = self.params, self.stderr, self.interval()
+        result = []
+        for item in self.model.parameters:
+            key, unit = item.key, item.parameter.unit
+            low, high = intervals.get(key, (params[key], params[key]))
+            kind = "bound" if key in self.upper_bounds else "estimated" if key in errors else "given"
+            if kind == "given" and self.model.terms[item.term].values.get("sigma") == 0.0:
+                kind = "undefined"
+            result.append(
+                {
+                    "key": key,
+                    "meaning": item.parameter.meaning,
+                    "kind": kind,
+                    "value": params[key],
+                    "stderr": errors.get(key),
+                    "lower": low,
+                    "upper": high,
+                    "unit": si_parameter_unit(unit, self.wv.quantity),
+                    "field": [
+                        (params[key] * f.per_si, low * f.per_si, high * f.per_si, f.unit)
+                        for f in field_units(unit, self.wv.quantity)
+                    ],
+                }
+            )
+        return result
+
+    def __str__(self) -> str:
+        wv = self.wv
+        name = wv.name or "series"
+        lines = [
+            f"{name}: {' + '.join(self.model.term_labels())}",
+            f"{wv.n:,} samples at {1.0 / wv.dt:g} Hz, {wv.tau.size} levels; "
+            f"{self.method.upper()}, {self.omega} weights",
+            "",
+            f"{'parameter':<20} {'estimate':>11} {'std. error':>10}  {'95 % interval':<23} unit",
+        ]
+        lines += [_row(row) for row in self.rows()]
+        fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
+        if np.isfinite(self.p_value):
+            fitness += f", p = {self.p_value:.2g}"
+        lines += ["", fitness, "valid" if self.valid else "NOT VALID"]
+        lines += [f"- {remark}" for remark in self.remarks]
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Allan deviation with error bars, fitted curve and components; returns the axes."""
+        from gmwm import plot
+
+        wv = self.wv
+        axes = plot.deviation(
+            wv.tau,
+            wv.allan_deviation,
+            np.sqrt(2.0 * wv.lower),
+            np.sqrt(2.0 * wv.upper),
+            unit=wv.unit,
+            title=wv.name,
+            ax=ax,
+        )
+        components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
+        plot.curves(axes, wv.tau, np.sqrt(2.0 * self.implied), components)
+        return axes
+
+    # -- tables and files -------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, in JSON types; see `from_dict`."""
+        return {
+            "model": [term.to_dict() for term in self.model.terms],
+            "params": self.params,
+            "stderr": self.stderr,
+            "keys": list(self.keys),
+            "covariance": self.covariance.tolist(),
+            "upper_bounds": self.upper_bounds,
+            "objective": self.objective,
+            "dof": self.dof,
+            "discrepancy": self.discrepancy,
+            "p_value": None if np.isnan(self.p_value) else self.p_value,
+            "method": self.method,
+            "omega": self.omega,
+            "valid": self.valid,
+            "remarks": list(self.remarks),
+            "units": {row["key"]: row["unit"] for row in self.rows()},
+            "wavelet_variance": self.wv.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Fit:
+        """Inverse of `to_dict`."""
+        p = len(content["keys"])
+        return cls(
+            model=model_from_list(content["model"]),
+            wv=WaveletVariance.from_dict(content["wavelet_variance"]),
+            keys=tuple(content["keys"]),
+            covariance=np.array(content["covariance"], dtype=float).reshape(p, p),
+            upper_bounds=dict(content["upper_bounds"]),
+            objective=content["objective"],
+            dof=content["dof"],
+            discrepancy=content["discrepancy"],
+            p_value=float("nan") if content["p_value"] is None else content["p_value"],
+            method=content["method"],
+            omega=content["omega"],
+            valid=content["valid"],
+            remarks=tuple(content["remarks"]),
+        )
+
+
+def _interval(item: ModelParameter, value: float, half_width: float) -> tuple[float, float]:
+    parameter = item.parameter
+    if parameter.lower == 0.0 and value > 0.0:
+        ratio = float(np.exp(min(half_width / value, 700.0)))
+        return value / ratio, min(value * ratio, parameter.upper)
+    return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
+
+
+def _row(row: dict[str, Any]) -> str:
+    head = f"{row['key']:<20}"
+    if row["kind"] == "undefined":
+        return f"{head} {'-':>11} {'':>10}  {'term has no amplitude':<23} {row['unit']}"
+    if row["kind"] == "given":
+        return f"{head} {row['value']:>11.5g} {'':>10}  {'given':<23} {row['unit']}"
+    if row["kind"] == "bound":
+        return f"{head} {0:>11} {'':>10}  {'< ' + format(row['upper'], '.4g'):<23} {row['unit']}"
+    interval = f"{row['lower']:.4g} .. {row['upper']:.4g}"
+    return f"{head} {row['value']:>11.5g} {row['stderr']:>10.2g}  {interval:<23} {row['unit']}"

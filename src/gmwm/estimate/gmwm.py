@@ -1,0 +1,212 @@
+"""The Generalized Method of Wavelet Moments.
+
+Guerrier, Skaloud, Stebler & Victoria-Feser (2013), *JASA* 108, 1021-1030; Stebler et al. (2012).
+The parameters minimise ``(nu_hat - nu(theta))' Omega (nu_hat - nu(theta))``. By default Omega is the
+inverse covariance of the estimates that the fitted model itself implies, iterated to a fixed
+point: it is smooth where one computed from the data is noisy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.design import Design
+from gmwm.estimate.discrepancy import Discrepancy
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.profile import Point, Profile, weight_root
+from gmwm.estimate.ramp import (
+    Slope,
+    bias_of_detrending,
+    detrended_covariance,
+    gls_slope,
+    ols_slope,
+)
+from gmwm.estimate.start import dictionary_fit, search
+from gmwm.estimate.uncertainty import describe
+from gmwm.process import Model, Process, RateRamp, as_model
+from gmwm.recording import Channel
+from gmwm.variance.covariance import haar_covariance, line_covariance
+from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+
+WEIGHTS = ("model", "diagonal", "identity")
+METHODS = ("gmwm",)
+
+_MAX_ROUNDS = 50
+_LEAST_PART = 0.05
+_DISCREPANCY_EVERY = 3
+_TOLERANCE = 1e-4  # of the implied curve from round to round, in standard deviations of the data
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What is known of a series before and while its noise is fitted.
+
+    Attributes
+    ----------
+    wv : WaveletVariance
+    slope : Slope or None
+        Drift removed from the wavelet variances, ``None`` where the model has no ramp.
+    slope_is_free : bool
+        Whether it is estimated (rather than given).
+    """
+
+    wv: WaveletVariance
+    slope: Slope | None
+    slope_is_free: bool
+
+    @classmethod
+    def of(cls, wv: WaveletVariance, model: Model) -> Moments:
+        ramps = [term for term in model.terms if isinstance(term, RateRamp)]
+        if not ramps:
+            return cls(wv, None, False)
+        if ramps[0].R is not None:
+            return cls(wv, Slope(ramps[0].R, 0.0), False)
+        return cls(wv, ols_slope(wv), True)
+
+    @property
+    def target(self) -> FloatArray:
+        """Wavelet variances without the drift, and without what removing it took, u^2, (J,)."""
+        if self.slope is None:
+            return self.wv.variance
+        return self.wv.detrended(self.slope.value) + bias_of_detrending(self.wv, self.slope)
+
+    def under(self, noise: Model, part: float = 1.0) -> Moments:
+        """The same with the slope moved by ``part`` of the way to its estimate under this noise."""
+        if self.slope is None or not self.slope_is_free or not _has_power(noise, self.wv.dt):
+            return self
+        new, old = gls_slope(self.wv, noise.psd), self.slope
+        moved = Slope(
+            (1.0 - part) * old.value + part * new.value,
+            (1.0 - part) * old.variance + part * new.variance,
+        )
+        return replace(self, slope=moved)
+
+    def covariance(self, noise: Model) -> FloatArray:
+        """Covariance of `target` that the fitted noise implies, u^4, (J, J)."""
+        wv = self.wv
+        if not _has_power(noise, wv.dt):
+            return wv.covariance
+        covariance = haar_covariance(noise.psd, wv.n, wv.dt)
+        if noise.lines():
+            covariance += line_covariance(noise.lines(), noise.psd, wv.n, wv.dt)
+        if self.slope_is_free and self.slope is not None:
+            covariance = detrended_covariance(covariance, wv, noise.psd, self.slope)
+        return covariance
+
+
+def _has_power(noise: Model, dt: float) -> bool:
+    return bool(np.any(noise.psd(np.array([1e-6, 0.01, 0.25]) / dt, dt) > 0.0))
+
+
+def fit(
+    model: Process | Model,
+    data: WaveletVariance | Channel | FloatArray,
+    dt: float | None = None,
+    *,
+    method: str = "gmwm",
+    omega: str = "model",
+    discrepancy: float | None = None,
+) -> Fit:
+    """Estimate the open parameters of an error model from a static series.
+
+    Parameters
+    ----------
+    model : Process or Model
+        Parameters that are given stay as they are, open ones are estimated. No starting values
+        are needed.
+    data : WaveletVariance, Channel or (n,) array_like
+    dt : float, optional
+        Sampling interval, s; needed for an array.
+    method : {"gmwm"}
+    omega : {"model", "diagonal", "identity"}
+        Weights: inverse covariance of the wavelet variances implied by the fitted model
+        (efficient), its diagonal, or none.
+    discrepancy : float, optional
+        Relative error that the model is granted at each level beyond the statistical one. By
+        default it is estimated where the model fails the chi-square test, and zero elsewhere; see
+        `gmwm.estimate.discrepancy`.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        If the data cannot be used, or the model has nothing to estimate.
+
+    Examples
+    --------
+    >>> import gmwm
+    >>> truth = gmwm.WhiteNoise(N=0.2) + gmwm.GaussMarkov(sigma=0.5, tau=20.0)
+    >>> fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, n=100_000, dt=1.0, seed=1), dt=1.0)
+    >>> fit.valid
+    True
+    """
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}: known are {', '.join(METHODS)}")
+    if omega not in WEIGHTS:
+        raise InputError(f"omega = {omega!r}: known are {', '.join(WEIGHTS)}")
+    if discrepancy is not None and not 0.0 <= discrepancy < 1.0:
+        raise InputError(f"discrepancy = {discrepancy!r}: give a share of the variance, e.g. 0.02")
+    model = as_model(model)
+    wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
+    if not model.is_open:
+        raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
+    return _fit(model, wv, omega, discrepancy)
+
+
+def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | None) -> Fit:
+    design = Design(model, wv.tau, wv.dt, wv.n)
+    moments = Moments.of(wv, model)
+    if not design.terms:
+        raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")
+    extra = tuple(term.process for term in design.terms)
+    reference = dictionary_fit(wv, moments.target, extra)
+    level = Discrepancy(discrepancy, wv.tau.size - design.n_free)
+    level.update(reference.residual, reference.covariance, moments.target, reference.dof)
+    weights = level.added_to(reference.covariance, moments.target)
+    point = search(Profile(design, moments.target, _root(weights, omega)))
+    # theta -> minimum under the weights that theta implies is iterated to its fixed point. Where
+    # it swings about that, the weights are moved by part of the way only (Aitken's relaxation).
+    part, converged, rounds = 1.0, False, 0
+    curve = _implied(design, point)
+    step = np.zeros_like(curve)
+    while not converged and rounds < _MAX_ROUNDS:
+        rounds += 1
+        noise = design.fitted_noise(point.x, point.shapes)
+        moments = moments.under(noise, part)
+        statistical = moments.covariance(noise)
+        covariance = level.added_to(statistical, moments.target)
+        weights = covariance if rounds == 1 else (1.0 - part) * weights + part * covariance
+        profile = Profile(design, moments.target, _root(weights, omega))
+        # Weights from a first fit may point elsewhere: search anew once, then follow.
+        point = search(profile) if rounds == 1 else profile.refine(profile.at(point.shapes))
+        previous, curve = curve, _implied(design, point)
+        before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))
+        converged = bool(np.max(np.abs(step)) < _TOLERANCE)
+        if converged or rounds % _DISCREPANCY_EVERY == 0:
+            changed = level.update(moments.target - curve, statistical, moments.target)
+            converged = converged and not changed
+        if rounds > 1 and not converged:
+            ratio = float(step @ before) / max(float(before @ before), 1e-300)
+            part = float(np.clip(part / (1.0 - min(ratio, 0.0)), _LEAST_PART, 1.0))
+    return describe(design, moments.target, covariance, point, moments.slope,
+                    wv=wv, omega=omega, slope_is_free=moments.slope_is_free,
+                    converged=converged, discrepancy=level.value)  # fmt: skip
+
+
+def _root(covariance: FloatArray, omega: str) -> FloatArray:
+    if omega == "model":
+        return weight_root(covariance)
+    if omega == "diagonal":
+        return np.diag(1.0 / np.sqrt(np.diag(covariance)))
+    return np.eye(covariance.shape[0]) / np.sqrt(np.max(np.diag(covariance)))
+
+
+def _implied(design: Design, point: Point) -> FloatArray:
+    return np.asarray(design.curves(point.shapes) @ design.amplitudes(point.x))

@@ -1,0 +1,327 @@
+"""From the minimum to a result: covariance, upper bounds, and whether it can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from gmwm._typing import FloatArray
+from gmwm.estimate.design import Design
+from gmwm.estimate.discrepancy import chi_square
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.profile import Point, weight_root
+from gmwm.estimate.ramp import Slope
+from gmwm.process import GaussMarkov, Model, Process
+from gmwm.process.base import Shape
+from gmwm.variance.wavelet import WaveletVariance
+
+_UPPER_LEVEL = 0.95
+_SHAPE_EDGE = 0.05  # in z, from the limit of the search
+_MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation times
+_POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
+_POOR_DOF = 30.0
+
+
+def describe(
+    design: Design,
+    target: FloatArray,
+    covariance: FloatArray,
+    point: Point,
+    slope: Slope | None,
+    *,
+    wv: WaveletVariance,
+    omega: str,
+    slope_is_free: bool,
+    converged: bool,
+    discrepancy: float,
+) -> Fit:
+    """Make the `Fit` of a minimum.
+
+    Parameters
+    ----------
+    design : Design
+    target : (J,) ndarray
+        The moments that were fitted, u^2.
+    covariance : (J, J) ndarray
+        Their covariance under the fitted model, u^4.
+    point : Point
+        The minimum.
+    slope : Slope or None
+    wv : WaveletVariance
+    omega : str
+    slope_is_free, converged : bool
+    discrepancy : float
+        Relative error granted to the model, part of ``covariance``.
+    """
+    order = design.ordered(point.shapes)
+    shapes = [point.shapes[i] for i in order]
+    amplitudes = design.amplitudes(point.x)[order]
+    model, places = _fitted_model(design, point, order, slope)
+    sub = Design(_noise(design, order), design.tau, design.dt, design.n)
+    x = amplitudes[list(sub.linear)]
+    keys, matrix, upper = _linearise(sub, shapes, x, target, covariance, omega, places, model)
+    implied = sub.curves(shapes) @ sub.amplitudes(x)
+    residual = target - implied
+    whitened = weight_root(covariance) @ residual
+    objective = float(whitened @ whitened)
+    n_free = len(keys)
+    dof = design.tau.size - n_free
+    p_value = float("nan")
+    if dof > 0 and np.all(implied > 0.0):
+        p_value = float(chi2.sf(chi_square(target, implied, covariance)[1], dof))
+    if slope_is_free and slope is not None:
+        ramp_key = next(i.key for i in model.parameters if i.parameter.role == "slope")
+        keys = (*keys, ramp_key)
+        matrix = np.pad(matrix, (0, 1))
+        matrix[-1, -1] = slope.variance
+        keys, matrix = _in_model_order(model, keys, matrix)
+    remarks = [
+        *_bound_remarks(model, upper),
+        *_shape_remarks(sub, shapes, x),
+        *_merged_remarks(model, keys, matrix),
+        *_count_remarks(design, sub),
+        *([] if converged else ["the iteration of the weights did not settle"]),
+    ]
+    misfit, poor = _misfit(wv, target, implied, covariance, discrepancy)
+    return Fit(
+        model=model,
+        wv=wv,
+        keys=keys,
+        covariance=matrix,
+        upper_bounds=upper,
+        objective=objective,
+        dof=dof,
+        discrepancy=discrepancy,
+        p_value=p_value,
+        method="gmwm",
+        omega=omega,
+        valid=not remarks and not poor,
+        remarks=(*remarks, *misfit),
+    )
+
+
+def _noise(design: Design, order: Sequence[int]) -> Model:
+    return Model(tuple(design.terms[i].process for i in order))
+
+
+def _fitted_model(
+    design: Design, point: Point, order: Sequence[int], slope: Slope | None
+) -> tuple[Model, list[int]]:
+    """The model with its estimated values, and where the ordered terms stand in it."""
+    fitted = design.fitted_processes(point.x, point.shapes)
+    terms: list[Process] = list(design.model.terms)
+    places = [term.index for term in design.terms]
+    for place, i in zip(places, order, strict=True):
+        terms[place] = fitted[i]
+    for i, term in enumerate(terms):
+        if slope is not None and any(p.role == "slope" for p in term.parameters):
+            terms[i] = term.with_values(R=slope.value)
+    return Model(tuple(terms)), places
+
+
+def _linearise(
+    design: Design,
+    shapes: Sequence[Shape],
+    x: FloatArray,
+    target: FloatArray,
+    covariance: FloatArray,
+    omega: str,
+    places: Sequence[int],
+    model: Model,
+) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
+    """Keys and covariance of the free parameters; upper bounds of those estimated as zero.
+
+    The covariance is the sandwich B V B' with B = (D' Omega D)^-1 D' Omega of the wavelet
+    variances' covariance V, in the parameters' own units. A term of zero amplitude has no
+    covariance; the bound of its amplitude is the quantile of the normal distribution of the
+    unconstrained estimate, cut at zero.
+    """
+    z = design.pack(shapes)
+    amplitudes = design.amplitudes(x)
+    curves = design.curves(shapes)
+    owners = design.owners()
+    slopes = design.shape_derivatives(z, shapes) * amplitudes[owners]
+    positive = [k for k, i in enumerate(design.linear) if amplitudes[i] > 0.0]
+    alive = [k for k, i in enumerate(owners) if amplitudes[i] > 0.0]
+    jacobian = np.column_stack([curves[:, [design.linear[k] for k in positive]], slopes[:, alive]])
+    natural = _sandwich(jacobian, covariance, omega)
+    by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
+    keys: list[str] = []
+    transform = np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    for row, k in enumerate(positive):
+        i = design.linear[k]
+        parameter = design.terms[i].process.linear_parameter
+        assert parameter is not None
+        keys.append(by_term[places[i], parameter.name])
+        value = amplitudes[i] ** (1.0 / parameter.power)
+        transform[row, row] = value / (parameter.power * amplitudes[i])
+    start = len(positive)
+    for i in design.shaped:
+        columns = [start + alive.index(k) for k, owner in enumerate(owners)
+                   if owner == i and k in alive]  # fmt: skip
+        if not columns:
+            continue
+        block, names = _shape_jacobian(design.terms[i].process, shapes[i], design.terms[i].free_shape)
+        keys.extend(by_term[places[i], name] for name in names)
+        transform[np.ix_(columns, columns)] = block
+    matrix = transform @ natural @ transform.T
+    upper: dict[str, float] = {}
+    for k, i in enumerate(design.linear):
+        if amplitudes[i] == 0.0:
+            parameter = design.terms[i].process.linear_parameter
+            assert parameter is not None
+            residual = target - curves @ amplitudes
+            bound = _upper_amplitude(jacobian, curves[:, i], residual, covariance)
+            upper[by_term[places[i], parameter.name]] = bound ** (1.0 / parameter.power)
+    ordered_keys, ordered = _in_model_order(model, tuple(keys), matrix)
+    return ordered_keys, ordered, upper
+
+
+def _in_model_order(
+    model: Model, keys: tuple[str, ...], matrix: FloatArray
+) -> tuple[tuple[str, ...], FloatArray]:
+    ranked = [key for key in model.params if key in keys]
+    index = [keys.index(key) for key in ranked]
+    return tuple(ranked), matrix[np.ix_(index, index)]
+
+
+def _shape_jacobian(
+    process: Process, shape: Shape, free: FloatArray
+) -> tuple[FloatArray, list[str]]:
+    """Derivative of the free shape parameters by their z, and their names."""
+    z = process.shape_to_free(shape)
+    names = [p.name for p in process.shape_parameters]
+    open_ones = np.flatnonzero(free)
+    block = np.empty((open_ones.size, open_ones.size))
+    for column, k in enumerate(open_ones):
+        moved = []
+        for step in (1e-6, -1e-6):
+            point = z.copy()
+            point[k] += step
+            moved.append(np.array(process.shape_from_free(point)))
+        block[:, column] = ((moved[0] - moved[1]) / 2e-6)[open_ones]
+    return block, [names[k] for k in open_ones]
+
+
+def _sandwich(jacobian: FloatArray, covariance: FloatArray, omega: str) -> FloatArray:
+    """B V B' on parameters scaled so that they are of like size."""
+    if jacobian.shape[1] == 0:
+        return np.zeros((0, 0))
+    if omega == "model":
+        root = weight_root(covariance)
+    elif omega == "diagonal":
+        root = np.diag(1.0 / np.sqrt(np.diag(covariance)))
+    else:
+        root = np.eye(covariance.shape[0]) / np.sqrt(np.max(np.diag(covariance)))
+    weighted = root @ jacobian
+    length = np.sqrt(np.sum(weighted**2, axis=0))
+    length[length == 0.0] = 1.0
+    estimator = np.linalg.pinv(weighted / length, rcond=1e-10) @ root / length[:, None]
+    return np.asarray(estimator @ covariance @ estimator.T)
+
+
+def _upper_amplitude(
+    jacobian: FloatArray, curve: FloatArray, residual: FloatArray, covariance: FloatArray
+) -> float:
+    """95 % upper bound of a non-negative amplitude whose estimate is zero."""
+    root = weight_root(covariance)
+    column, others = root @ curve, root @ jacobian
+    if others.shape[1]:
+        basis, _ = np.linalg.qr(others)
+        column = column - basis @ (basis.T @ column)
+    information = float(column @ column)
+    if information <= 0.0:
+        return float("inf")
+    deviation = 1.0 / np.sqrt(information)
+    centre = float(column @ (root @ residual)) / information
+    # Quantile of N(centre, deviation^2) restricted to positive values.
+    tail = norm.sf(-centre / deviation) * (1.0 - _UPPER_LEVEL)
+    return centre + deviation * float(norm.isf(tail))
+
+
+def _bound_remarks(model: Model, upper: dict[str, float]) -> list[str]:
+    return [
+        f"{key} is not identifiable from these data (estimate zero): below {bound:.3g} with 95 % "
+        "confidence"
+        for key, bound in upper.items()
+    ]
+
+
+def _shape_remarks(design: Design, shapes: Sequence[Shape], x: FloatArray) -> list[str]:
+    """Shapes at the edge of what the search allows."""
+    z = design.pack(shapes)
+    low, high = design.bounds(shapes)
+    amplitudes = design.amplitudes(x)
+    remarks = []
+    for k, i in enumerate(design.owners()):
+        if amplitudes[i] > 0.0 and not low[k] + _SHAPE_EDGE < z[k] < high[k] - _SHAPE_EDGE:
+            title = design.terms[i].process.title()
+            remarks.append(
+                f"a {title} term ran to the edge of what this record can show (shape "
+                f"{shapes[i][0]:.3g}): it is not identifiable, leave it out"
+            )
+    return remarks
+
+
+def _merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:
+    """Neighbouring Gauss-Markov terms whose correlation times do not differ significantly."""
+    params = model.params
+    taus = [
+        item.key
+        for item in model.parameters
+        if isinstance(model.terms[item.term], GaussMarkov)
+        and item.parameter.name == "tau"
+        and item.key in keys
+    ]
+    remarks = []
+    for first, second in zip(taus, taus[1:], strict=False):
+        a, b = params[first], params[second]
+        assert a is not None
+        assert b is not None
+        i, j = keys.index(first), keys.index(second)
+        gradient = np.array([-1.0 / a, 1.0 / b])
+        block = matrix[np.ix_([i, j], [i, j])]
+        error = float(np.sqrt(gradient @ block @ gradient))
+        if np.log(b / a) < _MERGED_SIGMA * error or b / a < 1.05:
+            remarks.append(
+                f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, {second} = "
+                f"{b:.3g} s): use one less"
+            )
+    return remarks
+
+
+def _count_remarks(design: Design, sub: Design) -> list[str]:
+    levels = design.tau.size
+    if levels >= sub.n_free:
+        return []
+    return [
+        f"{levels} levels cannot determine {sub.n_free} parameters: record longer or take a "
+        "smaller model"
+    ]
+
+
+def _misfit(
+    wv: WaveletVariance,
+    target: FloatArray,
+    implied: FloatArray,
+    covariance: FloatArray,
+    discrepancy: float,
+) -> tuple[list[str], bool]:
+    """What to say of a model that fails the chi-square test, and whether it fails too badly."""
+    if discrepancy == 0.0:
+        return [], False
+    statistical = np.diag(covariance) - (discrepancy * target) ** 2
+    known = 2.0 * target**2 / np.maximum(statistical, 1e-300) > _POOR_DOF
+    if not np.any(known):
+        return [], False
+    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
+    worst = int(np.argmax(ratio))
+    remark = (
+        "the model differs from the data by more than their statistical errors; a discrepancy of "
+        f"{100.0 * discrepancy:.2g} % of the variance at each level was allowed for and widens the "
+        f"intervals (largest misfit of the deviation {100.0 * ratio[worst]:.2g} % at tau = "
+        f"{wv.tau[known][worst]:.3g} s)"
+    )
+    return [remark], bool(ratio[worst] > _POOR_DEVIATION)

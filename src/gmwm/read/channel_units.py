@@ -1,0 +1,113 @@
+"""The unit of each channel: what the user says, else what the header says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gmwm.errors import InputError
+from gmwm.read.names import meaning
+from gmwm.read.roles import Roles
+from gmwm.read.table import Table
+from gmwm.units import SI_UNIT, factor, quantity_of
+
+_EXAMPLES = {"gyro": "deg/s", "accel": "g"}
+
+
+def channel_units(
+    table: Table, roles: Roles, units: Mapping[str, str]
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Find the unit of every channel.
+
+    Parameters
+    ----------
+    table : Table
+    roles : Roles
+    units : mapping of str to str
+        What the user gave, by sensor or by channel; the latter goes first.
+
+    Returns
+    -------
+    units : dict of str to str
+        By channel.
+    notes : tuple of str
+        Where they come from, if not from the user alone.
+
+    Raises
+    ------
+    InputError
+        If a unit is missing, unknown, or not one of what the channel measures.
+    """
+    _check_keys(units, roles)
+    found: dict[str, str] = {}
+    from_header: dict[str, str] = {}
+    overruled: dict[str, str] = {}
+    for channel, column in roles.channels.items():
+        sensor = _sensor(channel, table.names[column])
+        in_header = meaning(table.names[column]).unit
+        given = units.get(channel, units.get(sensor or ""))
+        unit = given if given is not None else in_header
+        if unit is None:
+            raise _missing(table, channel, sensor)
+        _check(table, channel, sensor, unit)
+        found[channel] = unit
+        if given is None:
+            from_header[channel] = unit
+        elif in_header not in (None, given):
+            overruled[channel] = f"{in_header}, not {given}"
+    return found, tuple(_notes(from_header, overruled))
+
+
+def _sensor(channel: str, column: str) -> str | None:
+    """What a channel measures, by its own name or by that of its column."""
+    for name in (channel, meaning(column).role or ""):
+        for sensor in SI_UNIT:
+            if name.lower().startswith(sensor):
+                return sensor
+    return None
+
+
+def _check_keys(units: Mapping[str, str], roles: Roles) -> None:
+    for key in units:
+        if key not in SI_UNIT and key not in roles.channels:
+            raise InputError(
+                f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
+                f"are {', '.join(roles.channels)}"
+            )
+
+
+def _check(table: Table, channel: str, sensor: str | None, unit: str) -> None:
+    try:
+        if sensor:
+            factor(unit, SI_UNIT[sensor])
+        else:
+            quantity_of(unit)
+    except InputError as error:
+        raise InputError(f"{table.source}, channel {channel}: {error}") from error
+
+
+def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
+    if sensor is None:
+        return InputError(
+            f"{table.source} does not say the unit of {channel}: give it, e.g. "
+            f'units={{"{channel}": "deg/s"}}'
+        )
+    example = _EXAMPLES[sensor]
+    return InputError(
+        f"{table.source} does not say the unit of {channel}: give it, e.g. "
+        f'units={{"{sensor}": "{example}"}} (on the command line --{sensor}-unit {example})'
+    )
+
+
+def _notes(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[str]:
+    notes = []
+    if from_header:
+        by_unit = {
+            unit: ", ".join(name for name, u in from_header.items() if u == unit)
+            for unit in dict.fromkeys(from_header.values())
+        }
+        parts = "; ".join(f"{names} in {unit}" for unit, names in by_unit.items())
+        notes.append(f"Units from the names of the columns: {parts}.")
+    if overruled:
+        parts = "; ".join(f"{name} in {text}" for name, text in overruled.items())
+        notes.append(f"The names of the columns say otherwise than the units given: {parts}.")
+    return notes

@@ -1,0 +1,227 @@
+"""Delimited text (CSV and its relatives), plain or gzip.
+
+Arrow parses block after block. A block that it cannot, or that holds a value which is not finite,
+is read again by plain Python, field by field: that either finds the line and column to complain
+about, or reads what Arrow is too strict for (``+1.5``, quotes). Both give the same numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.read.cells import BLANKS, number, split_line
+from gmwm.read.layout import Layout, find_layout
+from gmwm.read.table import label, usable
+from gmwm.read.text_file import blocks
+
+_HEAD = 1 << 18
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A text file of which the layout is known."""
+
+    path: Path
+    layout: Layout
+
+    @classmethod
+    def open(cls, path: Path) -> CsvTable:
+        """Look at the beginning of a file.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or is no table.
+        """
+        _, head = next(blocks(path, size=_HEAD), (1, b""))
+        return cls(path, find_layout(path.name, head))
+
+    @property
+    def source(self) -> str:
+        """Name of the file."""
+        return self.path.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self.layout.names
+
+    @property
+    def tentative(self) -> bool:
+        """Whether the names come from a comment."""
+        return self.layout.tentative
+
+    @property
+    def rate(self) -> float | None:
+        """A text states no rate."""
+        return None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed in the header."""
+        return self.layout.notes
+
+    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Read some columns.
+
+        Parameters
+        ----------
+        columns : sequence of int
+            Their indices, each once.
+
+        Returns
+        -------
+        dict of int to (n,) ndarray
+
+        Raises
+        ------
+        InputError
+            At the first line with a wrong number of fields or with text for a number; if there
+            is none, for the first number that is missing or not finite.
+        """
+        gaps = _Gaps()
+        parts: list[list[FloatArray]] = [[] for _ in columns]
+        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+            found = _parse_with_arrow(block, self.layout, columns)
+            if found is None:
+                found = _parse_by_field(line, block, self, columns, gaps)
+            for part, values in zip(parts, found, strict=True):
+                part.append(values)
+        gaps.complain(self.source)
+        # One column at a time lets the blocks go before the next one is joined.
+        return {column: np.concatenate(parts.pop(0)) for column in columns}
+
+    def where(self, row: int) -> str:
+        """The line of a row of data."""
+        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+            for i, text in enumerate(block.splitlines(), start=line):
+                if text.strip(b" \t"):
+                    row -= 1
+                if row < 0:
+                    return f"line {i}"
+        return "the last line"
+
+
+@dataclass
+class _Gaps:
+    """Fields without a finite number: the first, and how many."""
+
+    first: str = ""
+    count: int = 0
+
+    def add(self, place: str, cell: str) -> None:
+        """Take note of one."""
+        self.count += 1
+        self.first = self.first or f"{place}: {_excerpt(cell) if cell else 'an empty field'}"
+
+    def complain(self, source: str) -> None:
+        """Refuse the file if there are any."""
+        if self.count:
+            others = f", and {self.count - 1:,} more such" if self.count > 1 else ""
+            raise InputError(
+                f"{source}, {self.first} is not a usable number{others}: cut the file "
+                "before that line, or interpolate"
+            )
+
+
+def _parse_with_arrow(
+    block: bytes, layout: Layout, columns: Sequence[int]
+) -> list[FloatArray] | None:
+    """Read a block the fast way, or return ``None`` if anything in it is unusual."""
+    import pyarrow
+    from pyarrow import csv
+
+    if b'"' in block:
+        return None
+    if layout.delimiter == BLANKS:
+        block = _single_blanks(block)
+    names = [str(i) for i in range(layout.width + layout.trailing)]
+    wanted = [names[i] for i in columns]
+    try:
+        table = csv.read_csv(
+            pyarrow.BufferReader(block),
+            read_options=csv.ReadOptions(column_names=names),
+            parse_options=csv.ParseOptions(
+                delimiter=layout.delimiter,
+                quote_char=False,
+                # In a single column a blank line is a missing sample.
+                ignore_empty_lines=layout.width > 1,
+            ),
+            convert_options=csv.ConvertOptions(
+                include_columns=wanted,
+                column_types=dict.fromkeys(wanted, pyarrow.float64()),
+                null_values=[],
+                decimal_point=layout.decimal,
+            ),
+        )
+    except pyarrow.ArrowInvalid:
+        return None
+    found: list[FloatArray] = [table.column(name).to_numpy() for name in wanted]
+    return found if all(map(usable, found)) else None
+
+
+def _single_blanks(block: bytes) -> bytes:
+    """Turn runs of blanks to single ones, none at the ends of lines."""
+    block = block.replace(b"\t", b" ")
+    while b"  " in block:
+        block = block.replace(b"  ", b" ")
+    for end in (b"\n", b"\r"):
+        block = block.replace(b" " + end, end).replace(end + b" ", end)
+    return block.strip(b" ")
+
+
+def _parse_by_field(
+    first_line: int, block: bytes, table: CsvTable, columns: Sequence[int], gaps: _Gaps
+) -> list[FloatArray]:
+    """Read a block the careful way."""
+    layout = table.layout
+    found = [array("d") for _ in columns]
+    for line, raw in enumerate(block.splitlines(), start=first_line):
+        text = raw.decode(errors="replace")
+        if layout.width > 1 and not text.strip(" \t"):
+            continue
+        place = f"line {line}"
+        cells = _cells(table, place, text)
+        for values, column in zip(found, columns, strict=True):
+            value = number(cells[column], layout.decimal)
+            if value is None:
+                raise InputError(
+                    f"{table.source}, {place}, column {label(table.names, column)}: "
+                    f"{_excerpt(cells[column])} is not a number: mend the line, or choose other "
+                    "columns with channels= and time="
+                )
+            if math.isnan(value):
+                gaps.add(f"{place}, column {label(table.names, column)}", cells[column])
+            values.append(value)
+    return [np.array(values) for values in found]
+
+
+def _cells(table: CsvTable, place: str, text: str) -> list[str]:
+    """Fields of a line; a delimiter after the last one is no harm."""
+    width = table.layout.width
+    try:
+        cells = split_line(text, table.layout.delimiter)
+    except ValueError as error:
+        raise InputError(
+            f"{table.source}, {place}: quotes that do not match ({error}): mend the line"
+        ) from error
+    if len(cells) == width + 1 and not cells[-1]:
+        cells.pop()
+    if len(cells) != width:
+        raise InputError(
+            f"{table.source}, {place}: {len(cells)} fields where {width} were expected: mend the "
+            "line or take it out"
+        )
+    return cells
+
+
+def _excerpt(cell: str) -> str:
+    return repr(cell if len(cell) <= 30 else cell[:27] + "...")

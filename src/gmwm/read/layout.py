@@ -1,0 +1,243 @@
+"""How a delimited text is laid out: delimiter, decimal mark, header, where the data begin."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import mode
+
+from gmwm.errors import InputError
+from gmwm.read.cells import BLANKS, is_missing, number, split_header, split_line
+from gmwm.read.names import meaning
+from gmwm.read.table import FORMATS
+
+_COMMENT_MARKS = ("#", "%")
+_SAMPLE = 100  # lines looked at
+_DELIMITERS = (";", "\t", ",", BLANKS)  # of two that explain the lines equally well, the first
+_UTF8_MARK = b"\xef\xbb\xbf"
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How to read a delimited text.
+
+    Attributes
+    ----------
+    delimiter : str
+        One character; a space stands for runs of spaces and tabs.
+    decimal : {".", ","}
+    names : tuple of str
+        Of the columns, ``""`` where there is none.
+    tentative : bool
+        Whether the names, if any, are those of a comment line.
+    trailing : bool
+        Whether every line of data ends with a delimiter.
+    offset : int
+        Bytes before the first line of data.
+    line : int
+        Number of that line, counted from 1.
+    notes : tuple of str
+    """
+
+    delimiter: str
+    decimal: str
+    names: tuple[str, ...]
+    tentative: bool
+    trailing: bool
+    offset: int
+    line: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+
+@dataclass(frozen=True)
+class _Line:
+    number: int
+    offset: int
+    text: str
+
+
+def find_layout(source: str, head: bytes) -> Layout:
+    """Find out how a text is laid out from its first lines.
+
+    Parameters
+    ----------
+    source : str
+        Name of the file, for messages.
+    head : bytes
+        The beginning of the file, whole lines.
+
+    Raises
+    ------
+    InputError
+        If this is not a text, has no data, or its header does not fit the data.
+    """
+    _check_is_text(source, head)
+    comments, lines = _first_lines(source, head)
+    first, following = lines[0], lines[1:]
+    sample = [line.text for line in following or lines]
+    delimiter = _delimiter(source, sample)
+    decimal = _decimal(sample, delimiter)
+    names = _fields(source, first, delimiter, header=True)
+    has_header = _are_names(names, decimal)
+    if has_header and not following:
+        raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
+    # What pandas writes above columns without names.
+    is_numbering = len(names) > 2 and names == [str(i) for i in range(len(names))]
+    data = following if has_header or (is_numbering and following) else lines
+    rows = [_fields(source, line, delimiter) for line in data]
+    trailing = all(len(row) > 1 and not row[-1] for row in rows)
+    width = mode(len(row) for row in rows) - trailing
+    if has_header:
+        if trailing and len(names) == width + 1 and names[-1]:
+            trailing, width = False, width + 1  # a named column, every field of it empty
+        names = _without_last_empty(names, width)
+        if len(names) != width:
+            raise InputError(
+                f"{source}, line {data[0].number}: {width} fields where the header (line "
+                f"{first.number}) has {len(names)}: give every column one name"
+            )
+    else:
+        names = _commented_names(comments, delimiter, decimal, width)
+    return Layout(
+        delimiter=delimiter,
+        decimal=decimal,
+        names=tuple(names or [""] * width),
+        tentative=not has_header,
+        trailing=trailing,
+        offset=data[0].offset,
+        line=data[0].number,
+        notes=(f"Line {first.number} was taken for column numbers and left out.",)
+        if data is following and not has_header
+        else (),
+    )
+
+
+def _check_is_text(source: str, head: bytes) -> None:
+    if head.startswith(_UTF16_MARKS):
+        raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
+    if b"\0" in head:
+        raise InputError(f"{source} is not a text file: {FORMATS}, export it as one of these")
+
+
+def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
+    """Leading comments, and the lines from the first one that is not a comment."""
+    comments: list[_Line] = []
+    lines: list[_Line] = []
+    start = len(_UTF8_MARK) if head.startswith(_UTF8_MARK) else 0
+    for i, found in enumerate(_LINE.finditer(head, start), start=1):
+        raw = found.group().strip(b" \r\n")
+        if not raw.strip():
+            continue
+        text = raw.decode(errors="replace")
+        if lines or not text.startswith(_COMMENT_MARKS):
+            if not lines:
+                _check_utf8(source, i, raw)
+            lines.append(_Line(i, found.start(), text))
+            if len(lines) == _SAMPLE:
+                break
+        else:
+            comments.append(_Line(i, found.start(), text))
+    if not lines:
+        what = "holds only comments" if comments else "is empty"
+        raise InputError(f"{source} {what}: give a file with samples")
+    return comments, lines
+
+
+def _check_utf8(source: str, line: int, raw: bytes) -> None:
+    try:
+        raw.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{source}, line {line}: byte {raw[error.start]:#04x} is not UTF-8 text: save the "
+            f"file as UTF-8; {FORMATS}"
+        ) from error
+
+
+def _delimiter(source: str, texts: Sequence[str]) -> str:
+    """The delimiter that finds the most numbers."""
+    counts = {delimiter: _count_numbers(texts, delimiter) for delimiter in _DELIMITERS}
+    best = max(_DELIMITERS, key=lambda delimiter: counts[delimiter])
+    if not counts[best]:
+        raise InputError(f"{source} holds no numbers in its first lines: {FORMATS}")
+    # A single column has no delimiter; a comma then is the least surprising one.
+    if best == BLANKS and all(len(text.split()) == 1 for text in texts):
+        return ","
+    return best
+
+
+def _count_numbers(texts: Sequence[str], delimiter: str) -> int:
+    if delimiter != BLANKS and not any(delimiter in text for text in texts):
+        return 0
+    decimal = _decimal(texts, delimiter)
+    found = 0
+    for text in texts:
+        try:
+            cells = split_line(text, delimiter)
+        except ValueError:
+            continue
+        found += sum(_is_number(cell, decimal) for cell in cells)
+    return found
+
+
+def _decimal(texts: Sequence[str], delimiter: str) -> str:
+    """A comma if some field is a number only so; never where the comma parts the fields."""
+    if delimiter == "," or not any("," in text for text in texts):
+        return "."
+    cells = [cell.strip(' \t"') for text in texts for cell in _loose_split(text, delimiter)]
+    return "," if any("," in cell and _is_number(cell, ",") for cell in cells) else "."
+
+
+def _loose_split(text: str, delimiter: str) -> list[str]:
+    return text.split() if delimiter == BLANKS else text.split(delimiter)
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    value = number(cell, decimal)
+    return value is not None and not math.isnan(value)
+
+
+def _are_names(cells: Sequence[str], decimal: str) -> bool:
+    """Names have no number among them, and say something else than that there is none."""
+    return not any(_is_number(cell, decimal) for cell in cells) and not all(
+        is_missing(cell) for cell in cells
+    )
+
+
+def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> list[str]:
+    try:
+        return (split_header if header else split_line)(line.text, delimiter)
+    except ValueError as error:
+        raise InputError(
+            f"{source}, line {line.number}: quotes that do not match ({error}): mend the line"
+        ) from error
+
+
+def _without_last_empty(names: list[str], width: int) -> list[str]:
+    """Drop what stands after a delimiter at the end of a header."""
+    return names[:-1] if len(names) == width + 1 and not names[-1] else names
+
+
+def _commented_names(
+    comments: Sequence[_Line], delimiter: str, decimal: str, width: int
+) -> list[str]:
+    """The comment that is a header: as many words as columns, best with names that we know."""
+    candidates = []
+    for comment in reversed(comments):
+        text = comment.text.lstrip("".join(_COMMENT_MARKS)).strip(" ")
+        try:
+            names = _without_last_empty(split_header(text, delimiter), width)
+        except ValueError:
+            continue
+        if len(names) == width and _are_names(names, decimal):
+            candidates.append(names)
+    known = [names for names in candidates if any(meaning(name).role for name in names)]
+    return next(iter(known + candidates), [])

@@ -1,0 +1,214 @@
+"""What a column's name says: which channel it is, and in what unit.
+
+Names are cut into words (``AngularVelocity.x`` -> angular velocity x), so that separators, case
+and the path before a name do not matter. A unit is what stands in brackets at the end
+(``ax [m/s^2]``) or the last words (``gyro_x_dps``, ``time_us``).
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from gmwm.errors import InputError
+from gmwm.units import quantity_of
+
+AXES = ("x", "y", "z")
+CANONICAL = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in AXES)
+"""Names of the channels, in the order of a recording."""
+
+TIME = "time"
+"""Role of a column of time stamps."""
+
+_SENSOR_WORDS = {
+    word: sensor
+    for sensor, words in {
+        "gyro": "gyro gyr gyroscope omega angularvelocity angularrate angvel angrate "
+        "rotationrate rotrate turnrate rate wrs",
+        "accel": "accel acc accelerometer acceleration linearacceleration linacc linaccel "
+        "specificforce ars",
+    }.items()
+    for word in words.split()
+}
+# These mean a sensor only where nothing stands before them.
+_SENSOR_LETTERS = {"g": "gyro", "w": "gyro", "a": "accel", "f": "accel"}
+
+# Columns about a sensor other than its samples.
+_OTHER_MEANINGS = frozenset(
+    {"bias", "offset", "std", "sigma", "var", "cov", "covariance", "err", "error", "ref"}
+    | {"reference", "true", "truth", "cmd", "desired", "setpoint", "temp", "temperature"}
+    | {"delta", "mag"}
+)
+
+_UNIT_WORDS = {
+    word: unit
+    for unit, words in {
+        "rad/s": "rps rads radps radsec radpersec radpers",
+        "deg/s": "dps degs degps degsec degpersec degpers",
+        "deg/h": "dph degh degph deghr degperhr degperh",
+        "mdeg/s": "mdps mdegs mdegps",
+        "m/s^2": "mss ms2 mps2 mpss mpers2 msec2",
+        "g": "g",
+        "mg": "mg",
+        "ug": "ug",
+    }.items()
+    for word in words.split()
+}
+
+_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
+_BEFORE_TIME = frozenset(
+    {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
+    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local"}
+)
+_SECONDS = {
+    word: seconds
+    for seconds, words in {
+        1.0: "s sec secs second seconds",
+        1e-3: "ms msec msecs millis millisecond milliseconds",
+        1e-6: "us usec usecs micros microsecond microseconds",
+        1e-9: "ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
+    }.items()
+    for word in words.split()
+}
+
+_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
+_CAMEL_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+_GLUED_UNIT = re.compile(r"(time|timestamp|stamp)([mun]s)")
+
+# Only plain products of powers go on to the unit parser: a header is not to be computed.
+_UNIT_FACTOR = r"[A-Za-z°]+(?:(?:\^|\*\*)?-?[1-3])?"
+_UNIT_IN_HEADER = re.compile(rf"{_UNIT_FACTOR}(?:\s*[/*·\s]\s*{_UNIT_FACTOR}){{0,3}}")
+_POWER = re.compile(r"(?<=[A-Za-z])(?:\^|\*\*)?(-?[1-3])")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a name says.
+
+    Attributes
+    ----------
+    role : str or None
+        One of `CANONICAL`, `TIME`, or ``None`` for anything else.
+    unit : str or None
+        Unit of an angular rate or a specific force, if the name has one that is understood.
+    seconds : float or None
+        For a time column, its unit in seconds.
+    """
+
+    role: str | None
+    unit: str | None = None
+    seconds: float | None = None
+
+
+@lru_cache(maxsize=4096)
+def meaning(name: str) -> Meaning:
+    """Interpret the name of a column.
+
+    Parameters
+    ----------
+    name : str
+        As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
+    """
+    plain = unicodedata.normalize("NFKC", name.replace("²", "^2")).replace("μ", "u")
+    base, bracket = _split_brackets(plain)
+    words = [word.lower() for word in re.findall(r"[A-Za-z0-9]+", _CAMEL_HUMP.sub("_", base))]
+    return _as_time(words, bracket) or _as_channel(words, bracket) or Meaning(None, _unit(bracket))
+
+
+def bare(name: str) -> str:
+    """A name without the unit in brackets after it."""
+    return _BRACKETS.sub("", name).strip()
+
+
+def _split_brackets(name: str) -> tuple[str, str]:
+    """Part ``ax [g]`` into name and unit; an index such as ``acc[0]`` is an axis."""
+    found = _BRACKETS.search(name)
+    if not found:
+        return name, ""
+    base, inside = name[: found.start()], found.group(1).strip()
+    if inside in ("0", "1", "2"):
+        # PX4's gyro_rad[0] holds rates all the same.
+        base = re.sub(r"gyro_rad$", "gyro_rad_s", base)
+        return f"{base}_{AXES[int(inside)]}", ""
+    return base, inside
+
+
+def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
+    seconds = _SECONDS.get(bracket.strip().lower())
+    rest = list(words)
+    if rest and (glued := _GLUED_UNIT.fullmatch(rest[-1])):
+        rest[-1:] = glued.groups()
+    if rest and rest[-1] in _SECONDS:
+        # "s" alone may be anything
+        seconds = seconds or _SECONDS[rest[-1]]
+        if len(rest) == 1 and rest[0] != "s":
+            return Meaning(TIME, seconds=seconds)
+        rest.pop()
+    if rest[-2:] == ["time", "stamp"]:
+        rest[-2:] = ["timestamp"]
+    if not rest or rest[-1] not in _TIME_WORDS:
+        return None
+    return Meaning(TIME, seconds=seconds) if _BEFORE_TIME.issuperset(rest[:-1]) else None
+
+
+def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:
+    rest, unit = _split_unit(words)
+    if rest[-1:] == ["out"]:
+        rest.pop()
+    for sensor_words, axis in _ways_to_part(rest):
+        before, inner_unit = _split_unit(sensor_words)
+        sensor = _sensor(sensor_words) or _sensor(before)
+        if sensor:
+            return Meaning(f"{sensor}_{axis}", _unit(bracket) or unit or inner_unit)
+    return None
+
+
+def _split_unit(words: Sequence[str]) -> tuple[list[str], str | None]:
+    """Take a unit of up to three words off the end: ``gyro x rad s``."""
+    for size in (3, 2, 1):
+        unit = _UNIT_WORDS.get("".join(words[-size:]))
+        if unit and len(words) > size:
+            return list(words[:-size]), unit
+    return list(words), None
+
+
+def _ways_to_part(words: Sequence[str]) -> list[tuple[list[str], str]]:
+    """Sensor and axis: ``gyro x`` and ``gyrox``, ``imu xgyro``, ``x gyro``."""
+    if not words:
+        return []
+    *before, last = words
+    ways = [([*before, last[:-1]], last[-1])]
+    if len(last) > 2:  # "xa" would be too bold
+        ways.append(([*before, last[1:]], last[0]))
+    if len(last) > 1:
+        ways.append(([*words[1:]], words[0]))
+    return [([word for word in rest if word], axis) for rest, axis in ways if axis in AXES]
+
+
+def _sensor(words: Sequence[str]) -> str | None:
+    """The sensor that the last words name, whatever stands before them."""
+    if len(words) == 1 and words[0] in _SENSOR_LETTERS:
+        return _SENSOR_LETTERS[words[0]]
+    for start in range(len(words)):
+        sensor = _SENSOR_WORDS.get("".join(words[start:]))
+        if sensor and _OTHER_MEANINGS.isdisjoint(words[:start]):
+            return sensor
+    return None
+
+
+def _unit(text: str) -> str | None:
+    """The unit in a header, if it is one of an angular rate or a specific force."""
+    cleaned = re.sub(r"\bsec\b", "s", text.replace("°", "deg"))
+    if cleaned == "G":
+        cleaned = "g"
+    if len(cleaned) > 24 or not _UNIT_IN_HEADER.fullmatch(cleaned):
+        return None
+    unit = _POWER.sub(r"^\1", cleaned)
+    try:
+        quantity_of(unit)
+    except InputError:
+        return None
+    return unit

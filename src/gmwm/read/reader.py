@@ -1,0 +1,141 @@
+"""From a file to a `Recording`."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.read.arrays import ArrayTable
+from gmwm.read.channel_units import channel_units
+from gmwm.read.clock import Clock, agree
+from gmwm.read.csv_table import CsvTable
+from gmwm.read.names import meaning
+from gmwm.read.roles import Columns, Reference, assign_roles
+from gmwm.read.table import FEWEST, Table, label
+from gmwm.recording import Recording
+
+
+def read(
+    path: str | os.PathLike[str],
+    rate: float | None = None,
+    units: Mapping[str, str] | None = None,
+    channels: Mapping[str, Reference] | None = None,
+    time: Reference | Literal[False] | None = None,
+) -> Recording:
+    """Read a static recording of an inertial sensor.
+
+    Parameters
+    ----------
+    path : str or path
+        Delimited text (comma, semicolon, tab or blanks; with or without a header; plain or gzip;
+        decimal commas where they do not part the columns), NPY or NPZ.
+    rate : float, optional
+        Sampling rate, Hz. Not needed if the file has time stamps.
+    units : mapping of str to str, optional
+        Unit of ``"gyro"`` and of ``"accel"``, or of single channels, e.g.
+        ``{"gyro": "deg/s", "accel": "g"}``. Not needed where the header has them.
+    channels : mapping of str to (str or int), optional
+        Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``. Only
+        these are read. A name that begins with ``gyro`` or ``accel`` says what the column
+        measures; for any other its unit does. By default columns are known by their names; without
+        names, six are gyro and accelerometer x, y, z, seven have time before them, one or three
+        (with time: four) belong to the only sensor in ``units``.
+    time : str, int or False, optional
+        Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
+        header, e.g. ``time_us`` or ``t [ns]``; else the step decides: below 0.5 seconds, 2 to
+        500 milliseconds, to 5e5 microseconds, above nanoseconds.
+
+    Returns
+    -------
+    Recording
+        In rad/s and m/s^2. Its ``notes`` tell what was assumed and which columns were not used.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used. The message says what is wrong, where, and how to mend it.
+
+    Examples
+    --------
+    >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
+    """
+    units = units or {}
+    table = _open(Path(path))
+    stated = _stated_rate(table, rate)
+    columns = Columns(table.source, table.names)
+    roles = assign_roles(columns, table.tentative, units, channels, time)
+    if roles.time is None:
+        _required_rate(table, stated)  # complain before a long file is read, not after
+    unit_of, unit_notes = channel_units(table, roles, units)
+
+    arrays = table.load(roles.columns)
+    n = arrays[roles.columns[0]].size
+    if n < FEWEST:
+        raise InputError(
+            f"{table.source} has {n} samples where at least {FEWEST} are needed: record longer"
+        )
+    used_rate, clock_notes = _sampling_rate(table, roles.time, arrays, stated)
+    return Recording.from_arrays(
+        {name: arrays[index] for name, index in roles.channels.items()},
+        rate=used_rate,
+        units=unit_of,
+        source=table.source,
+        notes=(*table.notes, *roles.notes, *unit_notes, *clock_notes),
+    )
+
+
+def _open(path: Path) -> Table:
+    if path.is_dir():
+        raise InputError(f"{path} is a directory: name a file in it")
+    if not path.exists():
+        raise InputError(f"{path} does not exist: check the path")
+    if path.suffix.lower() in (".npy", ".npz"):
+        return ArrayTable.open(path)
+    return CsvTable.open(path)
+
+
+def _stated_rate(table: Table, rate: float | None) -> float | None:
+    """The rate that the caller or else the file states, if they do not contradict each other."""
+    if rate is None:
+        return table.rate
+    rate = float(rate)
+    if not (0.0 < rate < math.inf and 1.0 / rate < math.inf):
+        raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz, e.g. --rate 100")
+    if table.rate is not None and not agree(rate, table.rate):
+        raise InputError(
+            f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
+            "the rate to take that of the file"
+        )
+    return rate
+
+
+def _required_rate(table: Table, stated: float | None) -> float:
+    if stated is None:
+        raise InputError(
+            f"{table.source} has no time column and no rate was given: give it in Hz, e.g. "
+            "rate=100 (on the command line --rate 100)"
+        )
+    return stated
+
+
+def _sampling_rate(
+    table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
+) -> tuple[float, tuple[str, ...]]:
+    """The stated rate if there is one, checked against the time stamps if there are any."""
+    if time is None:
+        return _required_rate(table, stated), ()
+    clock = Clock(
+        place=f"{table.source}, column {label(table.names, time)}",
+        stamps=arrays[time],
+        seconds=meaning(table.names[time]).seconds,
+        where=table.where,
+    )
+    measured, note = clock.rate(stated)
+    if stated is None:
+        return measured, (note,)
+    return stated, (note, f"The rate stated, {stated:g} Hz, is used.")

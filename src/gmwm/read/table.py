@@ -1,0 +1,66 @@
+"""What every kind of file offers to the reader: columns, not yet read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+
+FORMATS = "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ"
+"""For messages about files of another kind."""
+
+FEWEST = 64
+"""Samples below which no variance is worth computing."""
+
+LARGEST = 1e150
+"""Magnitudes from here on are refused like infinities: their squares overflow."""
+
+
+class Table(Protocol):
+    """A file of columns of equal length.
+
+    Attributes
+    ----------
+    source : str
+        The file's name, for messages.
+    names : tuple of str
+        One for each column, as written in the file; ``""`` where a column has none.
+    tentative : bool
+        Whether the names come from a comment and may be something else.
+    rate : float or None
+        Sampling rate that the file itself states, Hz.
+    notes : tuple of str
+        What was noticed while opening it.
+    """
+
+    @property
+    def source(self) -> str: ...
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def tentative(self) -> bool: ...
+    @property
+    def rate(self) -> float | None: ...
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Read some columns, every value finite."""
+
+    def where(self, row: int) -> str:
+        """Say where a row of data is, e.g. ``"line 12"``."""
+
+
+def label(names: Sequence[str], index: int) -> str:
+    """How messages call a column: its name, or its place if it has none."""
+    if names[index]:
+        return repr(names[index])
+    return f"{index} (counted from 0)"
+
+
+def usable(values: FloatArray) -> bool:
+    """Whether every value is finite and of sane magnitude."""
+    return bool(np.all(np.abs(values) < LARGEST))

@@ -1,0 +1,127 @@
+"""Bytes of a text file, plain or gzip, in blocks of whole lines."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, cast
+
+from gmwm.errors import InputError
+
+BLOCK = 1 << 20
+"""Bytes read at once: large enough for speed, small beside the columns of a long recording."""
+
+_LONGEST_LINE = 1 << 24
+_GZIP_MAGIC = b"\x1f\x8b"
+_BLANK = b" \t\r\n"
+_LINE_END = re.compile(rb"\r\n|\n|\r")
+
+
+def blocks(
+    path: Path, offset: int = 0, line: int = 1, size: int = BLOCK
+) -> Iterator[tuple[int, bytes]]:
+    r"""Iterate over a file's lines, many at a time.
+
+    Blank lines at the end of the file are left out, so that they need no care further on.
+
+    Parameters
+    ----------
+    path : Path
+    offset : int, optional
+        Bytes (after decompression) to leave out at the beginning.
+    line : int, optional
+        Number of the line that begins there.
+    size : int, optional
+        Bytes to read at once.
+
+    Yields
+    ------
+    line : int
+        Number of the first line of the block, counted from 1.
+    block : bytes
+        Whole lines; ends may be ``\n``, ``\r\n`` or ``\r``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or its compression is damaged.
+    """
+    with _open(path) as stream:
+        _read(stream, offset, path.name)
+        text = b""
+        while fresh := _read(stream, size, path.name):
+            text += fresh
+            end = _end_of_content(text[: _end_of_last_line(text)])
+            if end:
+                yield line, text[:end]
+                line += count_lines(text[:end])
+                text = text[end:]
+            elif len(text) > _LONGEST_LINE:
+                raise InputError(
+                    f"{path.name}, line {line}: longer than {_LONGEST_LINE >> 20} MB, so this is "
+                    "no table of numbers: check that it is the right file"
+                )
+        if end := _end_of_content(text):
+            yield line, text[:end]
+
+
+def count_lines(text: bytes) -> int:
+    """Count line ends of any of the three kinds."""
+    return text.count(b"\n") + text.count(b"\r") - text.count(b"\r\n")
+
+
+def _end_of_last_line(text: bytes) -> int:
+    end = text.rfind(b"\n") + 1
+    # Only where lines end in a bare \r; the last byte may be half of \r\n.
+    return end or text.rfind(b"\r", 0, len(text) - 1) + 1
+
+
+def _end_of_content(text: bytes) -> int:
+    content = len(text.rstrip(_BLANK))
+    if not content:
+        return 0
+    found = _LINE_END.search(text, content)
+    return found.end() if found else len(text)
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        stream = path.open("rb")
+        try:
+            magic = stream.read(2)
+            stream.seek(0)
+        except OSError:
+            stream.close()
+            raise
+    except OSError as error:
+        raise _unreadable(path.name, error) from error
+    if magic == _GZIP_MAGIC:
+        stream.close()
+        return cast(BinaryIO, gzip.open(path, "rb"))
+    if magic and path.suffix.lower() == ".gz":
+        stream.close()
+        raise InputError(
+            f"{path.name} is not a gzip file although its name ends in .gz: "
+            "compress it with gzip, or take .gz off its name"
+        )
+    return stream
+
+
+def _read(stream: BinaryIO, size: int, name: str) -> bytes:
+    try:
+        return stream.read(size)
+    except EOFError as error:
+        raise InputError(
+            f"{name} ends before its gzip data are complete: it was cut off, get a whole copy"
+        ) from error
+    except (gzip.BadGzipFile, zlib.error) as error:
+        raise InputError(f"{name} is a damaged gzip file ({error}): get a whole copy") from error
+    except OSError as error:
+        raise _unreadable(name, error) from error
+
+
+def _unreadable(name: str, error: OSError) -> InputError:
+    return InputError(f"{name} cannot be read ({error.strerror}): check its permissions")

@@ -1,0 +1,261 @@
+"""Which model: sums of white, quantization and random-walk noise, a rate ramp, and up to five
+Gauss-Markov processes, ranked by an information criterion on the GMWM objective.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.design import Design
+from gmwm.estimate.discrepancy import Discrepancy
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.gmwm import fit
+from gmwm.estimate.profile import Point, Profile, weight_root
+from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
+from gmwm.estimate.start import dictionary_fit, search
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+)
+from gmwm.recording import Channel
+from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+
+MAX_GAUSS_MARKOV = 5
+
+_USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the search for more
+_FITS = 5  # candidates that are fitted in full before the best one is taken as it is
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model of the ranking.
+
+    Attributes
+    ----------
+    model : Model
+        With open parameters.
+    criterion : float
+        Objective plus ``2 p ln ln n``; less is better.
+    objective : float
+        Weighted sum of squares under weights common to all candidates.
+    n_parameters : int
+    """
+
+    model: Model
+    criterion: float
+    objective: float
+    n_parameters: int
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Candidate models, best first, and the fit of the best one.
+
+    Attributes
+    ----------
+    ranking : tuple of Candidate
+    fit : Fit
+        Of the chosen model.
+    """
+
+    ranking: tuple[Candidate, ...]
+    fit: Fit
+
+    @property
+    def model(self) -> Model:
+        """The chosen model with its estimated values."""
+        return self.fit.model
+
+    def __iter__(self) -> Iterator[Candidate]:
+        return iter(self.ranking)
+
+    def __len__(self) -> int:
+        return len(self.ranking)
+
+    def __getitem__(self, index: int) -> Candidate:
+        return self.ranking[index]
+
+    def __str__(self) -> str:
+        best = self.ranking[0].criterion
+        chosen = self.fit.model.opened()
+        lines = [f"{'':2}{'difference':>10} {'objective':>10} {'parameters':>10}  model"]
+        for item in self.ranking[:12]:
+            mark = "> " if item.model == chosen else "  "
+            lines.append(
+                f"{mark}{item.criterion - best:>10.4g} {item.objective:>10.4g} "
+                f"{item.n_parameters:>10}  {describe(item.model)}"
+            )
+        if len(self.ranking) > 12:
+            lines.append(f"  and {len(self.ranking) - 12} more")
+        return "\n".join(lines)
+
+
+def describe(model: Model) -> str:
+    """A model's terms in a few words: ``white noise + 2 Gauss-Markov``."""
+    titles = [term.title() for term in model.terms]
+    counts = {title: titles.count(title) for title in titles}
+    return " + ".join(f"{n} {title}" if n > 1 else title for title, n in counts.items())
+
+
+def select(
+    data: WaveletVariance | Channel | FloatArray,
+    dt: float | None = None,
+    *,
+    max_gauss_markov: int = MAX_GAUSS_MARKOV,
+) -> Selection:
+    """Rank the candidate models of a series and fit the best one.
+
+    Parameters
+    ----------
+    data : WaveletVariance, Channel or (n,) array_like
+    dt : float, optional
+        Sampling interval, s; needed for an array.
+    max_gauss_markov : int, optional
+        Largest number of Gauss-Markov terms.
+
+    Returns
+    -------
+    Selection
+
+    Raises
+    ------
+    InputError
+        If the data cannot be used.
+
+    Notes
+    -----
+    All candidates are compared under the same weights, those of a rich mixture fitted to the
+    wavelet variances, with the discrepancy that this mixture shows. The criterion is the objective
+    with the penalty of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment
+    selection (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so
+    a model without one pays the squared slope over its variance. Terms that come out as zero make
+    a model equal to a smaller one, and it is left out of the ranking. Of the best candidates the
+    first one is chosen whose own fit finds all of its terms identifiable.
+    """
+    wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
+    if not 0 <= max_gauss_markov <= MAX_GAUSS_MARKOV:
+        raise InputError(
+            f"max_gauss_markov = {max_gauss_markov!r}: give a number from 0 to {MAX_GAUSS_MARKOV}"
+        )
+    ranking = _rank(wv, max_gauss_markov)
+    fits = []
+    for candidate in ranking[:_FITS]:
+        fitted = fit(candidate.model, wv)
+        if fitted.valid or not _term_is_idle(fitted):
+            return Selection(tuple(ranking), fitted)
+        fits.append(fitted)
+    return Selection(tuple(ranking), fits[0])
+
+
+def _term_is_idle(fitted: Fit) -> bool:
+    """Whether some term of the model is not supported by the data."""
+    return any("identifiable" in remark or "use one less" in remark for remark in fitted.remarks)
+
+
+def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
+    reference = dictionary_fit(wv, wv.variance)
+    weights = _with_discrepancy(reference.covariance, reference.residual, wv.variance, reference.dof)
+    plain = _candidates(wv, wv.variance, weights, max_gauss_markov)
+    if not plain:
+        plain = [_fallback(wv, weights)]
+    best, point = min(plain, key=lambda item: item[0].criterion)
+    design = Design(best.model, wv.tau, wv.dt, wv.n)
+    slope = gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+    without = slope.value**2 / slope.variance
+    ranking = [_plus(candidate, without, 0.0) for candidate, _ in plain]
+    ranking += _with_ramp(wv, slope, max_gauss_markov)
+    return sorted(ranking, key=lambda candidate: candidate.criterion)
+
+
+def _with_ramp(wv: WaveletVariance, slope: Slope, max_gauss_markov: int) -> list[Candidate]:
+    """Candidates with a rate ramp, fitted to what is left when the slope is taken out."""
+    target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+    reference = dictionary_fit(wv, target)
+    weights = _with_discrepancy(reference.covariance, reference.residual, target, reference.dof)
+    ramped = _candidates(wv, target, weights, max_gauss_markov)
+    penalty = _penalty(wv.n)
+    return [
+        _plus(Candidate(candidate.model + RateRamp(), *_numbers(candidate)), 0.0, penalty)
+        for candidate, _ in ramped
+    ]
+
+
+def _numbers(candidate: Candidate) -> tuple[float, float, int]:
+    return candidate.criterion, candidate.objective, candidate.n_parameters
+
+
+def _plus(candidate: Candidate, objective: float, penalty: float) -> Candidate:
+    return Candidate(
+        candidate.model,
+        candidate.criterion + objective + penalty,
+        candidate.objective + objective,
+        candidate.n_parameters + (penalty > 0.0),
+    )
+
+
+def _with_discrepancy(
+    covariance: FloatArray, residual: FloatArray, target: FloatArray, dof: int
+) -> FloatArray:
+    level = Discrepancy(None, dof)
+    level.update(residual, covariance, target)
+    return level.added_to(covariance, target)
+
+
+def _penalty(n: int) -> float:
+    """Price of a parameter: 2 ln ln n."""
+    return 2.0 * float(np.log(np.log(n)))
+
+
+def _candidates(
+    wv: WaveletVariance, target: FloatArray, weights: FloatArray, max_gauss_markov: int
+) -> list[tuple[Candidate, Point]]:
+    """All sums whose terms come out positive, each started from the one with one term less."""
+    root = weight_root(weights)
+    penalty = _penalty(wv.n)
+    found = []
+    kinds = (WhiteNoise(), QuantizationNoise(), RandomWalk())
+    for chosen in product((False, True), repeat=len(kinds)):
+        base: tuple[Process, ...] = tuple(k for k, on in zip(kinds, chosen, strict=True) if on)
+        shapes: list[tuple[float, ...] | None] = [() for _ in base]
+        before = np.inf
+        for g in range(max_gauss_markov + 1):
+            if not base and g == 0:
+                continue
+            model = Model((*base, *(GaussMarkov() for _ in range(g))))
+            design = Design(model, wv.tau, wv.dt, wv.n)
+            if design.n_free >= wv.tau.size:
+                break
+            if g:
+                shapes.append(None)
+            point = search(Profile(design, target, root), shapes)
+            shapes = list(point.shapes)
+            if np.any(point.x <= 0.0) or before - point.objective < _USELESS:
+                if g:
+                    break
+                before = point.objective
+                continue
+            before = point.objective
+            criterion = point.objective + penalty * design.n_free
+            candidate = Candidate(model, criterion, point.objective, design.n_free)
+            found.append((candidate, point))
+    return found
+
+
+def _fallback(wv: WaveletVariance, weights: FloatArray) -> tuple[Candidate, Point]:
+    """White noise alone, for records too short for anything else."""
+    model = Model((WhiteNoise(),))
+    design = Design(model, wv.tau, wv.dt, wv.n)
+    point = search(Profile(design, wv.variance, weight_root(weights)))
+    criterion = point.objective + _penalty(wv.n)
+    return Candidate(model, criterion, point.objective, 1), point
