@@ -197,18 +197,20 @@ class Design:
         result[list(self.linear)] = x
         return result
 
-    def shape_derivatives(self, z: FloatArray, template: Sequence[Shape]) -> FloatArray:
+    def shape_derivatives(self, shapes: Sequence[Shape]) -> FloatArray:
         """Derivative of each term's curve by its own z, at unit free amplitude, (J, z)."""
-        result = np.empty((self.tau.size, z.size))
-        for k, i in enumerate(self.owners()):
-            curves = []
-            for step in (_STEP, -_STEP):
-                moved = z.copy()
-                moved[k] += step
-                shape = self.unpack(moved, template)[i]
-                curves.append(self.terms[i].curve(shape, self.tau, self.dt))
-            result[:, k] = (curves[0] - curves[1]) / (2.0 * _STEP)
-        return result
+        columns = []
+        for i in self.shaped:
+            term = self.terms[i]
+            z = term.process.shape_to_free(shapes[i])
+            for k in np.flatnonzero(term.free_shape):
+                pair = []
+                for step in (_STEP, -_STEP):
+                    moved = z.copy()
+                    moved[k] += step
+                    pair.append(term.curve(term.process.shape_from_free(moved), self.tau, self.dt))
+                columns.append((pair[0] - pair[1]) / (2.0 * _STEP))
+        return np.stack(columns, axis=1) if columns else np.zeros((self.tau.size, 0))
 
     def owners(self) -> list[int]:
         """For each element of z, the term it belongs to."""

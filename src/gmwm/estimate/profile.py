@@ -80,11 +80,11 @@ class Profile:
             return -self.amplitudes(design.curves(shapes))[1]
 
         def jacobian(z: FloatArray) -> FloatArray:
-            z = np.clip(z, low, high)
-            curves = design.curves(design.unpack(z, template))
+            shapes = design.unpack(np.clip(z, low, high), template)
+            curves = design.curves(shapes)
             x, _ = self.amplitudes(curves)
             weighted = self.root @ curves[:, list(design.linear)][:, x > 0.0]
-            slope = self.root @ design.shape_derivatives(z, template)
+            slope = self.root @ design.shape_derivatives(shapes)
             slope *= design.amplitudes(x)[owners]
             if weighted.shape[1]:
                 basis, _ = np.linalg.qr(weighted)
@@ -94,7 +94,7 @@ class Profile:
         if z0.size > self.target.size:
             return self.at(start.shapes)
         found = least_squares(
-            residual, z0, jac=jacobian, method="lm", xtol=1e-9, ftol=1e-12, gtol=1e-10,
+            residual, z0, jac=jacobian, method="lm", xtol=1e-7, ftol=1e-9, gtol=1e-9,
             max_nfev=_MAX_EVALUATIONS,
         )  # fmt: skip
         point = self.at(design.unpack(np.clip(found.x, low, high), template))

@@ -138,11 +138,10 @@ def _linearise(
     covariance; the bound of its amplitude is the quantile of the normal distribution of the
     unconstrained estimate, cut at zero.
     """
-    z = design.pack(shapes)
     amplitudes = design.amplitudes(x)
     curves = design.curves(shapes)
     owners = design.owners()
-    slopes = design.shape_derivatives(z, shapes) * amplitudes[owners]
+    slopes = design.shape_derivatives(shapes) * amplitudes[owners]
     positive = [k for k, i in enumerate(design.linear) if amplitudes[i] > 0.0]
     alive = [k for k, i in enumerate(owners) if amplitudes[i] > 0.0]
     jacobian = np.column_stack([curves[:, [design.linear[k] for k in positive]], slopes[:, alive]])

@@ -13,9 +13,11 @@ here both terms are of third order in a and computed as such.
 
 from __future__ import annotations
 
+import math
 from math import factorial
 from typing import Any
 
+import numba
 import numpy as np
 
 from gmwm._typing import FloatArray
@@ -23,6 +25,8 @@ from gmwm._typing import FloatArray
 _SERIES_BELOW = 0.5
 _SINH_TERMS = [1.0 / factorial(2 * k + 1) for k in range(1, 9)]
 _H_TERMS = [-((-1) ** k) * (2.0**k - 4.0) / factorial(k) for k in range(3, 22)]
+_H_ARRAY = np.array(_H_TERMS)
+_WHITE_ABOVE = 40.0  # exp(-a) is below rounding: white noise
 
 
 def _sinh_minus_identity(a: Any) -> Any:
@@ -60,8 +64,28 @@ def exponential_haar(rate: complex, m: FloatArray) -> Any:
         Averaging times in samples.
     """
     m = np.asarray(m, dtype=float)
-    if np.real(rate) > 40.0:
-        # exp(-a) is below rounding: white noise.
+    if np.real(rate) > _WHITE_ABOVE:
         return 0.5 / m + 0.0 * rate
+    if not np.iscomplexobj(rate):
+        flat = np.ascontiguousarray(m).ravel()
+        return _real_haar(float(rate), float(_sinh_minus_identity(rate)), flat).reshape(m.shape)
     denominator = 8.0 * m**2 * np.sinh(0.5 * rate) ** 2
     return (2.0 * m * _sinh_minus_identity(rate) + _h(m * rate)) / denominator
+
+
+@numba.njit(cache=True, nogil=True)
+def _real_haar(rate: float, excess: float, m: FloatArray) -> FloatArray:
+    """`exponential_haar` for a real rate, with sinh(rate) - rate given: the fit's inner loop."""
+    result = np.empty(m.size)
+    scale = 8.0 * math.sinh(0.5 * rate) ** 2
+    for i in range(m.size):
+        x = m[i] * rate
+        if x < _SERIES_BELOW:
+            h = 0.0
+            for k in range(_H_ARRAY.size - 1, -1, -1):
+                h = h * x + _H_ARRAY[k]
+            h *= x * x * x
+        else:
+            h = 2.0 * x - 3.0 + 4.0 * math.exp(-x) - math.exp(-2.0 * x)
+        result[i] = (2.0 * m[i] * excess + h) / (m[i] * m[i] * scale)
+    return result

@@ -28,7 +28,7 @@ class Clock:
 
     Attributes
     ----------
-    place : str
+    source, column : str
         File and column, for messages.
     stamps : (n,) ndarray
         In a unit of ``seconds``.
@@ -38,10 +38,16 @@ class Clock:
         Row -> where that is in the file.
     """
 
-    place: str
+    source: str
+    column: str
     stamps: FloatArray
     seconds: float | None
     where: Callable[[int], str]
+
+    @property
+    def place(self) -> str:
+        """File and column, at the beginning of messages."""
+        return f"{self.source}, column {self.column}"
 
     def rate(self, expected: float | None = None) -> tuple[float, str]:
         """Sampling rate from the first and the last stamp.
@@ -83,8 +89,8 @@ class Clock:
                 "leave out the rate to take that of the stamps, or give time=False to ignore them"
             )
         return rate, (
-            f"Time stamps ({self.place.split(', ')[-1]}, {_UNITS[seconds]}"
-            f"{' by the size of the step' if guessed else ''}) give {rate:.6g} Hz; their steps "
+            f"Time stamps (column {self.column}, {_UNITS[seconds]}"
+            f"{' as far as the steps tell' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)."
         )
 
@@ -113,7 +119,9 @@ class Clock:
         if self.seconds is not None:
             return self.seconds, False
         if expected is not None:
-            return min(_UNITS, key=lambda unit: abs(math.log(step * unit) + math.log(expected))), True
+            return min(
+                _UNITS, key=lambda unit: abs(math.log(step * unit) + math.log(expected))
+            ), True
         if step < 0.5:
             return 1.0, True
         if step < 2.0:

@@ -27,9 +27,9 @@ _SENSOR_WORDS = {
     word: sensor
     for sensor, words in {
         "gyro": "gyro gyr gyroscope omega angularvelocity angularrate angvel angrate "
-        "rotationrate rotrate turnrate rate wrs",
+        "rotationrate rotrate turnrate rate wrss",
         "accel": "accel acc accelerometer acceleration linearacceleration linacc linaccel "
-        "specificforce ars",
+        "specificforce arss",
     }.items()
     for word in words.split()
 }

@@ -130,7 +130,8 @@ def _sampling_rate(
     if time is None:
         return _required_rate(table, stated), ()
     clock = Clock(
-        place=f"{table.source}, column {label(table.names, time)}",
+        source=table.source,
+        column=label(table.names, time),
         stamps=arrays[time],
         seconds=meaning(table.names[time]).seconds,
         where=table.where,

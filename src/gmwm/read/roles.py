@@ -71,10 +71,12 @@ class Columns:
             return self._checked(reference, what)
         for known in (self.names, [bare(n) for n in self.names]):
             for fold in (str, str.lower):
-                found = [i for i, name in enumerate(known) if fold(name) == fold(reference)]
+                found = [
+                    i for i, name in enumerate(known) if name and fold(name) == fold(reference)
+                ]
                 if len(found) == 1:
                     return found[0]
-                if found and reference:
+                if found:
                     raise InputError(
                         f"{self.source} has {len(found)} columns {reference!r}: give the index of "
                         f"the one for {what}, counted from 0: {', '.join(map(str, found))}"
