@@ -1,1 +1,126 @@
-"""x"""
+"""Composite stochastic error models of inertial sensors, by the Generalized Method of Wavelet Moments.
+
+A static recording goes in (`read`, `Recording`), its wavelet variance says what the noise does at
+each averaging time (`wavelet_variance`), an error model is fitted to it (`fit`) or chosen
+(`select`), and `calibrate` does so for every channel. Inside, everything is in SI units and
+seconds; averaging times are 2^(j-1) dt; the Haar wavelet variance is half the Allan variance.
+
+Names are loaded when they are first used, so that importing the package costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gmwm.calibration import Calibration, calibrate, load
+    from gmwm.errors import InputError
+    from gmwm.estimate.fit import Fit
+    from gmwm.estimate.gmwm import fit
+    from gmwm.process import (
+        AR,
+        ARIMA,
+        ARMA,
+        MA,
+        BiasInstability,
+        GaussMarkov,
+        Model,
+        Parameter,
+        Process,
+        QuantizationNoise,
+        RandomWalk,
+        RateRamp,
+        Resonance,
+        Sinusoid,
+        StateSpace,
+        WhiteNoise,
+    )
+    from gmwm.process.model import simulate
+    from gmwm.read import read
+    from gmwm.recording import Channel, Recording
+    from gmwm.selection import Selection, select
+    from gmwm.variance.covariance import haar_covariance
+    from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+
+__version__ = "0.1.0"
+
+_HOME = {
+    **dict.fromkeys(("Calibration", "calibrate", "load"), "calibration"),
+    "InputError": "errors",
+    "Fit": "estimate.fit",
+    "fit": "estimate.gmwm",
+    **dict.fromkeys(
+        (
+            "AR",
+            "ARIMA",
+            "ARMA",
+            "MA",
+            "BiasInstability",
+            "GaussMarkov",
+            "Model",
+            "Parameter",
+            "Process",
+            "QuantizationNoise",
+            "RandomWalk",
+            "RateRamp",
+            "Resonance",
+            "Sinusoid",
+            "StateSpace",
+            "WhiteNoise",
+        ),
+        "process",
+    ),
+    "simulate": "process.model",
+    "read": "read",
+    **dict.fromkeys(("Channel", "Recording"), "recording"),
+    **dict.fromkeys(("Selection", "select"), "selection"),
+    "haar_covariance": "variance.covariance",
+    **dict.fromkeys(("WaveletVariance", "wavelet_variance"), "variance.wavelet"),
+}
+
+__all__ = [
+    "AR",
+    "ARIMA",
+    "ARMA",
+    "MA",
+    "BiasInstability",
+    "Calibration",
+    "Channel",
+    "Fit",
+    "GaussMarkov",
+    "InputError",
+    "Model",
+    "Parameter",
+    "Process",
+    "QuantizationNoise",
+    "RandomWalk",
+    "RateRamp",
+    "Recording",
+    "Resonance",
+    "Selection",
+    "Sinusoid",
+    "StateSpace",
+    "WaveletVariance",
+    "WhiteNoise",
+    "calibrate",
+    "fit",
+    "haar_covariance",
+    "load",
+    "read",
+    "select",
+    "simulate",
+    "wavelet_variance",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'gmwm' has no attribute {name!r}")
+    value = getattr(import_module(f"gmwm.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

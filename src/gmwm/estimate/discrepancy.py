@@ -22,16 +22,17 @@ _SETTLED = 1e-3  # relative change of delta
 
 
 def chi_square(
-    target: FloatArray, implied: FloatArray, covariance: FloatArray
+    target: FloatArray, implied: FloatArray, covariance: FloatArray, basis: FloatArray
 ) -> tuple[FloatArray, float]:
     """Standardised residuals per level and their chi-square, on the cube-root scale.
 
-    A wavelet variance of few degrees of freedom is far from normal, its cube root is not (Wilson
+    ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs. A wavelet variance of few degrees of freedom is far from normal, its cube root is not (Wilson
     & Hilferty 1931, *PNAS* 17, 684-688).
     """
     scale = np.sqrt(np.diag(covariance))
-    share = (scale / implied) ** 2 / 9.0  # 2/(9 dof)
-    standard = (np.cbrt(target / implied) - (1.0 - share)) / np.sqrt(share)
+    share = (scale / basis) ** 2 / 9.0  # 2/(9 dof)
+    root, expected = np.cbrt(target / basis), np.cbrt(implied / basis) * (1.0 - share)
+    standard = (root - expected) / np.sqrt(share)
     whitened = weight_root(covariance / np.outer(scale, scale)) @ standard
     return standard, float(whitened @ whitened)
 
@@ -49,8 +50,13 @@ class Discrepancy:
 
     def __init__(self, given: float | None, dof: int) -> None:
         self.value = given or 0.0
+        self._given = given
         self._estimated = given is None and dof > 0
         self._dof = dof
+
+    def restart(self) -> None:
+        """Forget what was estimated."""
+        self.value = self._given or 0.0
 
     def added_to(self, covariance: FloatArray, target: FloatArray) -> FloatArray:
         """Covariance of the wavelet variances with the discrepancy, u^4, (J, J)."""
@@ -61,16 +67,20 @@ class Discrepancy:
         residual: FloatArray,
         covariance: FloatArray,
         target: FloatArray,
+        basis: FloatArray,
         dof: int | None = None,
     ) -> bool:
-        """Estimate anew from residuals (J,) and their covariance; returns whether it changed."""
+        """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
+
+        ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs.
+        """
         if not self._estimated:
             return False
         dof = dof or self._dof
         if self.value == 0.0:
             implied = target - residual
-            if np.all(implied > 0.0):
-                objective = chi_square(target, implied, covariance)[1]
+            if np.all(implied > 0.0) and np.all(basis > 0.0):
+                objective = chi_square(target, implied, covariance, basis)[1]
                 if chi2.sf(objective, dof) > _SIGNIFICANT:
                     return False
         before, self.value = self.value, _moment_estimate(residual, covariance, target, dof)

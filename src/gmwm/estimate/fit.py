@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
@@ -17,6 +17,9 @@ from gmwm.variance.wavelet import WaveletVariance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+_UNDETERMINED = 3.0  # relative standard error at which an interval says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,8 @@ class Fit:
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that keep to the parameters' ranges.
 
-        Positive parameters have intervals symmetric in the logarithm; a parameter estimated as zero
+        Positive parameters have intervals in the logarithm, with quantiles of Student's t for the
+        degrees of freedom that their relative error stands for; a parameter estimated as zero
         goes from zero to its upper bound (which is one of 95 %).
 
         Parameters
@@ -108,7 +112,6 @@ class Fit:
         """
         if not 0.0 < level < 1.0:
             raise InputError(f"level = {level!r}: give a number between 0 and 1, e.g. 0.95")
-        quantile = float(norm.ppf(0.5 + 0.5 * level))
         params, errors = self.params, self.stderr
         result = {}
         for item in self.model.parameters:
@@ -116,7 +119,7 @@ class Fit:
             if key in self.upper_bounds:
                 result[key] = (0.0, self.upper_bounds[key])
             elif key in errors:
-                result[key] = _interval(item, value, quantile * errors[key])
+                result[key] = _interval(item, value, errors[key], level)
         return result
 
     @property
@@ -251,11 +254,19 @@ class Fit:
         )
 
 
-def _interval(item: ModelParameter, value: float, half_width: float) -> tuple[float, float]:
+def _interval(
+    item: ModelParameter, value: float, error: float, level: float
+) -> tuple[float, float]:
     parameter = item.parameter
     if parameter.lower == 0.0 and value > 0.0:
-        ratio = float(np.exp(min(half_width / value, 700.0)))
+        relative = error / value
+        if relative > _UNDETERMINED:
+            return 0.0, parameter.upper
+        # A variance known to a relative error of r is one of 2/r^2 degrees of freedom.
+        quantile = float(t.ppf(0.5 + 0.5 * level, max(2.0 / relative**2, 1.0)))
+        ratio = float(np.exp(quantile * relative))
         return value / ratio, min(value * ratio, parameter.upper)
+    half_width = float(norm.ppf(0.5 + 0.5 * level)) * error
     return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
 
 

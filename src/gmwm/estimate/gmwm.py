@@ -35,7 +35,8 @@ from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
 WEIGHTS = ("model", "diagonal", "identity")
 METHODS = ("gmwm",)
 
-_MAX_ROUNDS = 50
+_MAX_ROUNDS = 40
+_REFERENCE_ROUNDS = 3
 _LEAST_PART = 0.05
 _DISCREPANCY_EVERY = 3
 _TOLERANCE = 1e-4  # of the implied curve from round to round, in standard deviations of the data
@@ -162,22 +163,58 @@ def fit(
 
 def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | None) -> Fit:
     design = Design(model, wv.tau, wv.dt, wv.n)
-    moments = Moments.of(wv, model)
     if not design.terms:
         raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")
+    moments = Moments.of(wv, model)
     extra = tuple(term.process for term in design.terms)
     reference = dictionary_fit(wv, moments.target, extra)
     level = Discrepancy(discrepancy, wv.tau.size - design.n_free)
-    level.update(reference.residual, reference.covariance, moments.target, reference.dof)
+    level.update(
+        reference.residual, reference.covariance, moments.target, reference.curve, reference.dof
+    )
     weights = level.added_to(reference.covariance, moments.target)
     point = search(Profile(design, moments.target, _root(weights, omega)))
-    # theta -> minimum under the weights that theta implies is iterated to its fixed point. Where
-    # it swings about that, the weights are moved by part of the way only (Aitken's relaxation).
-    part, converged, rounds = 1.0, False, 0
+    state = State(moments, weights, point, reference.curve)
+    settled = _iterate(design, state, level, omega)
+    if settled is None:
+        settled = _under_reference(design, state, level, omega, extra)
+    return describe(design, settled.moments.target, settled.covariance, settled.point,
+                    settled.moments.slope, basis=settled.basis, wv=wv, omega=omega,
+                    slope_is_free=moments.slope_is_free, discrepancy=level.value)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where an estimation stands.
+
+    Attributes
+    ----------
+    moments : Moments
+    covariance : (J, J) ndarray
+        Of the moments, with the discrepancy, u^4.
+    point : Point
+        The minimum under it.
+    basis : (J,) ndarray
+        The wavelet variances to which the covariance belongs, u^2.
+    """
+
+    moments: Moments
+    covariance: FloatArray
+    point: Point
+    basis: FloatArray
+
+
+def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> State | None:
+    """Iterate theta -> minimum under the weights that theta implies; ``None`` if it wanders.
+
+    Where it swings about the fixed point, the weights are moved by part of the way only (Aitken's
+    relaxation).
+    """
+    moments, weights, point = start.moments, start.covariance, start.point
+    part = 1.0
     curve = _implied(design, point)
     step = np.zeros_like(curve)
-    while not converged and rounds < _MAX_ROUNDS:
-        rounds += 1
+    for rounds in range(1, _MAX_ROUNDS + 1):
         noise = design.fitted_noise(point.x, point.shapes)
         moments = moments.under(noise, part)
         statistical = moments.covariance(noise)
@@ -189,15 +226,49 @@ def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | Non
         previous, curve = curve, _implied(design, point)
         before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))
         converged = bool(np.max(np.abs(step)) < _TOLERANCE)
-        if converged or rounds % _DISCREPANCY_EVERY == 0:
-            changed = level.update(moments.target - curve, statistical, moments.target)
-            converged = converged and not changed
-        if rounds > 1 and not converged:
+        if converged or _discrepancy_is_due(level.value, rounds):
+            changed = level.update(
+                moments.target - curve, statistical, moments.target, previous
+            )
+            if converged and not changed:
+                return State(moments, covariance, point, curve)
+        elif rounds > 1:
             ratio = float(step @ before) / max(float(before @ before), 1e-300)
-            part = float(np.clip(part / (1.0 - min(ratio, 0.0)), _LEAST_PART, 1.0))
-    return describe(design, moments.target, covariance, point, moments.slope,
-                    wv=wv, omega=omega, slope_is_free=moments.slope_is_free,
-                    converged=converged, discrepancy=level.value)  # fmt: skip
+            part = float(np.clip(part / max(1.0 - ratio, 0.5), _LEAST_PART, 1.0))
+    return None
+
+
+def _under_reference(
+    design: Design, start: State, level: Discrepancy, omega: str, extra: tuple[Process, ...]
+) -> State:
+    """The minimum under the weights of the reference mixture.
+
+    The weights of a model that misses part of the noise depend on the very parameters that try to
+    make up for it, and their iteration may have no fixed point. The mixture misses nothing.
+    """
+    moments = start.moments
+    wv = moments.wv
+    for _ in range(_REFERENCE_ROUNDS):
+        reference = dictionary_fit(wv, moments.target, extra)
+        moments = moments.under(reference.mixture)
+    reference = dictionary_fit(wv, moments.target, extra)
+    statistical = moments.covariance(reference.mixture)
+    level.restart()
+    for _ in range(_REFERENCE_ROUNDS):
+        covariance = level.added_to(statistical, moments.target)
+        point = search(Profile(design, moments.target, _root(covariance, omega)))
+        residual = moments.target - _implied(design, point)
+        if not level.update(residual, statistical, moments.target, reference.curve):
+            break
+    return State(moments, covariance, point, reference.curve)
+
+
+def _discrepancy_is_due(value: float, rounds: int) -> bool:
+    """Whether to update the discrepancy before the weights have settled: if there is one.
+
+    It does not enter on the way, where any model looks wrong.
+    """
+    return value > 0.0 and rounds % _DISCREPANCY_EVERY == 0
 
 
 def _root(covariance: FloatArray, omega: str) -> FloatArray:

@@ -16,6 +16,7 @@ from gmwm.variance.covariance import haar_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _EXCHANGES = 2
+_REWEIGHTINGS = 3
 _IMPROVEMENT = 1e-3  # of the objective, below which an exchange is not worth a refinement
 
 
@@ -119,15 +120,20 @@ class Reference:
 
     Attributes
     ----------
+    mixture : Model
     covariance : (J, J) ndarray
         Of the wavelet variances under it, u^4.
+    curve : (J,) ndarray
+        Its wavelet variances, u^2.
     residual : (J,) ndarray
         What it leaves of them, u^2.
     dof : int
         Levels less the processes it uses.
     """
 
+    mixture: Model
     covariance: FloatArray
+    curve: FloatArray
     residual: FloatArray
     dof: int
 
@@ -153,16 +159,18 @@ def dictionary_fit(
             shapes.append(shape)
             columns.append(curve)
     matrix = np.stack(columns, axis=1)
-    root = weight_root(wv.covariance)
-    x, _ = solve_nonnegative(root @ matrix, root @ target)
-    mixture = []
-    for k in np.flatnonzero(x > 0.0):
-        term = design.terms[owner[k]]
-        linear = term.process.linear_parameter
-        assert linear is not None
-        value = float(x[k]) ** (1.0 / linear.power)
-        mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
     covariance = wv.covariance
-    if mixture:
+    for _ in range(_REWEIGHTINGS):
+        root = weight_root(covariance)
+        x, _ = solve_nonnegative(root @ matrix, root @ target)
+        mixture: list[Process] = []
+        for k in np.flatnonzero(x > 0.0):
+            term = design.terms[owner[k]]
+            linear = term.process.linear_parameter
+            assert linear is not None
+            value = float(x[k]) ** (1.0 / linear.power)
+            mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
         covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
-    return Reference(covariance, target - matrix @ x, max(wv.tau.size - len(mixture), 3))
+    dof = max(wv.tau.size - len(mixture), 3)
+    curve = matrix @ x
+    return Reference(Model(tuple(mixture)), covariance, curve, target - curve, dof)

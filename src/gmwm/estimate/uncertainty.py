@@ -31,10 +31,10 @@ def describe(
     point: Point,
     slope: Slope | None,
     *,
+    basis: FloatArray,
     wv: WaveletVariance,
     omega: str,
     slope_is_free: bool,
-    converged: bool,
     discrepancy: float,
 ) -> Fit:
     """Make the `Fit` of a minimum.
@@ -49,9 +49,11 @@ def describe(
     point : Point
         The minimum.
     slope : Slope or None
+    basis : (J,) ndarray
+        The wavelet variances to which ``covariance`` belongs, u^2.
     wv : WaveletVariance
     omega : str
-    slope_is_free, converged : bool
+    slope_is_free : bool
     discrepancy : float
         Relative error granted to the model, part of ``covariance``.
     """
@@ -69,8 +71,8 @@ def describe(
     n_free = len(keys)
     dof = design.tau.size - n_free
     p_value = float("nan")
-    if dof > 0 and np.all(implied > 0.0):
-        p_value = float(chi2.sf(chi_square(target, implied, covariance)[1], dof))
+    if dof > 0 and np.all(basis > 0.0):
+        p_value = float(chi2.sf(chi_square(target, implied, covariance, basis)[1], dof))
     if slope_is_free and slope is not None:
         ramp_key = next(i.key for i in model.parameters if i.parameter.role == "slope")
         keys = (*keys, ramp_key)
@@ -82,7 +84,6 @@ def describe(
         *_shape_remarks(sub, shapes, x),
         *_merged_remarks(model, keys, matrix),
         *_count_remarks(design, sub),
-        *([] if converged else ["the iteration of the weights did not settle"]),
     ]
     misfit, poor = _misfit(wv, target, implied, covariance, discrepancy)
     return Fit(

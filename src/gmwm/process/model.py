@@ -284,3 +284,30 @@ def _number(terms: tuple[Process, ...]) -> tuple[ModelParameter, ...]:
                 key = f"{key}_{seen[key]}"
             result.append(ModelParameter(key, index, parameter, getattr(term, parameter.name)))
     return tuple(result)
+
+
+def simulate(
+    model: Process | Model, n: int, dt: float, seed: int | np.random.Generator | None = None
+) -> FloatArray:
+    """Draw ``n`` samples of an error model, in u.
+
+    Parameters
+    ----------
+    model : Process or Model
+        With all parameters given.
+    n : int
+    dt : float
+        Sampling interval, s.
+    seed : int or numpy.random.Generator, optional
+
+    Returns
+    -------
+    (n,) ndarray
+        Stationary processes start in their stationary state, walks and ramps at zero.
+
+    Raises
+    ------
+    InputError
+        If a parameter is open, or ``n`` or ``dt`` is not positive.
+    """
+    return as_model(model).simulate(n, dt, seed)

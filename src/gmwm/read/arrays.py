@@ -28,6 +28,7 @@ _AnyArray = npt.NDArray[Any]
 _Column = tuple[str, _AnyArray]
 
 _NPY_MAGIC = b"\x93NUMPY"
+_ZIP_MAGIC = b"PK"
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
 
@@ -158,9 +159,13 @@ def _load_npy(path: Path) -> _AnyArray:
 
 
 def _load_npz(path: Path) -> dict[str, _AnyArray]:
-    with _damage_named(path.name):
-        if zipfile.is_zipfile(path):
-            with np.load(path, allow_pickle=False) as archive:
+    # Opened here: numpy leaves a damaged archive open.
+    with _damage_named(path.name), path.open("rb") as stream:
+        magic = stream.read(len(_ZIP_MAGIC))
+        # Without the magic number at the beginning, numpy would take it for pickled objects.
+        if magic == _ZIP_MAGIC and zipfile.is_zipfile(stream):
+            stream.seek(0)
+            with np.load(stream, allow_pickle=False) as archive:
                 return {name: _entry(archive, name) for name in archive.files}
     raise InputError(f"{path.name} is not an NPZ file: write it with numpy.savez")
 

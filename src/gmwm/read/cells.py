@@ -40,7 +40,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
     try:
         rows = list(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
     except csv.Error as error:
-        raise ValueError(str(error)) from error
+        raise ValueError("quotes that do not match") from error
     return [cell.strip(" \t") for cell in rows[0]]
 
 

@@ -211,7 +211,7 @@ def _cells(table: CsvTable, place: str, text: str) -> list[str]:
         cells = split_line(text, table.layout.delimiter)
     except ValueError as error:
         raise InputError(
-            f"{table.source}, {place}: quotes that do not match ({error}): mend the line"
+            f"{table.source}, {place}: quotes that do not match: mend the line"
         ) from error
     if len(cells) == width + 1 and not cells[-1]:
         cells.pop()

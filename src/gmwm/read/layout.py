@@ -84,12 +84,14 @@ def find_layout(source: str, head: bytes) -> Layout:
     comments, lines = _first_lines(source, head)
     first, following = lines[0], lines[1:]
     sample = [line.text for line in following or lines]
-    delimiter = _delimiter(source, sample)
+    delimiter = _delimiter(sample)
+    if delimiter is None and following:
+        raise InputError(f"{source} holds no numbers in its first lines: {FORMATS}")
+    if delimiter is None:
+        raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
     decimal = _decimal(sample, delimiter)
     names = _fields(source, first, delimiter, header=True)
-    has_header = _are_names(names, decimal)
-    if has_header and not following:
-        raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
+    has_header = bool(following) and _are_names(names, decimal)
     # What pandas writes above columns without names.
     is_numbering = len(names) > 2 and names == [str(i) for i in range(len(names))]
     data = following if has_header or (is_numbering and following) else lines
@@ -102,7 +104,7 @@ def find_layout(source: str, head: bytes) -> Layout:
         names = _without_last_empty(names, width)
         if len(names) != width:
             raise InputError(
-                f"{source}, line {data[0].number}: {width} fields where the header (line "
+                f"{source}, line {data[0].number} and after: {width} fields where the header (line "
                 f"{first.number}) has {len(names)}: give every column one name"
             )
     else:
@@ -162,12 +164,12 @@ def _check_utf8(source: str, line: int, raw: bytes) -> None:
         ) from error
 
 
-def _delimiter(source: str, texts: Sequence[str]) -> str:
-    """The delimiter that finds the most numbers."""
+def _delimiter(texts: Sequence[str]) -> str | None:
+    """The delimiter that finds the most numbers, ``None`` if there is no number."""
     counts = {delimiter: _count_numbers(texts, delimiter) for delimiter in _DELIMITERS}
     best = max(_DELIMITERS, key=lambda delimiter: counts[delimiter])
     if not counts[best]:
-        raise InputError(f"{source} holds no numbers in its first lines: {FORMATS}")
+        return None
     # A single column has no delimiter; a comma then is the least surprising one.
     if best == BLANKS and all(len(text.split()) == 1 for text in texts):
         return ","
@@ -189,11 +191,12 @@ def _count_numbers(texts: Sequence[str], delimiter: str) -> int:
 
 
 def _decimal(texts: Sequence[str], delimiter: str) -> str:
-    """A comma if some field is a number only so; never where the comma parts the fields."""
+    """The mark with which more fields are numbers; never a comma that parts the fields."""
     if delimiter == "," or not any("," in text for text in texts):
         return "."
     cells = [cell.strip(' \t"') for text in texts for cell in _loose_split(text, delimiter)]
-    return "," if any("," in cell and _is_number(cell, ",") for cell in cells) else "."
+    counts = {mark: sum(_is_number(cell, mark) for cell in cells) for mark in ".,"}
+    return "," if counts[","] > counts["."] else "."
 
 
 def _loose_split(text: str, delimiter: str) -> list[str]:
@@ -217,7 +220,7 @@ def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> l
         return (split_header if header else split_line)(line.text, delimiter)
     except ValueError as error:
         raise InputError(
-            f"{source}, line {line.number}: quotes that do not match ({error}): mend the line"
+            f"{source}, line {line.number}: quotes that do not match: mend the line"
         ) from error
 
 

@@ -137,21 +137,23 @@ def _split_brackets(name: str) -> tuple[str, str]:
 
 
 def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
-    seconds = _SECONDS.get(bracket.strip().lower())
+    seconds = _SECONDS.get(bracket.lower())
     rest = list(words)
     if rest and (glued := _GLUED_UNIT.fullmatch(rest[-1])):
         rest[-1:] = glued.groups()
     if rest and rest[-1] in _SECONDS:
-        # "s" alone may be anything
-        seconds = seconds or _SECONDS[rest[-1]]
-        if len(rest) == 1 and rest[0] != "s":
-            return Meaning(TIME, seconds=seconds)
-        rest.pop()
+        unit = rest.pop()
+        seconds = seconds or _SECONDS[unit]
+        if not rest:
+            # "s" alone may be anything, and so may "second [g]"
+            return Meaning(TIME, seconds=seconds) if unit != "s" and not bracket else None
     if rest[-2:] == ["time", "stamp"]:
         rest[-2:] = ["timestamp"]
-    if not rest or rest[-1] not in _TIME_WORDS:
+    if not rest or rest[-1] not in _TIME_WORDS or not _BEFORE_TIME.issuperset(rest[:-1]):
         return None
-    return Meaning(TIME, seconds=seconds) if _BEFORE_TIME.issuperset(rest[:-1]) else None
+    if rest[-1] == "t" and bracket and seconds is None:
+        return None  # "t [degC]"
+    return Meaning(TIME, seconds=seconds)
 
 
 def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:

@@ -18,7 +18,7 @@ from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
-from gmwm.estimate.start import dictionary_fit, search
+from gmwm.estimate.start import Reference, dictionary_fit, search
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -34,6 +34,7 @@ from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
 MAX_GAUSS_MARKOV = 5
 
 _USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the search for more
+_RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 
 
@@ -139,7 +140,8 @@ def select(
     wavelet variances, with the discrepancy that this mixture shows. The criterion is the objective
     with the penalty of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment
     selection (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so
-    a model without one pays the squared slope over its variance. Terms that come out as zero make
+    a model without one pays the squared slope over its variance; it must win by a margin of 6, for
+    a straight line passes through any slow drift that is seen only once. Terms that come out as zero make
     a model equal to a smaller one, and it is left out of the ranking. Of the best candidates the
     first one is chosen whose own fit finds all of its terms identifiable.
     """
@@ -165,7 +167,7 @@ def _term_is_idle(fitted: Fit) -> bool:
 
 def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     reference = dictionary_fit(wv, wv.variance)
-    weights = _with_discrepancy(reference.covariance, reference.residual, wv.variance, reference.dof)
+    weights = _with_discrepancy(reference, wv.variance)
     plain = _candidates(wv, wv.variance, weights, max_gauss_markov)
     if not plain:
         plain = [_fallback(wv, weights)]
@@ -175,14 +177,19 @@ def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     without = slope.value**2 / slope.variance
     ranking = [_plus(candidate, without, 0.0) for candidate, _ in plain]
     ranking += _with_ramp(wv, slope, max_gauss_markov)
-    return sorted(ranking, key=lambda candidate: candidate.criterion)
+    return sorted(ranking, key=_rank_key)
+
+
+def _rank_key(candidate: Candidate) -> float:
+    ramped = any(isinstance(term, RateRamp) for term in candidate.model.terms)
+    return candidate.criterion + (_RAMP_MARGIN if ramped else 0.0)
 
 
 def _with_ramp(wv: WaveletVariance, slope: Slope, max_gauss_markov: int) -> list[Candidate]:
     """Candidates with a rate ramp, fitted to what is left when the slope is taken out."""
     target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
     reference = dictionary_fit(wv, target)
-    weights = _with_discrepancy(reference.covariance, reference.residual, target, reference.dof)
+    weights = _with_discrepancy(reference, target)
     ramped = _candidates(wv, target, weights, max_gauss_markov)
     penalty = _penalty(wv.n)
     return [
@@ -204,12 +211,10 @@ def _plus(candidate: Candidate, objective: float, penalty: float) -> Candidate:
     )
 
 
-def _with_discrepancy(
-    covariance: FloatArray, residual: FloatArray, target: FloatArray, dof: int
-) -> FloatArray:
-    level = Discrepancy(None, dof)
-    level.update(residual, covariance, target)
-    return level.added_to(covariance, target)
+def _with_discrepancy(reference: Reference, target: FloatArray) -> FloatArray:
+    level = Discrepancy(None, reference.dof)
+    level.update(reference.residual, reference.covariance, target, reference.curve)
+    return level.added_to(reference.covariance, target)
 
 
 def _penalty(n: int) -> float:

@@ -1,0 +1,229 @@
+"""The main job: a recording in, an error model for every channel out."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from gmwm.errors import InputError
+from gmwm.estimate.fit import Fit
+from gmwm.files import written
+from gmwm.process import Model, Process
+from gmwm.recording import Channel, Recording
+from gmwm.selection import select
+from gmwm.variance.wavelet import MIN_SAMPLES, wavelet_variance
+
+SCHEMA = "gmwm.calibration"
+SCHEMA_VERSION = 1
+
+Progress = Callable[[str], None]
+"""Called with the name of each channel when it is done."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Error models of the channels of a recording.
+
+    Attributes
+    ----------
+    fits : dict
+        Channel name -> `Fit`.
+    skipped : dict
+        Channel name -> why it has none, one sentence.
+    source : str
+        What was calibrated.
+    rate : float
+        Sampling rate, Hz.
+    n : int
+        Samples per channel.
+    notes : tuple of str
+        What the reader noticed.
+    """
+
+    fits: dict[str, Fit]
+    skipped: dict[str, str]
+    source: str
+    rate: float
+    n: int
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Fit:
+        if name not in self.fits:
+            why = self.skipped.get(name, f"it has {', '.join(self.fits)}")
+            raise InputError(f"the calibration has no model of channel {name!r}: {why}")
+        return self.fits[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.fits)
+
+    def __len__(self) -> int:
+        return len(self.fits)
+
+    @property
+    def duration(self) -> float:
+        """Length of the recording, s."""
+        return self.n / self.rate
+
+    @property
+    def valid(self) -> bool:
+        """Whether every channel has a valid fit."""
+        return not self.skipped and all(fit.valid for fit in self.fits.values())
+
+    def __str__(self) -> str:
+        blocks = [str(fit) for fit in self.fits.values()]
+        blocks += [f"{name}: skipped, {why}" for name, why in self.skipped.items()]
+        return "\n\n".join(blocks)
+
+    # -- files ------------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, in JSON types; see `from_dict`."""
+        return {
+            "schema": SCHEMA,
+            "schema_version": SCHEMA_VERSION,
+            "source": self.source,
+            "rate_hz": self.rate,
+            "n": self.n,
+            "notes": list(self.notes),
+            "skipped": self.skipped,
+            "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Calibration:
+        """Inverse of `to_dict`.
+
+        Raises
+        ------
+        InputError
+            If the content is no calibration of a schema version known here.
+        """
+        if not isinstance(content, dict) or content.get("schema") != SCHEMA:
+            raise InputError("this is no calibration: expected a file made by gmwm calibrate")
+        version = content.get("schema_version")
+        if version != SCHEMA_VERSION:
+            raise InputError(
+                f"schema version {version!r} is not known to this gmwm (it knows {SCHEMA_VERSION}): "
+                "calibrate again or update gmwm"
+            )
+        try:
+            return cls(
+                fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
+                skipped=dict(content["skipped"]),
+                source=content["source"],
+                rate=content["rate_hz"],
+                n=content["n"],
+                notes=tuple(content["notes"]),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"the calibration is damaged ({error!r}): calibrate again") from None
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything as JSON; the file appears whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        with written(path) as stream:
+            json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
+            stream.write("\n")
+        return Path(path)
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the self-contained HTML report; see `gmwm.report`."""
+        from gmwm.report import write_report
+
+        return write_report(self, path)
+
+
+def load(path: str | os.PathLike[str]) -> Calibration:
+    """Read a calibration written by `Calibration.save`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no JSON, or no calibration.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no JSON ({error}): give a calibration.json") from None
+    try:
+        return Calibration.from_dict(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def calibrate(
+    recording: Recording,
+    model: Process | Model | None = None,
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Error model of every channel of a static recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    model : Process or Model, optional
+        Fitted to every channel; by default the model is selected for each channel.
+    jobs : int, optional
+        Threads; by default one per core.
+    progress : callable, optional
+        Called with each channel's name when it is done.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If no channel can be calibrated.
+    """
+    dead = {c.name: f"constant at {c.values[0]:.6g} {c.unit}" for c in recording if c.is_constant}
+    alive = [c for c in recording if c.name not in dead]
+    if not alive:
+        raise InputError(
+            f"{recording.source or 'the recording'}: every channel is constant, nothing to "
+            "calibrate: check the sensor and the columns"
+        )
+    if recording.n < MIN_SAMPLES:
+        raise InputError(f"{recording.n} samples are too few: record at least {MIN_SAMPLES}")
+
+    def one(channel: Channel) -> Fit:
+        fitted = _channel_fit(channel, model)
+        if progress is not None:
+            progress(channel.name)
+        return fitted
+
+    workers = Parallel(n_jobs=jobs or -1, prefer="threads")
+    fits = workers(delayed(one)(channel) for channel in alive)
+    return Calibration(
+        fits={channel.name: fit for channel, fit in zip(alive, fits, strict=True)},
+        skipped=dead,
+        source=recording.source,
+        rate=recording.rate,
+        n=recording.n,
+        notes=recording.notes,
+    )
+
+
+def _channel_fit(channel: Channel, model: Process | Model | None) -> Fit:
+    wv = wavelet_variance(channel)
+    if model is None:
+        return select(wv).fit
+    from gmwm.estimate.gmwm import fit
+
+    return fit(model, wv)

@@ -1,0 +1,256 @@
+"""Command line: parse, call, print."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gmwm import __version__
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from gmwm.calibration import Calibration, Progress
+    from gmwm.process import Model
+    from gmwm.recording import Recording
+
+_EXIT_INPUT = 2
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="gmwm")
+def cli() -> None:
+    """Stochastic error models of inertial sensors from static recordings."""
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-out"),
+              show_default=True, help="Folder for calibration.json, report.html, imu.yaml.")  # fmt: skip
+@click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column.")
+@click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ...")
+@click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ...")
+@click.option("--channel", "channels", multiple=True, metavar="NAME=COLUMN",
+              help="Role of a column by its name or 0-based number, e.g. gyro_x=wx or accel_z=5; "
+                   "repeat. By default roles are guessed from the column names.")  # fmt: skip
+@click.option("--time", "time_column", metavar="COLUMN",
+              help="Time column by name or number; 'none' to ignore it.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: one per core].")
+def calibrate(
+    file: Path,
+    output: Path,
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+    jobs: int | None,
+) -> None:
+    """Calibrate every channel of a static recording.
+
+    FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
+    For each channel an error model is selected and estimated; the table shows it in the units of
+    the field, the files hold everything in SI units.
+
+    \b
+    Example:
+      gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
+    """
+    from gmwm.calibration import calibrate as run
+    from gmwm.files import output_folder
+    from gmwm.read import read
+
+    folder = output_folder(output)
+    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    recording = read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
+    with _progress(recording) as progress:
+        result = run(recording, jobs=jobs, progress=progress)
+    _show(result)
+    _write(result, folder)
+
+
+@cli.command()
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-demo"),
+              show_default=True, help="Folder for calibration.json, report.html, imu.yaml.")  # fmt: skip
+@click.option("--hours", type=click.FloatRange(0.01, 100.0), default=1.0, show_default=True,
+              help="Length of the simulated recording in hours.")  # fmt: skip
+@click.option("--seed", type=int, default=1, show_default=True)
+def demo(output: Path, hours: float, seed: int) -> None:
+    """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
+
+    The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
+
+    \b
+    Example:
+      gmwm demo --hours 4 --seed 2
+    """
+    from gmwm.calibration import calibrate as run
+    from gmwm.demo import simulated_imu
+    from gmwm.files import output_folder
+
+    folder = output_folder(output)
+    recording, truth = simulated_imu(3600.0 * hours, seed)
+    with _progress(recording) as progress:
+        result = run(recording, progress=progress)
+    _show(result, truth)
+    _write(result, folder)
+
+
+def main() -> None:
+    """Entry point: bad input is one sentence and exit code 2, never a traceback."""
+    try:
+        cli.main(standalone_mode=False)
+    except InputError as error:
+        click.echo(f"gmwm: {error}", err=True)
+        sys.exit(_EXIT_INPUT)
+    except click.exceptions.Exit as error:
+        sys.exit(error.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(_EXIT_INPUT)
+    except click.Abort:
+        click.echo("gmwm: interrupted, nothing was written", err=True)
+        sys.exit(130)
+
+
+# -- arguments ------------------------------------------------------------------------------------
+
+
+def _column(text: str) -> str | int:
+    return int(text) if text.isdigit() else text
+
+
+def _roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
+    roles = {}
+    for pair in pairs:
+        name, separator, column = pair.partition("=")
+        if not (name and separator and column):
+            raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
+        roles[name] = _column(column)
+    return roles or None
+
+
+def _time(text: str | None) -> str | int | bool | None:
+    if text is None:
+        return None
+    return False if text.lower() == "none" else _column(text)
+
+
+# -- what is printed ------------------------------------------------------------------------------
+
+
+@contextmanager
+def _progress(recording: Recording) -> Iterator[Progress]:
+    """A bar over the channels, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("calibrating"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total} channels {task.description}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("", total=len(recording))
+
+        def done(name: str) -> None:
+            bar.update(task, advance=1, description=name)
+
+        yield done
+
+
+def _show(result: Calibration, truth: dict[str, Model] | None = None) -> None:
+    from gmwm.report.page import duration_text
+
+    console = _console()
+    console.print(
+        f"{result.source}: {duration_text(result.duration)} at {result.rate:g} Hz, "
+        f"{result.n:,} samples a channel",
+        highlight=False,
+    )
+    console.print(_table(result, truth))
+    for note in result.notes:
+        console.print(f"- {note}", highlight=False)
+    for name, why in result.skipped.items():
+        console.print(f"- {name} skipped: {why}", highlight=False)
+    for name, fit in result.fits.items():
+        for remark in fit.remarks:
+            console.print(f"- {name}: {remark}", highlight=False)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    # Piped output is as wide as a terminal that people use, not as rich guesses.
+    return Console(width=None if sys.stdout.isatty() else 80)
+
+
+def _table(result: Calibration, truth: dict[str, Model] | None) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    from gmwm.demo import matched_truth
+    from gmwm.units import field_units
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("channel", no_wrap=True)
+    table.add_column("param.", no_wrap=True)
+    if truth:
+        table.add_column("truth", justify="right", no_wrap=True)
+    table.add_column("estimate", justify="right", no_wrap=True)
+    table.add_column("95 % interval", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for name, fit in result.fits.items():
+        known, unresolved = matched_truth(fit.model, truth[name]) if truth else ({}, [])
+        rows = fit.rows()
+        for i, row in enumerate(rows):
+            cells = [name if i == 0 else "", row["key"]]
+            value, low, high, unit = row["field"][0] if row["field"] else (
+                row["value"], row["lower"], row["upper"], row["unit"])  # fmt: skip
+            scale = value / row["value"] if row["value"] else 1.0
+            if truth:
+                true = known.get(row["key"])
+                cells.append("-" if true is None else f"{true * scale:.4g}")
+            if row["kind"] == "bound":
+                cells += ["0", f"below {high:.3g}", unit]
+            elif row["kind"] == "estimated":
+                cells += [f"{value:.4g}", f"{low:.3g} .. {high:.3g}", unit]
+            else:
+                cells += [f"{value:.4g}", row["kind"], unit]
+            mark = "" if fit.valid else "not valid"
+            table.add_row(*cells, mark if i == 0 else "", end_section=i == len(rows) - 1)
+        for item in unresolved:
+            unit = field_units(item.parameter.unit, fit.wv.quantity)
+            value = item.value * (unit[0].per_si if unit else 1.0)
+            si = item.parameter.unit
+            table.add_row("", item.key, f"{value:.4g}", "-", "not resolved", unit[0].unit if unit else si)
+    return table
+
+
+def _write(result: Calibration, folder: Path) -> None:
+    from gmwm.export import write_kalibr
+
+    written = [
+        result.save(folder / "calibration.json"),
+        result.report(folder / "report.html"),
+    ]
+    quantities = {fit.wv.quantity for fit in result.fits.values()}
+    if {"gyro", "accel"} <= quantities:
+        written.append(write_kalibr(result, folder / "imu.yaml"))
+    for path in written:
+        click.echo(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main()

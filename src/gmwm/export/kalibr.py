@@ -1,0 +1,74 @@
+"""Kalibr's ``imu.yaml``: one noise density and one random walk per sensor.
+
+Kalibr's model is white noise plus random walk, the same for all axes, in continuous time
+(https://github.com/ethz-asl/kalibr/wiki/IMU-Noise-Model). It refuses zeros.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.files import written
+from gmwm.summary import random_walk, white_density
+
+_SENSORS = (
+    ("accel", "accelerometer", "m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"),
+    ("gyro", "gyroscope", "rad/s/sqrt(Hz)", "rad/s^2/sqrt(Hz)"),
+)
+
+
+def kalibr_text(calibration: Calibration) -> str:
+    """The content of ``imu.yaml``.
+
+    Each value is that of the noisiest axis. The noise density counts every term that averages out
+    at 1 s; a random walk that no axis shows is given by the largest of the axes' upper bounds of 95 %.
+
+    Raises
+    ------
+    InputError
+        If the calibration has no gyro or no accelerometer, which Kalibr needs both.
+    """
+    lines = [f"# {calibration.source or 'recording'}, {calibration.duration:.0f} s static"]
+    for quantity, name, density_unit, walk_unit in _SENSORS:
+        fits = {k: f for k, f in calibration.fits.items() if f.wv.quantity == quantity}
+        if not fits:
+            raise InputError(
+                f"imu.yaml needs gyro and accelerometer channels, there is no {name}: calibrate both"
+            )
+        densities = {key: white_density(fitted) for key, fitted in fits.items()}
+        lines.append(f"{name}_noise_density: {max(densities.values()):.6e}  # {density_unit}")
+        lines.append(f"#   by axis: {_listed(densities)}")
+        walks = {key: random_walk(fitted) for key, fitted in fits.items()}
+        found = {key: walk.value for key, walk in walks.items() if walk.found}
+        if found:
+            lines.append(f"{name}_random_walk: {max(found.values()):.6e}  # {walk_unit}")
+            lines.append(f"#   by axis: {_listed(found)}")
+        else:
+            bounds = {key: walk.value for key, walk in walks.items()}
+            lines.append(f"{name}_random_walk: {max(bounds.values()):.6e}  # {walk_unit}")
+            lines.append("#   no random walk was found: this is the largest 95 % upper bound")
+            lines.append(f"#   of the axes: {_listed(bounds)}")
+    lines.append("rostopic: /imu0  # set to the topic of your bag")
+    lines.append(f"update_rate: {calibration.rate:.6g}  # Hz")
+    return "\n".join(lines) + "\n"
+
+
+def write_kalibr(calibration: Calibration, path: str | os.PathLike[str]) -> Path:
+    """Write ``imu.yaml``; see `kalibr_text`.
+
+    Raises
+    ------
+    InputError
+        If a sensor is missing or the file cannot be written.
+    """
+    text = kalibr_text(calibration)
+    with written(path) as stream:
+        stream.write(text)
+    return Path(path)
+
+
+def _listed(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3e}" for name, value in values.items())

@@ -1,0 +1,66 @@
+"""Output files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TextIO
+
+from gmwm.errors import InputError
+
+
+@contextmanager
+def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
+    """Open a text file for writing under a temporary name; it takes its own when all went well.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:
+        raise InputError(_sentence(target, error)) from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            yield stream
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except OSError as error:
+        raise InputError(_sentence(target, error)) from None
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(name)
+
+
+def output_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder for outputs, and make sure that it can be written.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(_sentence(folder, error)) from None
+    return folder
+
+
+def _sentence(path: Path, error: OSError) -> str:
+    return f"{path}: cannot be written ({error.strerror}): choose another place with -o"
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,104 @@
+"""Pictures from plain arrays and labels, in the axes people know.
+
+Every function draws into given axes or new ones and returns them; none knows what it draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195")
+"""Okabe & Ito's palette, told apart by colour-blind people too; black is the sum."""
+
+DATA_COLOUR = "#444444"
+SUM_COLOUR = "#000000"
+
+_DECADES_SHOWN_BELOW = 0.7  # of a component, below the lowest data point
+
+
+def deviation(
+    tau: FloatArray,
+    value: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    *,
+    unit: str,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """Allan deviation with error bars against averaging time, log-log.
+
+    Parameters
+    ----------
+    tau : (J,) ndarray
+        Averaging times, s.
+    value, lower, upper : (J,) ndarray
+        Deviations and the ends of their intervals, in ``unit``.
+    unit : str
+    title : str, optional
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    import matplotlib.pyplot as plt
+
+    if ax is None:
+        _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+    bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
+    ax.errorbar(
+        tau, value, yerr=bars, fmt="o", color=DATA_COLOUR, markersize=4.5, capsize=2.5,
+        elinewidth=1.0, label="data, 95 % interval", zorder=4,
+    )  # fmt: skip
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel("averaging time [s]")
+    ax.set_ylabel(f"Allan deviation [{unit}]")
+    if title:
+        ax.set_title(title)
+    ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
+    ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
+    ax.set_axisbelow(True)
+    return ax
+
+
+def curves(
+    ax: Axes, tau: FloatArray, total: FloatArray, components: Mapping[str, FloatArray]
+) -> None:
+    """Fitted curve and its components over the data of `deviation`.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    tau : (J,) ndarray
+        Averaging times, s.
+    total : (J,) ndarray
+        Deviation of the sum.
+    components : mapping of str to (J,) ndarray
+        Deviations of the terms by label.
+    """
+    for colour, (label, value) in zip(_cycle(len(components)), components.items(), strict=True):
+        ax.plot(tau, value, color=colour, linewidth=1.3, linestyle="--", label=label, zorder=2)
+    ax.plot(tau, total, color=SUM_COLOUR, linewidth=1.8, label="model", zorder=3)
+    ax.set_ylim(*deviation_range(total))
+    ax.legend(fontsize="small", framealpha=0.9)
+
+
+def deviation_range(total: FloatArray) -> tuple[float, float]:
+    """Limits of the deviation axis that show the data and hide components far below them."""
+    low, high = float(np.min(total)), float(np.max(total))
+    return low / 10**_DECADES_SHOWN_BELOW, high * 10**0.4
+
+
+def _cycle(count: int) -> list[str]:
+    palette = COMPONENT_COLOURS
+    return [palette[i % len(palette)] for i in range(count)]

@@ -1,0 +1,108 @@
+"""Interactive deviation plots, as the JSON that plotly.js draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gmwm.estimate.fit import Fit
+from gmwm.plot import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
+from gmwm.units import field_units
+
+_GRID = "#dddddd"
+
+
+def deviation_figure(fitted: Fit) -> dict[str, Any]:
+    """Allan deviation with error bars, model and components, in SI with the field's unit on hover.
+
+    Returns
+    -------
+    dict
+        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
+    """
+    wv = fitted.wv
+    unit, factor = wv.unit, 1.0
+    field = field_units("u", wv.quantity)
+    if field:
+        unit, factor = field[0].unit, field[0].per_si
+    tau = wv.tau.tolist()
+    value = wv.allan_deviation * factor
+    lower, upper = np.sqrt(2.0 * wv.lower) * factor, np.sqrt(2.0 * wv.upper) * factor
+    total = np.sqrt(2.0 * fitted.implied) * factor
+    traces = [
+        _line(tau, np.sqrt(2.0 * curve) * factor, label, colour, "dash", 1.5)
+        for (label, curve), colour in zip(
+            fitted.components.items(), _colours(len(fitted.components)), strict=True
+        )
+        if np.any(curve > 0.0)
+    ]
+    traces.append(_line(tau, total, "model", SUM_COLOUR, "solid", 2.2))
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "data, 95 % interval",
+            "x": tau,
+            "y": value.tolist(),
+            "marker": {"color": DATA_COLOUR, "size": 6},
+            "error_y": {
+                "type": "data",
+                "symmetric": False,
+                "array": (upper - value).tolist(),
+                "arrayminus": (value - lower).tolist(),
+                "color": DATA_COLOUR,
+                "thickness": 1.2,
+                "width": 3,
+            },
+        }
+    )
+    low, high = deviation_range(np.concatenate([total, value]))
+    layout = {
+        "xaxis": _axis("averaging time [s]"),
+        "yaxis": {
+            **_axis(f"Allan deviation [{unit}]"),
+            "range": [float(np.log10(low)), float(np.log10(high))],
+        },
+        "margin": {"l": 75, "r": 15, "t": 15, "b": 50},
+        "height": 420,
+        "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 1, "xanchor": "right", "y": 1},
+        "plot_bgcolor": "#ffffff",
+        "paper_bgcolor": "#ffffff",
+        "hovermode": "closest",
+        "font": {"family": "system-ui, sans-serif", "size": 13},
+    }
+    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
+    return {"data": traces, "layout": layout, "config": config}
+
+
+def _line(
+    tau: list[float], value: np.typing.NDArray[np.float64], label: str, colour: str, dash: str, width: float
+) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": label,
+        "x": tau,
+        "y": value.tolist(),
+        "line": {"color": colour, "dash": dash, "width": width},
+        "hovertemplate": "%{y:.4g} at %{x:.4g} s",
+    }
+
+
+def _axis(title: str) -> dict[str, Any]:
+    return {
+        "type": "log",
+        "title": {"text": title},
+        "exponentformat": "power",
+        "dtick": 1,
+        "gridcolor": _GRID,
+        "linecolor": "#888888",
+        "mirror": True,
+        "ticks": "outside",
+        "minor": {"ticks": "outside", "ticklen": 3},
+    }
+
+
+def _colours(count: int) -> list[str]:
+    return [COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)] for i in range(count)]

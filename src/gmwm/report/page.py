@@ -1,0 +1,121 @@
+"""The page: what is shown, and in which words."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import gmwm
+from gmwm.calibration import Calibration
+from gmwm.estimate.fit import Fit
+from gmwm.files import written
+from gmwm.report.figure import deviation_figure
+from gmwm.selection import describe
+from gmwm.summary import floor, sentence, white_density
+from gmwm.units import field_units
+
+
+def write_report(calibration: Calibration, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a calibration as one HTML file that needs no network.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    path : path-like
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    text = page(calibration)
+    with written(path) as stream:
+        stream.write(text)
+    return Path(path)
+
+
+def page(calibration: Calibration) -> str:
+    """The report as HTML text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
+    )
+    template = environment.get_template("template.html")
+    return template.render(
+        calibration=calibration,
+        version=gmwm.__version__,
+        length=duration_text(calibration.duration),
+        channels=[_channel(name, fit) for name, fit in calibration.fits.items()],
+        plotly_js=get_plotlyjs(),
+    )
+
+
+def duration_text(seconds: float) -> str:
+    """A duration as people say it: ``2 h 46 min``, ``35 min``, ``40 s``."""
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60.0)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def number(value: float) -> str:
+    """Four significant digits, without an exponent where a person would write none."""
+    text = f"{value:.4g}"
+    return text if "e" not in text else f"{value:.3e}"
+
+
+def _in_field_unit(value: float, parameter_unit: str, fit: Fit) -> str:
+    units = field_units(parameter_unit, fit.wv.quantity)
+    if not units:
+        return f"{number(value)} {fit.wv.unit}"
+    return f"{number(value * units[0].per_si)} {units[0].unit}"
+
+
+def _channel(name: str, fit: Fit) -> dict[str, Any]:
+    low = floor(fit)
+    return {
+        "name": name,
+        "fit": fit,
+        "model": describe(fit.model),
+        "density": _in_field_unit(white_density(fit), "u/sqrt(Hz)", fit),
+        "floor": _in_field_unit(low.deviation, "u", fit),
+        "floor_tau": number(low.tau),
+        "sentence": sentence(fit),
+        "rows": [_row(row) for row in fit.rows()],
+        "figure": json.dumps(deviation_figure(fit)),
+        "fitness": _fitness(fit),
+    }
+
+
+def _fitness(fit: Fit) -> str:
+    text = f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom"
+    if fit.p_value == fit.p_value:
+        text += f", p = {fit.p_value:.2g}"
+    if fit.discrepancy > 0.0:
+        text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
+    return text
+
+
+def _row(row: dict[str, Any]) -> dict[str, Any]:
+    """A parameter for the table: SI, then each of the field's units."""
+
+    def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
+        if row["kind"] == "bound":
+            return {"value": f"< {number(high)}", "interval": "upper bound, 95 %", "unit": unit}
+        if row["kind"] == "estimated":
+            interval = f"{number(low)} to {number(high)}"
+            return {"value": number(value), "interval": interval, "unit": unit}
+        return {"value": number(value), "interval": row["kind"], "unit": unit}
+
+    cells = [cell(row["value"], row["lower"], row["upper"], row["unit"])]
+    cells += [cell(*field) for field in row["field"]]
+    return {"key": row["key"], "meaning": row["meaning"], "cells": cells}

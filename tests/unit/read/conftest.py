@@ -1,0 +1,47 @@
+"""Small files to read."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Writer = Callable[..., Path]
+
+
+@pytest.fixture
+def samples() -> np.ndarray:
+    """80 samples of six axes, with few digits so that text gives them back exactly."""
+    return np.round(np.random.default_rng(5).normal(size=(80, 6)), 5)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Writer:
+    """Write rows of numbers as text."""
+
+    def _write(
+        rows: np.ndarray,
+        header: str | None = None,
+        name: str = "static.csv",
+        delimiter: str = ",",
+        end: str = "\n",
+        decimal: str = ".",
+        last: str = "",
+        before: str = "",
+        after: str = "",
+    ) -> Path:
+        lines = [
+            delimiter.join(repr(float(v)).replace(".", decimal) for v in row) + last
+            for row in np.atleast_2d(rows)
+        ]
+        if header is not None:
+            lines.insert(0, header)
+        data = (before + end.join(lines) + end + after).encode()
+        path = tmp_path / name
+        path.write_bytes(gzip.compress(data) if name.endswith(".gz") else data)
+        return path
+
+    return _write

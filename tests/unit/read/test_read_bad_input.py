@@ -1,0 +1,378 @@
+"""What cannot be used is refused in one sentence: what, where, and the mend."""
+
+from __future__ import annotations
+
+import gzip
+import os
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.read import read
+from gmwm.read.names import CANONICAL
+
+SI = {"gyro": "rad/s", "accel": "m/s^2"}
+HEADER = ",".join(CANONICAL)
+
+
+def problem(path, **options):
+    with pytest.raises(InputError) as caught:
+        read(path, **({"rate": 100, "units": SI} | options))
+    message = str(caught.value)
+    assert len(message.splitlines()) == 1
+    assert ": " in message
+    return message
+
+
+@pytest.fixture
+def damaged(write, samples):
+    """Write a good file with one line replaced."""
+
+    def _damaged(number, line, **options):
+        path = write(samples, HEADER, **options)
+        lines = path.read_text().split("\n")
+        lines[number - 1] = line
+        path.write_text("\n".join(lines))
+        return path
+
+    return _damaged
+
+
+def test_missing_file(tmp_path):
+    path = tmp_path / "nowhere.csv"
+    assert problem(path) == f"{path} does not exist: check the path"
+    assert "does not exist" in problem(tmp_path / "nowhere.npy")
+    assert "does not exist" in problem("a\0b.csv")
+
+
+def test_directory(tmp_path):
+    assert problem(tmp_path) == f"{tmp_path} is a directory: name a file in it"
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may read anything")
+@pytest.mark.parametrize("name", ["a.csv", "a.npy"])
+def test_no_permission(tmp_path, name):
+    path = tmp_path / name
+    path.write_text("gx\n")
+    path.chmod(0)
+    assert "a.csv cannot be read" in problem(path)
+
+
+def test_unreadable(tmp_path, monkeypatch):
+    path = tmp_path / "a.csv"
+    path.write_text("gx\n")
+
+    def refuse(*_args, **_kwargs):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(type(path), "open", refuse)
+    assert problem(path) == "a.csv cannot be read (Permission denied): check its permissions"
+    npy = tmp_path / "a.npy"
+    npy.touch()
+    assert problem(npy) == "a.npy cannot be read: check its permissions"
+
+
+@pytest.mark.parametrize("data", [b"", b"\n", b" \r\n\t\n", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz"])
+def test_empty(tmp_path, data, name):
+    path = tmp_path / name
+    path.write_bytes(gzip.compress(data) if name.endswith("gz") else data)
+    assert problem(path) == f"{name} is empty: give a file with samples"
+
+
+def test_zero_bytes_called_gz(tmp_path):
+    path = tmp_path / "a.csv.gz"
+    path.touch()
+    assert problem(path) == "a.csv.gz is empty: give a file with samples"
+
+
+def test_comments_only(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("# a\n% b\n")
+    assert "holds only comments" in problem(path)
+
+
+def test_header_only(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(HEADER + "\n\n")
+    assert problem(path) == "a.csv has a header (line 1) but no data: add samples"
+
+
+@pytest.mark.parametrize(
+    "cell", ["abc", "1.2.3", "1,5", "1_0", "0x10", "١", "--1", "1 2", "1e", "#"]
+)
+def test_text_for_a_number(damaged, cell):
+    path = damaged(40, f"1;2;3;{cell};5;6", delimiter=";")
+    path.write_text(path.read_text().replace(HEADER, HEADER.replace(",", ";")))
+    message = problem(path)
+    assert message.startswith(f"static.csv, line 40, column 'accel_x': {cell!r} is not a number: ")
+    assert "mend the line" in message
+
+
+def test_long_and_odd_text_is_cut_and_escaped(damaged):
+    message = problem(damaged(9, "1,2,3,4,5," + "\x0b\x1b" * 50))
+    assert message.startswith("static.csv, line 9, column 'accel_z': '\\x0b")
+    assert "..." in message
+    assert message.isprintable()
+
+
+def test_text_without_header(write, samples):
+    path = write(samples)
+    path.write_text(path.read_text() + "1,2,oops,4,5,6\n")
+    assert "line 81, column 2 (counted from 0): 'oops' is not a number" in problem(path)
+
+
+def test_text_in_the_first_line_is_no_header(damaged):
+    path = damaged(1, "1,2,oops,4,5,6")
+    assert "static.csv, line 1, column 2 (counted from 0): 'oops'" in problem(path)
+
+
+def test_comment_among_the_data(damaged):
+    assert "line 30: 1 fields where 6 were expected" in problem(damaged(30, "# pause"))
+
+
+@pytest.mark.parametrize(
+    "cell", ["nan", "NaN", "inf", "-Infinity", "NA", "null", "1e999", "-1e200"]
+)
+def test_not_finite(damaged, cell):
+    message = problem(damaged(12, f"1,{cell},3,4,{cell},6"))
+    assert message.startswith(f"static.csv, line 12, column 'gyro_y': '{cell}' is not a usable")
+    assert "and 1 more such" in message
+    assert "interpolate" in message
+
+
+@pytest.mark.parametrize("cell", ["", " ", '""'])
+def test_empty_cell(damaged, cell):
+    message = problem(damaged(12, f"1,{cell},3,4,5,6"))
+    assert message.startswith("static.csv, line 12, column 'gyro_y': an empty field is not")
+    assert "more such" not in message
+
+
+def test_gaps_are_counted_over_all_blocks(damaged, monkeypatch):
+    from gmwm.read import csv_table
+
+    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500))
+    path = damaged(12, "1,,3,4,nan,6")
+    path.write_text(path.read_text() + "1,2,3,4,5,\n" * 3)
+    assert "line 12, column 'gyro_y'" in problem(path)
+    assert "and 4 more such" in problem(path)
+
+
+def test_blank_line_in_a_single_column(write, samples):
+    path = write(samples[:, :1], "gx", after="\n\n")
+    lines = path.read_text().split("\n")
+    lines[40] = ""
+    path.write_text("\n".join(lines))
+    assert "line 41, column 'gx': an empty field" in problem(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "found"), [("1,2,3,4,5", 5), ("1,2,3,4,5,6,7", 7), ("1;2", 1), ("1,2,3,4,5,6,,", 8)]
+)
+def test_ragged(damaged, line, found):
+    message = problem(damaged(33, line))
+    assert f"static.csv, line 33: {found} fields where 6 were expected: mend the line" in message
+
+
+@pytest.mark.parametrize("line", ["1 2 3 4 5", "1\t2 3 4  5 6 7"])
+def test_ragged_blanks(write, samples, line):
+    path = write(samples, delimiter=" ")
+    path.write_text(path.read_text() + line)
+    assert f"line 81: {len(line.split())} fields where 6" in problem(path)
+
+
+def test_first_line_is_the_ragged_one(write, samples):
+    path = write(samples)
+    path.write_text("1,2,3\n" + path.read_text())
+    assert "static.csv, line 1: 3 fields where 6 were expected" in problem(path)
+
+
+@pytest.mark.parametrize("header", ["gyro_x,gyro_y", HEADER + ",temp"])
+def test_header_of_another_width(write, samples, header):
+    message = problem(write(samples, header))
+    assert "line 2 and after: 6 fields where the header (line 1) has" in message
+
+
+def test_quotes_that_do_not_match(damaged):
+    assert "line 8: quotes that do not match" in problem(damaged(8, '1,2,"3,4,5,6'))
+    assert "line 1: quotes that do not match" in problem(damaged(1, '"a,b,c,d,e,f'))
+
+
+def test_too_few_samples(write, samples):
+    message = problem(write(samples[:63], HEADER))
+    assert message == "static.csv has 63 samples where at least 64 are needed: record longer"
+    assert read(write(samples[:64], HEADER), rate=1, units=SI).n == 64
+
+
+@pytest.mark.parametrize(("option", "quantity"), [("deg/s", "gyro"), ("g", "accel")])
+def test_unit_missing(write, samples, option, quantity):
+    units = {key: unit for key, unit in SI.items() if key != quantity}
+    message = problem(write(samples, HEADER), units=units)
+    assert f"static.csv does not say the unit of {quantity}_x" in message
+    assert f'units={{"{quantity}": "{option}"}}' in message
+    assert f"--{quantity}-unit {option}" in message
+
+
+def test_unit_of_another_name_missing(write, samples):
+    message = problem(write(samples), channels={"table": 0}, units={})
+    assert 'does not say the unit of table: give it, e.g. units={"table": "deg/s"}' in message
+
+
+@pytest.mark.parametrize("unit", ["furlong", "", "deg/", "9 9", "LSB", "m"])
+def test_unit_unknown(write, samples, unit):
+    message = problem(write(samples, HEADER), units=SI | {"gyro": unit})
+    assert message.startswith("static.csv, channel gyro_x: un")
+    assert repr(unit) in message
+
+
+def test_unit_of_the_other_sensor(write, samples):
+    message = problem(write(samples, HEADER), units=SI | {"gyro": "g"})
+    assert "channel gyro_x: unit 'g' does not measure the same as rad/s" in message
+    message = problem(write(samples[:, :1], "gyro_x [g]"), units={})
+    assert "channel gyro_x: unit 'g' does not measure" in message
+
+
+def test_units_of_nothing(write, samples):
+    message = problem(write(samples, HEADER), units=SI | {"gyros": "deg/s"})
+    assert "units has 'gyros', which is neither gyro nor accel nor a channel" in message
+    assert "gyro_x, gyro_y" in message
+
+
+def test_rate_missing(write, samples):
+    message = problem(write(samples, HEADER), rate=None)
+    assert "static.csv has no time column and no rate was given" in message
+    assert "--rate 100" in message
+
+
+@pytest.mark.parametrize("rate", [0, -5.0, float("nan"), float("inf"), 1e-320])
+def test_rate_not_positive(write, samples, rate):
+    assert "give a positive sampling rate in Hz" in problem(write(samples, HEADER), rate=rate)
+
+
+def test_names_that_mean_nothing(write, samples):
+    message = problem(write(samples, "a,b,c,d,e,f"))
+    assert "its columns are 'a', 'b', 'c', 'd', 'e', 'f'" in message
+    assert "channels={" in message
+
+
+def test_many_names(write, samples):
+    rows = np.tile(samples, (1, 5))
+    message = problem(write(rows, ",".join(f"c{i}" for i in range(30))))
+    assert "'c11' and 18 more" in message
+
+
+@pytest.mark.parametrize("width", [2, 5, 8])
+def test_number_of_columns_without_names(write, samples, width):
+    message = problem(write(np.tile(samples, 2)[:, :width]))
+    assert f"static.csv has {width} columns without names" in message
+    assert "channels={" in message
+
+
+@pytest.mark.parametrize("units", [{}, SI])
+@pytest.mark.parametrize("width", [1, 3, 4])
+def test_one_sensor_but_which(write, samples, width, units):
+    message = problem(write(samples[:, :width]), units=units)
+    assert "whether this is a gyro or an accelerometer" in message
+    assert "channels={" in message
+
+
+def test_two_columns_of_one_meaning(write, samples):
+    message = problem(write(samples, "gx,gyro_x,gy,gz,ax,ay"))
+    assert "columns 'gx' and 'gyro_x' may both be gyro_x" in message
+    assert 'channels={"gyro_x": 0}' in message
+    message = problem(write(samples, "gx,gx,gy,gz,ax,ay"), channels={"gyro_x": "gx"})
+    assert "2 columns 'gx': give the index of the one for gyro_x" in message
+    # Where nobody asks for them, equal names do no harm.
+    assert len(read(write(samples, "t2,t2,gy,gz,ax,ay"), rate=1, units=SI)) == 4
+
+
+@pytest.mark.parametrize("reference", ["gz", "", "-1", "6", 6, -1])
+@pytest.mark.parametrize("option", ["channels", "time"])
+def test_no_such_column(write, samples, option, reference):
+    path = write(samples, "a,b,c,d,e,f")
+    value = {"gyro_x": reference} if option == "channels" else reference
+    assert "static.csv has no column" in problem(path, **{option: value})
+
+
+@pytest.mark.parametrize("reference", [True, None, 1.0, ["a"]])
+def test_no_column_at_all(write, samples, reference):
+    message = problem(write(samples), channels={"gyro_x": reference})
+    assert f"gyro_x = {reference!r} is no column: give its name or its index" in message
+
+
+def test_no_channels(write, samples):
+    assert "channels names no channel" in problem(write(samples), channels={})
+
+
+def test_time_true(write, samples):
+    assert "time = True is no column" in problem(write(samples), time=True)
+
+
+def test_not_gzip(write, samples):
+    path = write(samples, HEADER)
+    path = path.rename(path.with_name("static.csv.gz"))
+    assert problem(path).startswith("static.csv.gz is not a gzip file although its name ends")
+
+
+@pytest.mark.parametrize("keep", [3, 12, 0.5, -4])
+def test_cut_gzip(write, samples, keep):
+    path = write(samples, HEADER, name="static.csv.gz")
+    data = path.read_bytes()
+    path.write_bytes(data[: int(keep * len(data)) if isinstance(keep, float) else keep])
+    message = problem(path)
+    assert message.startswith("static.csv.gz ends before its gzip data are complete")
+    assert "get a whole copy" in message
+
+
+def test_damaged_gzip(write, samples):
+    path = write(samples, HEADER, name="static.csv.gz")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+    assert "static.csv.gz is a damaged gzip file" in problem(path)
+    path.write_bytes(b"\x1f\x8b\xff\xff" + bytes(20))
+    assert "static.csv.gz is a damaged gzip file" in problem(path)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.mat", "a.xlsx", "a.csv.gz"])
+def test_binary(tmp_path, name):
+    path = tmp_path / name
+    data = bytes(range(256)) * 8
+    path.write_bytes(gzip.compress(data) if name.endswith("gz") else data)
+    message = problem(path)
+    assert message.startswith(f"{name} is not a text file")
+    assert "CSV and other delimited text (plain or .gz), NPY and NPZ" in message
+
+
+@pytest.mark.parametrize("name", ["a.py", "a.md", "a.json"])
+def test_text_that_is_no_table(tmp_path, name):
+    path = tmp_path / name
+    path.write_text("import this\n\nprint('hello')\n")
+    message = problem(path)
+    assert message.startswith(f"{name} holds no numbers in its first lines")
+    assert "NPY and NPZ" in message
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-32"])
+def test_wide_encodings(write, samples, encoding):
+    path = write(samples, HEADER)
+    path.write_bytes(path.read_text().encode(encoding))
+    message = problem(path)
+    assert "is UTF-16 text: save it as UTF-8" in message or "is not a text file" in message
+
+
+def test_latin_1_header(write, samples):
+    path = write(samples, HEADER)
+    path.write_bytes(path.read_text().replace("gyro_x", "gyro_x [°/s]").encode("latin-1"))
+    message = problem(path)
+    assert "static.csv, line 1: byte 0xb0 is not UTF-8 text: save the file as UTF-8" in message
+
+
+def test_endless_line(tmp_path, monkeypatch):
+    from gmwm.read import text_file
+
+    monkeypatch.setattr(text_file, "_LONGEST_LINE", 1 << 18)
+    path = tmp_path / "a.csv"
+    path.write_text("1," * (1 << 18))
+    assert "a.csv, line 1: longer than" in problem(path)
