@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from joblib import Parallel, delayed
 
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.gmwm import fit
 from gmwm.files import written
 from gmwm.process import Model, Process
 from gmwm.recording import Channel, Recording
@@ -166,7 +167,7 @@ def load(path: str | os.PathLike[str]) -> Calibration:
 
 def calibrate(
     recording: Recording,
-    model: Process | Model | None = None,
+    model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     jobs: int | None = None,
     progress: Progress | None = None,
@@ -176,8 +177,9 @@ def calibrate(
     Parameters
     ----------
     recording : Recording
-    model : Process or Model, optional
-        Fitted to every channel; by default the model is selected for each channel.
+    model : Process, Model or mapping, optional
+        Fitted to every channel, or by channel name; by default the model of each channel is
+        selected.
     jobs : int, optional
         Threads; by default one per core.
     progress : callable, optional
@@ -190,7 +192,7 @@ def calibrate(
     Raises
     ------
     InputError
-        If no channel can be calibrated.
+        If no channel can be calibrated, or a mapping has no model for one.
     """
     dead = {c.name: f"constant at {c.values[0]:.6g} {c.unit}" for c in recording if c.is_constant}
     alive = [c for c in recording if c.name not in dead]
@@ -203,7 +205,7 @@ def calibrate(
         raise InputError(f"{recording.n} samples are too few: record at least {MIN_SAMPLES}")
 
     def one(channel: Channel) -> Fit:
-        fitted = _channel_fit(channel, model)
+        fitted = _channel_fit(channel, _model_of(channel, model))
         if progress is not None:
             progress(channel.name)
         return fitted
@@ -211,7 +213,7 @@ def calibrate(
     workers = Parallel(n_jobs=jobs or -1, prefer="threads")
     fits = workers(delayed(one)(channel) for channel in alive)
     return Calibration(
-        fits={channel.name: fit for channel, fit in zip(alive, fits, strict=True)},
+        fits={channel.name: found for channel, found in zip(alive, fits, strict=True)},
         skipped=dead,
         source=recording.source,
         rate=recording.rate,
@@ -220,10 +222,16 @@ def calibrate(
     )
 
 
+def _model_of(
+    channel: Channel, model: Process | Model | Mapping[str, Process | Model] | None
+) -> Process | Model | None:
+    if not isinstance(model, Mapping):
+        return model
+    if channel.name not in model:
+        raise InputError(f"no model is given for channel {channel.name!r}: add one to the mapping")
+    return model[channel.name]
+
+
 def _channel_fit(channel: Channel, model: Process | Model | None) -> Fit:
     wv = wavelet_variance(channel)
-    if model is None:
-        return select(wv).fit
-    from gmwm.estimate.gmwm import fit
-
-    return fit(model, wv)
+    return select(wv).fit if model is None else fit(model, wv)

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -70,7 +70,7 @@ def calibrate(
     folder = output_folder(output)
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
     recording = read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
-    with _progress(recording) as progress:
+    with _progress(recording, "calibrating") as progress:
         result = run(recording, jobs=jobs, progress=progress)
     _show(result)
     _write(result, folder)
@@ -94,13 +94,24 @@ def demo(output: Path, hours: float, seed: int) -> None:
     from gmwm.calibration import calibrate as run
     from gmwm.demo import simulated_imu
     from gmwm.files import output_folder
+    from gmwm.report.page import duration_text
+    from gmwm.selection import describe
 
     folder = output_folder(output)
     recording, truth = simulated_imu(3600.0 * hours, seed)
-    with _progress(recording) as progress:
-        result = run(recording, progress=progress)
-    _show(result, truth)
-    _write(result, folder)
+    forms = {name: model.opened() for name, model in truth.items()}
+    with _progress(recording, "fitting") as progress:
+        fitted = run(recording, forms, progress=progress)
+    with _progress(recording, "selecting") as progress:
+        selected = run(recording, progress=progress)
+    click.echo(f"{recording.source}: {duration_text(recording.duration)} at {recording.rate:g} Hz")
+    click.echo("\nTruth and estimate, the form of each model known:\n")
+    _show_truth(fitted, truth)
+    click.echo("\nSelected where the form is not known, as gmwm calibrate does:\n")
+    for name, fit in selected.fits.items():
+        click.echo(f"  {name:8}  {describe(fit.model)}")
+    click.echo()
+    _write(selected, folder)
 
 
 def main() -> None:
@@ -147,13 +158,13 @@ def _time(text: str | None) -> str | int | bool | None:
 
 
 @contextmanager
-def _progress(recording: Recording) -> Iterator[Progress]:
+def _progress(recording: Recording, what: str) -> Iterator[Progress]:
     """A bar over the channels, on a terminal only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     bar = Progress(
-        TextColumn("calibrating"),
+        TextColumn(what),
         BarColumn(),
         TextColumn("{task.completed}/{task.total} channels {task.description}"),
         TimeElapsedColumn(),
@@ -169,7 +180,7 @@ def _progress(recording: Recording) -> Iterator[Progress]:
         yield done
 
 
-def _show(result: Calibration, truth: dict[str, Model] | None = None) -> None:
+def _show(result: Calibration) -> None:
     from gmwm.report.page import duration_text
 
     console = _console()
@@ -178,7 +189,7 @@ def _show(result: Calibration, truth: dict[str, Model] | None = None) -> None:
         f"{result.n:,} samples a channel",
         highlight=False,
     )
-    console.print(_table(result, truth))
+    console.print(_table(result))
     for note in result.notes:
         console.print(f"- {note}", highlight=False)
     for name, why in result.skipped.items():
@@ -195,46 +206,64 @@ def _console() -> Console:
     return Console(width=None if sys.stdout.isatty() else 80)
 
 
-def _table(result: Calibration, truth: dict[str, Model] | None) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    from gmwm.demo import matched_truth
-    from gmwm.units import field_units
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("channel", no_wrap=True)
-    table.add_column("param.", no_wrap=True)
-    if truth:
-        table.add_column("truth", justify="right", no_wrap=True)
-    table.add_column("estimate", justify="right", no_wrap=True)
-    table.add_column("95 % interval", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    table.add_column("", no_wrap=True)
+def _table(result: Calibration) -> Table:
+    table = _new_table("channel", "parameter", ">estimate", "95 % interval", "unit", "")
     for name, fit in result.fits.items():
-        known, unresolved = matched_truth(fit.model, truth[name]) if truth else ({}, [])
         rows = fit.rows()
         for i, row in enumerate(rows):
+            si = (row["value"], row["lower"], row["upper"], row["unit"])
+            value, low, high, unit = row["field"][0] if row["field"] else si
             cells = [name if i == 0 else "", row["key"]]
-            value, low, high, unit = row["field"][0] if row["field"] else (
-                row["value"], row["lower"], row["upper"], row["unit"])  # fmt: skip
-            scale = value / row["value"] if row["value"] else 1.0
-            if truth:
-                true = known.get(row["key"])
-                cells.append("-" if true is None else f"{true * scale:.4g}")
             if row["kind"] == "bound":
                 cells += ["0", f"below {high:.3g}", unit]
             elif row["kind"] == "estimated":
-                cells += [f"{value:.4g}", f"{low:.3g} .. {high:.3g}", unit]
+                cells += [f"{value:.4g}", f"{low:.4g} .. {high:.4g}", unit]
             else:
                 cells += [f"{value:.4g}", row["kind"], unit]
-            mark = "" if fit.valid else "not valid"
-            table.add_row(*cells, mark if i == 0 else "", end_section=i == len(rows) - 1)
-        for item in unresolved:
-            unit = field_units(item.parameter.unit, fit.wv.quantity)
-            value = item.value * (unit[0].per_si if unit else 1.0)
-            si = item.parameter.unit
-            table.add_row("", item.key, f"{value:.4g}", "-", "not resolved", unit[0].unit if unit else si)
+            mark = "" if fit.valid or i else "not valid"
+            table.add_row(*cells, mark, end_section=i == len(rows) - 1)
+    return table
+
+
+def _show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
+    """One table of truth beside estimate."""
+    from gmwm.demo import compare
+
+    table = _new_table("channel", "param.", ">truth", ">estimate", "95 % interval", "unit", "")
+    determined = covered = total = 0
+    for name, fit in fitted.fits.items():
+        rows = compare(fit, truth[name])
+        for i, row in enumerate(rows):
+            total += 1
+            determined += row.determined
+            covered += row.determined and row.covered
+            cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
+            if not row.determined:
+                cells = ["-", "too short to tell"]
+            elif row.estimate == 0.0:
+                cells = ["0", f"below {row.upper:.4g}"]
+            mark = "" if row.covered else "outside"
+            first = name if i == 0 else ""
+            table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit, mark,
+                          end_section=i == len(rows) - 1)  # fmt: skip
+    console = _console()
+    console.print(table)
+    console.print(
+        f"{determined} of {total} parameters are determined by this record; {covered} of these "
+        f"{determined} intervals hold the truth.",
+        highlight=False,
+    )
+
+
+def _new_table(*columns: str) -> Table:
+    """A plain table; ``>`` before a title puts the column to the right."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for title in columns:
+        justify: Literal["left", "right"] = "right" if title.startswith(">") else "left"
+        table.add_column(title.removeprefix(">"), justify=justify, no_wrap=True)
     return table
 
 

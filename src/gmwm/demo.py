@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from gmwm.estimate.fit import Fit
 from gmwm.process import GaussMarkov, Model, WhiteNoise
-from gmwm.process.model import ModelParameter
 from gmwm.recording import Channel, Recording
-from gmwm.units import SI_UNIT, factor
+from gmwm.units import SI_UNIT, factor, field_units
 
 RATE = 100.0
 """Hz."""
@@ -66,34 +68,45 @@ def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model
     return Recording(tuple(channels), source), truth
 
 
-def matched_truth(fitted: Model, truth: Model) -> tuple[dict[str, float], list[ModelParameter]]:
-    """True values beside fitted parameters.
+@dataclass(frozen=True)
+class Comparison:
+    """A true value beside its estimate, in the units of the field.
 
-    Gauss-Markov terms are matched one to one by nearest correlation time, other terms by kind.
-
-    Returns
-    -------
-    dict
-        Key of the fitted model -> true value.
-    list of ModelParameter
-        The parameters of true terms that no fitted term stands for.
+    Attributes
+    ----------
+    channel, what, unit : str
+    truth, estimate, lower, upper : float
+        With the 95 % interval.
     """
-    known: dict[str, float] = {}
-    distance = []
-    for i, term in enumerate(fitted.terms):
-        for j, true in enumerate(truth.terms):
-            if isinstance(term, GaussMarkov) and isinstance(true, GaussMarkov):
-                gap = abs(np.log(float(term.tau or 1.0) / float(true.tau or 1.0)))
-                distance.append((float(gap), i, j))
-            elif type(term) is type(true):
-                distance.append((0.0, i, j))
-    pairs: dict[int, int] = {}
-    for _, i, j in sorted(distance):
-        if i not in pairs and j not in pairs.values():
-            pairs[i] = j
-    for item in fitted.parameters:
-        if item.term in pairs:
-            value = truth.terms[pairs[item.term]].values[item.parameter.name]
-            known[item.key] = float(value or 0.0)
-    unresolved = [item for item in truth.parameters if item.term not in pairs.values()]
-    return known, unresolved
+
+    channel: str
+    what: str
+    truth: float
+    estimate: float
+    lower: float
+    upper: float
+    unit: str
+
+    @property
+    def determined(self) -> bool:
+        """Whether the record says anything about it."""
+        return bool(np.isfinite(self.upper))
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval holds the truth."""
+        return self.lower <= self.truth <= self.upper
+
+
+def compare(fitted: Fit, truth: Model) -> list[Comparison]:
+    """True parameters beside those estimated for a model of the same form."""
+    intervals = fitted.interval()
+    rows = []
+    for item in truth.parameters:
+        key, value = item.key, item.value or 0.0
+        units = field_units(item.parameter.unit, fitted.wv.quantity)
+        unit, scale = (units[0].unit, units[0].per_si) if units else (item.parameter.unit, 1.0)
+        low, high = intervals.get(key, (0.0, np.inf))
+        numbers = [v * scale for v in (value, fitted.params[key], low, high)]
+        rows.append(Comparison(fitted.wv.name, key, *numbers, unit))
+    return rows

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_UNDETERMINED = 3.0  # relative standard error at which an interval says nothing
+_UNDETERMINED = 1.0  # relative standard error at which an interval says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +139,41 @@ class Fit:
         """Wavelet variance of each term, u^2, (J,)."""
         curves = self.model.component_variances(self.wv.tau, self.wv.dt)
         return dict(zip(self.model.term_labels(), curves, strict=True))
+
+    def deviation_interval(
+        self, tau: FloatArray, level: float = 0.95
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Allan deviation of the fitted model with its interval, at any averaging times.
+
+        Parameters
+        ----------
+        tau : array_like
+            Averaging times, s.
+        level : float, optional
+
+        Returns
+        -------
+        value, lower, upper : ndarray
+            In u, same shape as ``tau``; by linear propagation of the parameters' covariance to
+            the logarithm of the deviation.
+        """
+        tau = np.asarray(tau, dtype=float)
+        curve = self.model.haar_variance(tau, self.wv.dt)
+        errors = np.sqrt(np.diag(self.covariance))
+        gradient = np.empty((len(self.keys), tau.size))
+        for i, key in enumerate(self.keys):
+            step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
+            pair = [
+                self.model.with_params({key: self.params[key] + sign * step}).haar_variance(
+                    tau, self.wv.dt
+                )
+                for sign in (1.0, -1.0)
+            ]
+            gradient[i] = ((pair[0] - pair[1]) / (2.0 * step) / (2.0 * curve)).ravel()
+        spread = np.sqrt(np.einsum("ij,ik,kj->j", gradient, self.covariance, gradient))
+        value = np.sqrt(2.0 * curve)
+        ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
+        return value, value / ratio, value * ratio
 
     # -- looks ------------------------------------------------------------------------------------
 
