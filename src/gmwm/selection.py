@@ -35,6 +35,7 @@ MAX_GAUSS_MARKOV = 5
 
 _USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the search for more
 _RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
+_RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 
 
@@ -176,7 +177,8 @@ def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     slope = gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
     without = slope.value**2 / slope.variance
     ranking = [_plus(candidate, without, 0.0) for candidate, _ in plain]
-    ranking += _with_ramp(wv, slope, max_gauss_markov)
+    if without > _RAMP_PLAUSIBLE:
+        ranking += _with_ramp(wv, slope, max_gauss_markov)
     return sorted(ranking, key=_rank_key)
 
 

@@ -66,6 +66,8 @@ class Term:
 
     def curve(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         """Wavelet variance of `with_shape`, (J,)."""
+        if self.free_scale:
+            return self.process.unit_haar_variance(shape, tau, dt)
         return np.asarray(self.with_shape(shape).haar_variance(tau, dt), dtype=float)
 
     def grid(self, dt: float, n: int) -> list[Shape]:

@@ -181,6 +181,16 @@ class Process(ABC):
         """
         return spectral.haar_variance(self.psd, np.asarray(tau, dtype=float), dt)
 
+    def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
+        values: dict[str, float | None] = {
+            parameter.name: value
+            for parameter, value in zip(self.shape_parameters, shape, strict=True)
+        }
+        if self.linear_parameter is not None:
+            values[self.linear_parameter.name] = 1.0
+        return np.asarray(self.with_values(**values).haar_variance(tau, dt), dtype=float)
+
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).
 

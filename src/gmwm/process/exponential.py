@@ -26,6 +26,7 @@ _SERIES_BELOW = 0.5
 _SINH_TERMS = [1.0 / factorial(2 * k + 1) for k in range(1, 9)]
 _H_TERMS = [-((-1) ** k) * (2.0**k - 4.0) / factorial(k) for k in range(3, 22)]
 _H_ARRAY = np.array(_H_TERMS)
+_SINH_ARRAY = np.array(_SINH_TERMS)
 _WHITE_ABOVE = 40.0  # exp(-a) is below rounding: white noise
 
 
@@ -66,17 +67,25 @@ def exponential_haar(rate: complex, m: FloatArray) -> Any:
     m = np.asarray(m, dtype=float)
     if np.real(rate) > _WHITE_ABOVE:
         return 0.5 / m + 0.0 * rate
-    if not np.iscomplexobj(rate):
-        flat = np.ascontiguousarray(m).ravel()
-        return _real_haar(float(rate), float(_sinh_minus_identity(rate)), flat).reshape(m.shape)
     denominator = 8.0 * m**2 * np.sinh(0.5 * rate) ** 2
     return (2.0 * m * _sinh_minus_identity(rate) + _h(m * rate)) / denominator
 
 
 @numba.njit(cache=True, nogil=True)
-def _real_haar(rate: float, excess: float, m: FloatArray) -> FloatArray:
-    """`exponential_haar` for a real rate, with sinh(rate) - rate given: the fit's inner loop."""
+def real_haar(rate: float, m: FloatArray) -> FloatArray:
+    """`exponential_haar` for a real rate and m of shape (J,): the inner loop of every fit."""
     result = np.empty(m.size)
+    if rate > _WHITE_ABOVE:
+        for i in range(m.size):
+            result[i] = 0.5 / m[i]
+        return result
+    if rate < _SERIES_BELOW:
+        excess = 0.0
+        for k in range(_SINH_ARRAY.size - 1, -1, -1):
+            excess = excess * rate * rate + _SINH_ARRAY[k]
+        excess *= rate * rate * rate
+    else:
+        excess = math.sinh(rate) - rate
     scale = 8.0 * math.sinh(0.5 * rate) ** 2
     for i in range(m.size):
         x = m[i] * rate

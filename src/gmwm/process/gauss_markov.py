@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.process import synthesis
 from gmwm.process.base import Process, Shape
-from gmwm.process.exponential import exponential_haar, exponential_psd
+from gmwm.process.exponential import exponential_haar, exponential_psd, real_haar
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
@@ -42,8 +43,12 @@ class GaussMarkov(Process):
         return self.sigma**2 * exponential_psd(dt / self.tau, f, dt)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        m = np.asarray(tau, dtype=float) / dt
-        return self.sigma**2 * exponential_haar(dt / self.tau, m)
+        tau = np.asarray(tau, dtype=float)
+        return self.sigma**2 * self.unit_haar_variance((self.tau,), tau, dt)
+
+    def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        flat = real_haar(dt / shape[0], np.ascontiguousarray(tau).ravel() / dt)
+        return flat.reshape(tau.shape)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
@@ -59,6 +64,12 @@ class GaussMarkov(Process):
         driving = self.sigma * np.sqrt(-np.expm1(-2.0 * dt / self.tau))
         synthesis.first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
         return series
+
+    def shape_to_free(self, shape: Shape) -> FloatArray:
+        return np.array([math.log(shape[0])])
+
+    def shape_from_free(self, free: FloatArray) -> Shape:
+        return (math.exp(free[0]),)
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         # Below a third of dt it is white noise; beyond a third of the record a random walk.

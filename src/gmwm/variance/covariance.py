@@ -143,21 +143,40 @@ def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     return result
 
 
-def _integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
-    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
-    grid = quadrature(tuple(m.tolist()))
-    power = grid.weight * grid.sampled(psd, dt) ** 2
-    integral = (grid.gain * power) @ grid.gain.T
-    # Where lobes were replaced by their mean, the mean of a product of two gains is not the
-    # product of the means if the averaging times are equal or differ by a factor of two.
-    tail = power / np.sin(np.pi * grid.frequency) ** 4
+@lru_cache(maxsize=4)
+def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows, columns and weights of what replaced lobes take from products of gains.
+
+    Where lobes were replaced by their mean, the mean of a product of two gains is not the
+    product of the means if the averaging times are equal or differ by a factor of two.
+    """
+    grid = quadrature(averaging)
+    m = np.array(averaging)
+    rows, columns, weights = [], [], []
     for step, excess in _MEAN_PRODUCT_EXCESS.items():
         for j in range(m.size - step):
-            k = j + step
-            averaged = 1.0 - grid.resolved[j] * grid.resolved[k]
-            correction = excess * (averaged @ tail) / (m[j] * m[k]) ** 2
-            integral[j, k] += correction
-            integral[k, j] = integral[j, k]
+            averaged = 1.0 - grid.resolved[j] * grid.resolved[j + step]
+            if np.any(averaged > 0.0):
+                rows.append(j)
+                columns.append(j + step)
+                scale = excess / (m[j] * m[j + step]) ** 2
+                weights.append(scale * averaged / np.sin(np.pi * grid.frequency) ** 4)
+    return np.array(rows, dtype=int), np.array(columns, dtype=int), np.array(weights)
+
+
+def _integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
+    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
+    averaging = tuple(m.tolist())
+    grid = quadrature(averaging)
+    density = grid.sampled(psd, dt)
+    scaled = grid.gain * (np.sqrt(grid.weight) * density)
+    integral = scaled @ scaled.T
+    rows, columns, weights = _excess(averaging)
+    if rows.size:
+        correction = weights @ (grid.weight * density**2)
+        integral[rows, columns] += correction
+        apart = rows != columns
+        integral[columns[apart], rows[apart]] += correction[apart]
     return np.asarray(4.0 * integral)
 
 
