@@ -180,6 +180,8 @@ def naive(data: bytes, delimiter: str | None) -> np.ndarray | None:
     for line in re.split("\r\n|\r|\n", text):
         if not line.strip(" \t") or (not rows and line.lstrip(" ")[0] in "#%"):
             continue
+        if delimiter:  # between quotes it parts nothing
+            line = re.sub('"[^"]*"', lambda quoted: quoted[0].replace(delimiter, "?"), line)
         # Not split(None), to which more than blanks and tabs is blank.
         fields = line.split(delimiter) if delimiter else re.split("[ \t]+", line.strip(" \t"))
         cells = [cell.strip(' \t"') for cell in fields]

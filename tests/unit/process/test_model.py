@@ -1,0 +1,108 @@
+"""Sums, parameters, identifiability and what is said when they are wrong."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import (
+    AR,
+    ARIMA,
+    ARMA,
+    GaussMarkov,
+    RandomWalk,
+    Resonance,
+    Sinusoid,
+    WhiteNoise,
+)
+from gmwm.process import model_from_list
+
+
+def test_repr_is_readable_and_evaluates_back():
+    model = WhiteNoise(N=0.2) + 2 * GaussMarkov() + RandomWalk(1e-3)
+    assert repr(model) == "WhiteNoise(N=0.2) + 2 * GaussMarkov() + RandomWalk(K=0.001)"
+    assert eval(repr(model), vars(gmwm) | {k: getattr(gmwm, k) for k in gmwm.__all__}) == model
+
+
+@pytest.mark.parametrize(
+    "process",
+    [AR([0.5, 0.1], 2.0), ARMA(2, 1), ARIMA([0.5], 1, [0.2], 1.0), Resonance(1.0, 2.0, 0.1)],
+    ids=repr,
+)
+def test_processes_survive_pickle_repr_and_json(process):
+    scope = {k: getattr(gmwm, k) for k in gmwm.__all__}
+    assert pickle.loads(pickle.dumps(process)) == process
+    assert eval(repr(process), scope) == process
+    assert model_from_list([process.to_dict()]).terms == (process,)
+
+
+def test_parameters_are_numbered_only_where_they_have_to_be():
+    one = WhiteNoise() + GaussMarkov() + Resonance()
+    assert list(one.params) == [
+        "N", "sigma", "tau", "resonance_sigma", "resonance_frequency", "resonance_damping",
+    ]  # fmt: skip
+    two = WhiteNoise() + 2 * GaussMarkov()
+    assert list(two.params) == ["N", "sigma_1", "tau_1", "sigma_2", "tau_2"]
+
+
+def test_gauss_markov_terms_stand_by_rising_time():
+    model = GaussMarkov(1.0, 50.0) + WhiteNoise(0.1) + GaussMarkov(2.0, 5.0)
+    assert model.params == {"sigma_1": 2.0, "tau_1": 5.0, "N": 0.1, "sigma_2": 1.0, "tau_2": 50.0}
+
+
+def test_moments_of_a_sum_are_sums_of_moments():
+    parts = (WhiteNoise(0.3), GaussMarkov(1.0, 7.0), RandomWalk(0.01))
+    model = parts[0] + parts[1] + parts[2]
+    tau, f = np.array([1.0, 8.0, 64.0]), np.array([0.01, 0.2])
+    np.testing.assert_allclose(
+        model.haar_variance(tau, 1.0), sum(p.haar_variance(tau, 1.0) for p in parts)
+    )
+    np.testing.assert_allclose(model.psd(f, 1.0), sum(p.psd(f, 1.0) for p in parts))
+    assert model.state_space(1.0).n_states == 2
+    assert model.state_space(1.0).measurement_noise == pytest.approx(0.09)
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: WhiteNoise(1) + WhiteNoise(2), "two WhiteNoise .* keep one"),
+        (lambda: 2 * RandomWalk(), "two RandomWalk"),
+        (lambda: 2 * GaussMarkov(1.0, 2.0), "two GaussMarkov of equal tau = 2"),
+        (lambda: Sinusoid(1.0, 3.0) + Sinusoid(2.0, 3.0), "equal frequency = 3"),
+        (lambda: GaussMarkov(sigma=-1.0), r"sigma = -1 is out of range"),
+        (lambda: GaussMarkov(tau=0.0), "tau = 0 is out of range"),
+        (lambda: WhiteNoise(float("nan")), "N = nan is out of range"),
+        (lambda: WhiteNoise("a"), "give a number"),
+        (lambda: Resonance(1.0, 1.0, 1.5), r"damping = 1.5 is out of range"),
+        (lambda: AR([1.1]), "not stationary"),
+        (lambda: ARMA([0.1], [2.0]), "not invertible"),
+        (lambda: ARIMA(0, 3), "d = 3"),
+        (lambda: AR("two"), "give an order"),
+        (lambda: 0 * WhiteNoise(), "must be 1 or more"),
+        (lambda: WhiteNoise().simulate(10, 1.0), "open parameters"),
+        (lambda: WhiteNoise(1.0).simulate(0, 1.0), "positive whole number"),
+        (lambda: WhiteNoise(1.0).simulate(5, -1.0), "positive sampling interval"),
+        (lambda: (WhiteNoise() + RandomWalk()).psd(np.ones(1), 1.0), "open parameters .N, K."),
+        (lambda: (WhiteNoise() + RandomWalk()).with_params({"Z": 1.0}), "no parameter 'Z'"),
+        (lambda: ARIMA([0.1], 2, 0, 1.0).haar_variance(np.ones(1), 1.0), "one integration"),
+        (lambda: gmwm.simulate("noise", 5, 1.0), "no error model"),
+        (lambda: model_from_list([{"process": "Nonsense"}]), "unknown process 'Nonsense'"),
+    ],
+)
+def test_what_is_wrong_is_said(build, words):
+    with pytest.raises(gmwm.InputError, match=words):
+        build()
+
+
+def test_instances_do_not_change():
+    with pytest.raises(AttributeError, match="does not change"):
+        WhiteNoise(1.0).N = 2.0
+    with pytest.raises(AttributeError, match="does not change"):
+        (WhiteNoise(1.0) + RandomWalk(1.0)).terms = ()
+
+
+def test_partial_autocorrelations_are_a_bijection():
+    process = ARMA(3, 2)
+    z = np.array([0.3, -1.2, 0.7, 2.0, -0.4])
+    np.testing.assert_allclose(process.shape_to_free(process.shape_from_free(z)), z, rtol=1e-9)
