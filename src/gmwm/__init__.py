@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         WhiteNoise,
     )
     from gmwm.process.model import simulate
-    from gmwm.read import read
+    from gmwm.readers import read
     from gmwm.recording import Channel, Recording
     from gmwm.selection import Selection, select
     from gmwm.variance.covariance import haar_covariance
@@ -72,7 +72,7 @@ _HOME = {
         "process",
     ),
     "simulate": "process.model",
-    "read": "read",
+    "read": "readers",
     **dict.fromkeys(("Channel", "Recording"), "recording"),
     **dict.fromkeys(("Selection", "select"), "selection"),
     "haar_covariance": "variance.covariance",

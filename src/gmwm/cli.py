@@ -65,7 +65,7 @@ def calibrate(
     """
     from gmwm.calibration import calibrate as run
     from gmwm.files import output_folder
-    from gmwm.read import read
+    from gmwm.readers import read
 
     folder = output_folder(output)
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}

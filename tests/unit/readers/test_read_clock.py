@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.read import read
+from gmwm.readers import read
 
 UNITS = {"gyro": "rad/s"}
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from statistics import mode
 
 from gmwm.errors import InputError
-from gmwm.read.cells import BLANKS, is_missing, number, split_header, split_line
-from gmwm.read.names import meaning
-from gmwm.read.table import FORMATS
+from gmwm.readers.cells import BLANKS, is_missing, number, split_header, split_line
+from gmwm.readers.names import meaning
+from gmwm.readers.table import FORMATS
 
 _COMMENT_MARKS = ("#", "%")
 _SAMPLE = 100  # lines looked at

@@ -13,8 +13,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gmwm.errors import InputError
-from gmwm.read import csv_table, read
-from gmwm.read.names import CANONICAL
+from gmwm.readers import csv_table, read
+from gmwm.readers.names import CANONICAL
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gmwm.read import csv_table, read
-from gmwm.read.names import CANONICAL
+from gmwm.readers import csv_table, read
+from gmwm.readers.names import CANONICAL
 from gmwm.units import factor
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}

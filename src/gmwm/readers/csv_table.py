@@ -17,10 +17,10 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.read.cells import BLANKS, number, split_line
-from gmwm.read.layout import Layout, find_layout
-from gmwm.read.table import label, usable
-from gmwm.read.text_file import blocks
+from gmwm.readers.cells import BLANKS, number, split_line
+from gmwm.readers.layout import Layout, find_layout
+from gmwm.readers.table import label, usable
+from gmwm.readers.text_file import blocks
 
 _HEAD = 1 << 18
 

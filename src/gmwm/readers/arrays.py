@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.read.names import AXES, CANONICAL, meaning
-from gmwm.read.table import FEWEST, LARGEST, label, usable
+from gmwm.readers.names import AXES, CANONICAL, meaning
+from gmwm.readers.table import FEWEST, LARGEST, label, usable
 
 _AnyArray = npt.NDArray[Any]
 _Column = tuple[str, _AnyArray]

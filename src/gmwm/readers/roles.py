@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gmwm.errors import InputError
-from gmwm.read.names import AXES, CANONICAL, TIME, bare, meaning
-from gmwm.read.table import label
+from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
+from gmwm.readers.table import label
 from gmwm.units import SI_UNIT
 
 Reference = str | int

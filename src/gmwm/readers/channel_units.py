@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gmwm.errors import InputError
-from gmwm.read.names import meaning
-from gmwm.read.roles import Roles
-from gmwm.read.table import Table
+from gmwm.readers.names import meaning
+from gmwm.readers.roles import Roles
+from gmwm.readers.table import Table
 from gmwm.units import SI_UNIT, factor, quantity_of
 
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}

@@ -6,7 +6,7 @@ import csv
 import math
 import re
 
-from gmwm.read.table import LARGEST
+from gmwm.readers.table import LARGEST
 
 BLANKS = " "
 """The delimiter that stands for runs of spaces and tabs."""

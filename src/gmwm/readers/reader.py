@@ -10,13 +10,13 @@ from typing import Literal
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.read.arrays import ArrayTable
-from gmwm.read.channel_units import channel_units
-from gmwm.read.clock import Clock, agree
-from gmwm.read.csv_table import CsvTable
-from gmwm.read.names import meaning
-from gmwm.read.roles import Columns, Reference, assign_roles
-from gmwm.read.table import FEWEST, Table, label
+from gmwm.readers.arrays import ArrayTable
+from gmwm.readers.channel_units import channel_units
+from gmwm.readers.clock import Clock, agree
+from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.names import meaning
+from gmwm.readers.roles import Columns, Reference, assign_roles
+from gmwm.readers.table import FEWEST, Table, label
 from gmwm.recording import Recording
 
 

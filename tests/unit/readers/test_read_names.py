@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gmwm.read.names import meaning
+from gmwm.readers.names import meaning
 
 GYRO = """gyro_{} g{} w{} omega_{} angular_velocity.{} angular_velocity_{} gyr_{} rate_{} ang_vel_{}
     imu.angular_velocity.{} /imu/data/angular_velocity/{} gyro{} {}gyro {}_gyro_out RAW_IMU.{}gyro

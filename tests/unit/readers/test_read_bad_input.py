@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.read import read
-from gmwm.read.names import CANONICAL
+from gmwm.readers import read
+from gmwm.readers.names import CANONICAL
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 HEADER = ",".join(CANONICAL)
@@ -150,7 +150,7 @@ def test_empty_cell(damaged, cell):
 
 
 def test_gaps_are_counted_over_all_blocks(damaged, monkeypatch):
-    from gmwm.read import csv_table
+    from gmwm.readers import csv_table
 
     monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500))
     path = damaged(12, "1,,3,4,nan,6")
@@ -370,7 +370,7 @@ def test_latin_1_header(write, samples):
 
 
 def test_endless_line(tmp_path, monkeypatch):
-    from gmwm.read import text_file
+    from gmwm.readers import text_file
 
     monkeypatch.setattr(text_file, "_LONGEST_LINE", 1 << 18)
     path = tmp_path / "a.csv"

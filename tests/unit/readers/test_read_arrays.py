@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.read import read
-from gmwm.read.names import CANONICAL
+from gmwm.readers import read
+from gmwm.readers.names import CANONICAL
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 TIME = 0.01 * np.arange(80)

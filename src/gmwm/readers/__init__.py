@@ -5,6 +5,6 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 `gmwm.errors.InputError` with one sentence: what is wrong, where, and how to mend it.
 """
 
-from gmwm.read.reader import read
+from gmwm.readers.reader import read
 
 __all__ = ["read"]
