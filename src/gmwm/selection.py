@@ -34,8 +34,10 @@ from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
 MAX_GAUSS_MARKOV = 5
 
 _USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the search for more
+_STRICTNESS = 1.5  # c of Hannan & Quinn; consistent above 1
 _RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
 _RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
+_TIE = 3.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 
 
@@ -48,7 +50,7 @@ class Candidate:
     model : Model
         With open parameters.
     criterion : float
-        Objective plus ``2 p ln ln n``; less is better.
+        Objective plus ``3 p ln ln n``; less is better.
     objective : float
         Weighted sum of squares under weights common to all candidates.
     n_parameters : int
@@ -139,12 +141,13 @@ def select(
     -----
     All candidates are compared under the same weights, those of a rich mixture fitted to the
     wavelet variances, with the discrepancy that this mixture shows. The criterion is the objective
-    with the penalty of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment
-    selection (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so
-    a model without one pays the squared slope over its variance; it must win by a margin of 6, for
-    a straight line passes through any slow drift that is seen only once. Terms that come out as zero make
-    a model equal to a smaller one, and it is left out of the ranking. Of the best candidates the
-    first one is chosen whose own fit finds all of its terms identifiable.
+    with the penalty ``2 c p ln ln n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195),
+    consistent for moment selection (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one
+    moment, its slope, so a model without one pays the squared slope over its variance; it must win
+    by a margin of 6, for a straight line passes through any slow drift that is seen only once.
+    Terms that come out as zero make a model equal to a smaller one, and it is left out of the
+    ranking. Models within 3 of the best are a tie, in which the smaller one wins. Of the best
+    candidates the first one is chosen whose own fit finds all of its terms identifiable.
     """
     wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
     if not 0 <= max_gauss_markov <= MAX_GAUSS_MARKOV:
@@ -153,12 +156,20 @@ def select(
         )
     ranking = _rank(wv, max_gauss_markov)
     fits = []
-    for candidate in ranking[:_FITS]:
+    for candidate in _simplest_of_ties(ranking)[:_FITS]:
         fitted = fit(candidate.model, wv)
         if fitted.valid or not _term_is_idle(fitted):
             return Selection(tuple(ranking), fitted)
         fits.append(fitted)
     return Selection(tuple(ranking), fits[0])
+
+
+def _simplest_of_ties(ranking: list[Candidate]) -> list[Candidate]:
+    """The ranking with the candidates that tie with the best one ordered by size."""
+    limit = _rank_key(ranking[0]) + _TIE
+    tied = [item for item in ranking if _rank_key(item) <= limit]
+    tied.sort(key=lambda item: item.n_parameters)
+    return tied + ranking[len(tied) :]
 
 
 def _term_is_idle(fitted: Fit) -> bool:
@@ -220,8 +231,8 @@ def _with_discrepancy(reference: Reference, target: FloatArray) -> FloatArray:
 
 
 def _penalty(n: int) -> float:
-    """Price of a parameter: 2 ln ln n."""
-    return 2.0 * float(np.log(np.log(n)))
+    """Price of a parameter: 2 c ln ln n."""
+    return 2.0 * _STRICTNESS * float(np.log(np.log(n)))
 
 
 def _candidates(

@@ -27,7 +27,7 @@ from gmwm.estimate.ramp import (
 )
 from gmwm.estimate.start import dictionary_fit, search
 from gmwm.estimate.uncertainty import describe
-from gmwm.process import Model, Process, RateRamp, as_model
+from gmwm.process import Model, Process, RateRamp, Sinusoid, as_model
 from gmwm.recording import Channel
 from gmwm.variance.covariance import haar_covariance, line_covariance
 from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
@@ -169,9 +169,11 @@ def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | Non
     extra = tuple(term.process for term in design.terms)
     reference = dictionary_fit(wv, moments.target, extra)
     level = Discrepancy(discrepancy, wv.tau.size - design.n_free)
-    level.update(
-        reference.residual, reference.covariance, moments.target, reference.curve, reference.dof
-    )
+    if not any(isinstance(process, Sinusoid) for process in extra):
+        # What no sum of processes without lines can follow is discrepancy from the start.
+        level.update(
+            reference.residual, reference.covariance, moments.target, reference.curve, reference.dof
+        )
     weights = level.added_to(reference.covariance, moments.target)
     point = search(Profile(design, moments.target, _root(weights, omega)))
     state = State(moments, weights, point, reference.curve)

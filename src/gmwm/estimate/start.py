@@ -10,7 +10,15 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.estimate.design import Design
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
-from gmwm.process import GaussMarkov, Model, Process, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    Sinusoid,
+    WhiteNoise,
+)
 from gmwm.process.base import Shape
 from gmwm.variance.covariance import haar_covariance
 from gmwm.variance.wavelet import WaveletVariance
@@ -147,7 +155,8 @@ def dictionary_fit(
     ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
     first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
-    kinds = {type(process): process for process in extra}
+    # Lines are left out: a comb of them follows anything, and has no spectrum to weight with.
+    kinds = {type(process): process for process in extra if not isinstance(process, Sinusoid)}
     kinds.pop(GaussMarkov, None)
     processes: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), GaussMarkov())
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))

@@ -7,9 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.process.base import Process
+from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
+
+_GRID_PER_DECADE = 100
 
 
 class Sinusoid(Process):
@@ -67,6 +69,13 @@ class Sinusoid(Process):
     def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         cycles = self.frequency * dt * np.arange(n) + rng.random()
         return self.amplitude * np.cos(2.0 * np.pi * cycles)
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        # The gain's lobes at coarse levels make many local minima: the grid is finer than they are
+        # where the line is seen at all.
+        low, high = np.log10(2.0 / (n * dt)), np.log10(0.5 / dt)
+        points = max(int(np.ceil((high - low) * _GRID_PER_DECADE)), 2)
+        return [(float(frequency),) for frequency in np.logspace(low, high, points)]
 
     @classmethod
     def examples(cls) -> tuple[Process, ...]:

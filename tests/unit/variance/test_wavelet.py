@@ -1,0 +1,118 @@
+"""The wavelet variance of a series against allantools, real recordings, and bad input."""
+
+import json
+from pathlib import Path
+
+import allantools
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+import gmwm
+
+SHARED = Path(__file__).resolve().parents[4] / "shared"
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.integers(8, 3000), st.integers(0, 2**31), st.floats(-1e6, 1e6), st.floats(-2.0, 2.0))
+def test_half_of_allantools_overlapping_allan_variance(n, seed, offset, drift):
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=n) + np.cumsum(rng.normal(size=n)) + offset + drift * np.arange(n)
+    wv = gmwm.wavelet_variance(x, dt=0.5)
+    taus, deviation, _, _ = allantools.oadev(x, rate=2.0, data_type="freq", taus=wv.tau)
+    # allantools drops levels with few coefficients; ours are all there.
+    ours = wv.variance[: taus.size]
+    np.testing.assert_allclose(ours, 0.5 * deviation**2, rtol=1e-9, atol=1e-20 * offset**2)
+    assert wv.tau.size == int(np.log2(n))
+
+
+@pytest.mark.parametrize("n", [8, 9, 15, 16, 17, 1023, 1024, 1025])
+def test_all_levels_with_at_least_one_coefficient(n):
+    x = np.random.default_rng(n).normal(size=n)
+    wv = gmwm.wavelet_variance(x, dt=1.0)
+    for m, variance, mean, count in zip(
+        wv.averaging.astype(int), wv.variance, wv.mean, wv.counts, strict=True
+    ):
+        w = [0.5 * (x[t + m : t + 2 * m].mean() - x[t : t + m].mean()) for t in range(n - 2 * m + 1)]
+        assert len(w) == count >= 1
+        assert variance == pytest.approx(np.mean(np.square(w)), rel=1e-10)
+        assert mean == pytest.approx(np.mean(w), rel=1e-9, abs=1e-12)
+
+
+def test_real_recording_against_an_independent_implementation():
+    source = SHARED / "data" / "adis16405" / "adis16405_1.csv.gz"
+    if not source.exists():
+        pytest.skip("the real recordings are not on this machine")
+    reference = json.loads((SHARED / "reference" / "adis16405_1_wavelet_variance.json").read_text())
+    rec = gmwm.read(source, rate=100, units={"gyro": "deg/s", "accel": "g"})
+    factor = {"deg/s": np.pi / 180.0, "g": 9.80665}
+    for name, expected in reference["channels"].items():
+        wv = gmwm.wavelet_variance(rec[name])
+        found = wv.variance[:18] / factor[expected["unit"]] ** 2
+        np.testing.assert_allclose(found, expected["haar_wavelet_variance"], rtol=1e-9)
+
+
+def test_removing_a_drift_from_the_moments_is_removing_it_from_the_series():
+    rng = np.random.default_rng(3)
+    x, t = np.cumsum(rng.normal(size=700)), 0.1 * np.arange(700)
+    before = gmwm.wavelet_variance(x + 0.7 * t, dt=0.1)
+    np.testing.assert_allclose(
+        before.detrended(0.7), gmwm.wavelet_variance(x, dt=0.1).variance, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    "process", [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(1.0), gmwm.BiasInstability(1.0)], ids=repr
+)
+def test_intervals_cover(process):
+    runs, n = 300, 1000
+    rng = np.random.default_rng(12)
+    truth = process.haar_variance(2.0 ** np.arange(9), 1.0)
+    inside = np.zeros(9)
+    for _ in range(runs):
+        wv = gmwm.wavelet_variance(process.simulate(n, 1.0, rng), dt=1.0)
+        inside += (wv.lower < truth) & (truth < wv.upper)
+    # Up to 64 s the degrees of freedom come out well; the last levels have hardly any.
+    low, high = binom.ppf([1e-4, 1 - 1e-4], runs, 0.95)
+    assert np.all(inside[:6] >= low), inside
+    assert np.all(inside[:6] <= high), inside
+    assert np.all(inside >= 0.80 * runs), inside
+
+
+def test_round_trip_and_text():
+    wv = gmwm.wavelet_variance(np.random.default_rng(0).normal(size=100), dt=0.02)
+    again = gmwm.WaveletVariance.from_dict(json.loads(json.dumps(wv.to_dict())))
+    np.testing.assert_array_equal(again.variance, wv.variance)
+    assert str(again) == str(wv)
+    assert str(wv).splitlines()[0] == "series: 100 samples at 50 Hz"
+
+
+def test_allan_deviation_is_what_it_is_called():
+    wv = gmwm.wavelet_variance(np.random.default_rng(0).normal(size=100), dt=0.02)
+    np.testing.assert_allclose(wv.allan_deviation**2, 2.0 * wv.variance)
+
+
+@pytest.mark.parametrize(
+    ("data", "dt", "words"),
+    [
+        (np.arange(7.0), 1.0, "8 samples or more"),
+        (np.ones(100), 1.0, "constant"),
+        (np.array([1.0] * 50 + [np.nan] * 50), 1.0, "50 NaN .* index 50"),
+        (np.array([1.0] * 50 + [np.inf] * 50), 1.0, "infinite"),
+        (np.zeros((10, 10)), 1.0, "one series"),
+        (["a"] * 100, 1.0, "not a number"),
+        (np.arange(100.0), None, "sampling interval"),
+        (np.arange(100.0), 0.0, "positive sampling interval"),
+        (np.arange(100.0), float("nan"), "positive sampling interval"),
+    ],
+)
+def test_bad_input(data, dt, words):
+    with pytest.raises(gmwm.InputError, match=words):
+        gmwm.wavelet_variance(data, dt)
+
+
+def test_confidence_out_of_range():
+    with pytest.raises(gmwm.InputError, match="between 0 and 1"):
+        gmwm.wavelet_variance(np.arange(100.0), 1.0, confidence=95)
