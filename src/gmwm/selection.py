@@ -13,12 +13,11 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
-from gmwm.estimate.discrepancy import Discrepancy
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
-from gmwm.estimate.start import Reference, dictionary_fit, search
+from gmwm.estimate.start import dictionary_fit, search
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -179,7 +178,7 @@ def _term_is_idle(fitted: Fit) -> bool:
 
 def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     reference = dictionary_fit(wv, wv.variance)
-    weights = _with_discrepancy(reference, wv.variance)
+    weights = reference.weights(wv.variance)
     plain = _candidates(wv, wv.variance, weights, max_gauss_markov)
     if not plain:
         plain = [_fallback(wv, weights)]
@@ -202,7 +201,7 @@ def _with_ramp(wv: WaveletVariance, slope: Slope, max_gauss_markov: int) -> list
     """Candidates with a rate ramp, fitted to what is left when the slope is taken out."""
     target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
     reference = dictionary_fit(wv, target)
-    weights = _with_discrepancy(reference, target)
+    weights = reference.weights(target)
     ramped = _candidates(wv, target, weights, max_gauss_markov)
     penalty = _penalty(wv.n)
     return [
@@ -222,12 +221,6 @@ def _plus(candidate: Candidate, objective: float, penalty: float) -> Candidate:
         candidate.objective + objective,
         candidate.n_parameters + (penalty > 0.0),
     )
-
-
-def _with_discrepancy(reference: Reference, target: FloatArray) -> FloatArray:
-    level = Discrepancy(None, reference.dof)
-    level.update(reference.residual, reference.covariance, target, reference.curve)
-    return level.added_to(reference.covariance, target)
 
 
 def _penalty(n: int) -> float:

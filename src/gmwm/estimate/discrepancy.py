@@ -18,6 +18,7 @@ from gmwm._typing import FloatArray
 from gmwm.estimate.profile import weight_root
 
 _SIGNIFICANT = 0.001
+_NOT_SMALL = 0.02
 _SETTLED = 1e-3  # relative change of delta
 
 
@@ -53,6 +54,14 @@ class Discrepancy:
         self._given = given
         self._estimated = given is None and dof > 0
         self._dof = dof
+
+    def start_at(self, value: float) -> None:
+        """Begin with a value found elsewhere, if it is to be estimated and not small.
+
+        A small one may be that of the mixture's own grid.
+        """
+        if self._estimated and value > _NOT_SMALL:
+            self.value = value
 
     def restart(self) -> None:
         """Forget what was estimated."""

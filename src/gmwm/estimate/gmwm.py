@@ -171,9 +171,7 @@ def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | Non
     level = Discrepancy(discrepancy, wv.tau.size - design.n_free)
     if not any(isinstance(process, Sinusoid) for process in extra):
         # What no sum of processes without lines can follow is discrepancy from the start.
-        level.update(
-            reference.residual, reference.covariance, moments.target, reference.curve, reference.dof
-        )
+        level.start_at(reference.discrepancy)
     weights = level.added_to(reference.covariance, moments.target)
     point = search(Profile(design, moments.target, _root(weights, omega)))
     state = State(moments, weights, point, reference.curve)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.design import Design
+from gmwm.estimate.discrepancy import Discrepancy
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
 from gmwm.process import (
     GaussMarkov,
@@ -24,7 +25,7 @@ from gmwm.variance.covariance import haar_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _EXCHANGES = 2
-_REWEIGHTINGS = 3
+_REWEIGHTINGS = 5
 _IMPROVEMENT = 1e-3  # of the objective, below which an exchange is not worth a refinement
 
 
@@ -133,17 +134,18 @@ class Reference:
         Of the wavelet variances under it, u^4.
     curve : (J,) ndarray
         Its wavelet variances, u^2.
-    residual : (J,) ndarray
-        What it leaves of them, u^2.
-    dof : int
-        Levels less the processes it uses.
+    discrepancy : float
+        Relative error that even this mixture needs, see `gmwm.estimate.discrepancy`.
     """
 
     mixture: Model
     covariance: FloatArray
     curve: FloatArray
-    residual: FloatArray
-    dof: int
+    discrepancy: float
+
+    def weights(self, target: FloatArray) -> FloatArray:
+        """Covariance with the discrepancy, u^4, (J, J)."""
+        return self.covariance + np.diag((self.discrepancy * target) ** 2)
 
 
 def dictionary_fit(
@@ -168,9 +170,12 @@ def dictionary_fit(
             shapes.append(shape)
             columns.append(curve)
     matrix = np.stack(columns, axis=1)
-    covariance = wv.covariance
+    covariance, curve = wv.covariance, target
+    level = Discrepancy(None, 1)
     for _ in range(_REWEIGHTINGS):
-        root = weight_root(covariance)
+        # Without the discrepancy, tiny errors of the fine levels would be fitted at the price of
+        # all others, and what is left would tell nothing.
+        root = weight_root(level.added_to(covariance, target))
         x, _ = solve_nonnegative(root @ matrix, root @ target)
         mixture: list[Process] = []
         for k in np.flatnonzero(x > 0.0):
@@ -179,7 +184,8 @@ def dictionary_fit(
             assert linear is not None
             value = float(x[k]) ** (1.0 / linear.power)
             mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
+        curve = matrix @ x
         covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
-    dof = max(wv.tau.size - len(mixture), 3)
-    curve = matrix @ x
-    return Reference(Model(tuple(mixture)), covariance, curve, target - curve, dof)
+        dof = max(wv.tau.size - len(mixture), 3)
+        level.update(target - curve, covariance, target, curve, dof)
+    return Reference(Model(tuple(mixture)), covariance, curve, level.value)
