@@ -1,4 +1,4 @@
-"""Composite stochastic error models of inertial sensors, by the Generalized Method of Wavelet Moments.
+"""Stochastic error models of inertial sensors, by the Generalized Method of Wavelet Moments.
 
 A static recording goes in (`read`, `Recording`), its wavelet variance says what the noise does at
 each averaging time (`wavelet_variance`), an error model is fitted to it (`fit`) or chosen

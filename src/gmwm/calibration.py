@@ -110,7 +110,7 @@ class Calibration:
         version = content.get("schema_version")
         if version != SCHEMA_VERSION:
             raise InputError(
-                f"schema version {version!r} is not known to this gmwm (it knows {SCHEMA_VERSION}): "
+                f"schema version {version!r} is not known here (known is {SCHEMA_VERSION}): "
                 "calibrate again or update gmwm"
             )
         try:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -24,6 +24,17 @@ if TYPE_CHECKING:
 _EXIT_INPUT = 2
 
 
+def _output_option(default: str) -> Callable[[Any], Any]:
+    return click.option(
+        "-o",
+        "--output",
+        type=click.Path(path_type=Path),
+        default=Path(default),
+        show_default=True,
+        help="Folder for calibration.json, report.html, imu.yaml.",
+    )
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="gmwm")
 def cli() -> None:
@@ -32,8 +43,7 @@ def cli() -> None:
 
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-out"),
-              show_default=True, help="Folder for calibration.json, report.html, imu.yaml.")  # fmt: skip
+@_output_option("gmwm-out")
 @click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column.")
 @click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ...")
 @click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ...")
@@ -53,7 +63,7 @@ def calibrate(
     time_column: str | None,
     jobs: int | None,
 ) -> None:
-    """Calibrate every channel of a static recording.
+    r"""Calibrate every channel of a static recording.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
     For each channel an error model is selected and estimated; the table shows it in the units of
@@ -69,7 +79,9 @@ def calibrate(
 
     folder = output_folder(output)
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    recording = read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
+    recording = read(
+        file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column)
+    )
     with _progress(recording, "calibrating") as progress:
         result = run(recording, jobs=jobs, progress=progress)
     _show(result)
@@ -77,13 +89,12 @@ def calibrate(
 
 
 @cli.command()
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-demo"),
-              show_default=True, help="Folder for calibration.json, report.html, imu.yaml.")  # fmt: skip
+@_output_option("gmwm-demo")
 @click.option("--hours", type=click.FloatRange(0.01, 100.0), default=1.0, show_default=True,
               help="Length of the simulated recording in hours.")  # fmt: skip
 @click.option("--seed", type=int, default=1, show_default=True)
 def demo(output: Path, hours: float, seed: int) -> None:
-    """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
+    r"""Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
 
     The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
 

@@ -33,7 +33,8 @@ def table_six() -> dict[str, Model]:
     )
     accel = WhiteNoise(140.0 * _ACCEL_DENSITY) + Model(
         tuple(
-            GaussMarkov(sigma * _MICRO_G, 1.0 / beta) for sigma, beta in ((5.0, 0.04), (13.0, 0.002))
+            GaussMarkov(sigma * _MICRO_G, 1.0 / beta)
+            for sigma, beta in ((5.0, 0.04), (13.0, 0.002))
         )
     )
     return {"gyro": gyro, "accel": accel}
@@ -107,6 +108,15 @@ def compare(fitted: Fit, truth: Model) -> list[Comparison]:
         units = field_units(item.parameter.unit, fitted.wv.quantity)
         unit, scale = (units[0].unit, units[0].per_si) if units else (item.parameter.unit, 1.0)
         low, high = intervals.get(key, (0.0, np.inf))
-        numbers = [v * scale for v in (value, fitted.params[key], low, high)]
-        rows.append(Comparison(fitted.wv.name, key, *numbers, unit))
+        rows.append(
+            Comparison(
+                channel=fitted.wv.name,
+                what=key,
+                truth=value * scale,
+                estimate=fitted.params[key] * scale,
+                lower=low * scale,
+                upper=high * scale,
+                unit=unit,
+            )
+        )
     return rows

@@ -139,9 +139,7 @@ class Recording:
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        raise InputError(
-            f"the recording has no channel {name!r}: it has {', '.join(self.names)}"
-        )
+        raise InputError(f"the recording has no channel {name!r}: it has {', '.join(self.names)}")
 
     def __iter__(self) -> Iterator[Channel]:
         return iter(self.channels)

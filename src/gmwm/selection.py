@@ -5,7 +5,7 @@ Gauss-Markov processes, ranked by an information criterion on the GMWM objective
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -36,7 +36,7 @@ _USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the sear
 _STRICTNESS = 1.5  # c of Hannan & Quinn; consistent above 1
 _RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
 _RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
-_TIE = 3.0
+_TIE = 2.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 
 
@@ -145,7 +145,7 @@ def select(
     moment, its slope, so a model without one pays the squared slope over its variance; it must win
     by a margin of 6, for a straight line passes through any slow drift that is seen only once.
     Terms that come out as zero make a model equal to a smaller one, and it is left out of the
-    ranking. Models within 3 of the best are a tie, in which the smaller one wins. Of the best
+    ranking. Models within 2 of the best are a tie, in which the smaller one wins. Of the best
     candidates the first one is chosen whose own fit finds all of its terms identifiable.
     """
     wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
@@ -178,49 +178,65 @@ def _term_is_idle(fitted: Fit) -> bool:
 
 def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     reference = dictionary_fit(wv, wv.variance)
-    weights = reference.weights(wv.variance)
-    plain = _candidates(wv, wv.variance, weights, max_gauss_markov)
-    if not plain:
-        plain = [_fallback(wv, weights)]
-    best, point = min(plain, key=lambda item: item[0].criterion)
-    design = Design(best.model, wv.tau, wv.dt, wv.n)
-    slope = gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+    allowed = reference.discrepancy
+    plain = _candidates(wv, wv.variance, reference.weights(wv.variance, allowed), max_gauss_markov)
+    plain.sort(key=lambda item: item[0].criterion)
+    slope = _slope_under(plain[0], wv)
     without = slope.value**2 / slope.variance
-    ranking = [_plus(candidate, without, 0.0) for candidate, _ in plain]
+    ramped: list[Candidate] = []
     if without > _RAMP_PLAUSIBLE:
-        ranking += _with_ramp(wv, slope, max_gauss_markov)
-    return sorted(ranking, key=_rank_key)
+        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        drift_free = dictionary_fit(wv, target)
+        if drift_free.discrepancy < allowed:
+            # Both kinds must be compared under the same allowance.
+            allowed = drift_free.discrepancy
+            weights = reference.weights(wv.variance, allowed)
+            plain = _candidates(wv, wv.variance, weights, max_gauss_markov)
+        found = _candidates(wv, target, drift_free.weights(target, allowed), max_gauss_markov)
+        ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
+    return sorted(_without_ramp(plain, wv, without) + ramped, key=_rank_key)
+
+
+def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
+    """Generalized least-squares slope under the noise of a candidate."""
+    candidate, point = item
+    design = Design(candidate.model, wv.tau, wv.dt, wv.n)
+    return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+
+
+def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
+    return Candidate(
+        candidate.model + RateRamp(),
+        candidate.criterion + penalty,
+        candidate.objective,
+        candidate.n_parameters + 1,
+    )
+
+
+def _without_ramp(
+    plain: list[tuple[Candidate, Point]], wv: WaveletVariance, squared_slope: float
+) -> list[Candidate]:
+    """Candidates that pay the squared slope over its variance: under their own noise, if good."""
+    result = []
+    for rank, item in enumerate(sorted(plain, key=lambda item: item[0].criterion)):
+        price = squared_slope
+        if squared_slope > _RAMP_PLAUSIBLE and rank < _FITS:
+            slope = _slope_under(item, wv)
+            price = slope.value**2 / slope.variance
+        candidate = item[0]
+        result.append(
+            replace(
+                candidate,
+                criterion=candidate.criterion + price,
+                objective=candidate.objective + price,
+            )
+        )
+    return result
 
 
 def _rank_key(candidate: Candidate) -> float:
     ramped = any(isinstance(term, RateRamp) for term in candidate.model.terms)
     return candidate.criterion + (_RAMP_MARGIN if ramped else 0.0)
-
-
-def _with_ramp(wv: WaveletVariance, slope: Slope, max_gauss_markov: int) -> list[Candidate]:
-    """Candidates with a rate ramp, fitted to what is left when the slope is taken out."""
-    target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
-    reference = dictionary_fit(wv, target)
-    weights = reference.weights(target)
-    ramped = _candidates(wv, target, weights, max_gauss_markov)
-    penalty = _penalty(wv.n)
-    return [
-        _plus(Candidate(candidate.model + RateRamp(), *_numbers(candidate)), 0.0, penalty)
-        for candidate, _ in ramped
-    ]
-
-
-def _numbers(candidate: Candidate) -> tuple[float, float, int]:
-    return candidate.criterion, candidate.objective, candidate.n_parameters
-
-
-def _plus(candidate: Candidate, objective: float, penalty: float) -> Candidate:
-    return Candidate(
-        candidate.model,
-        candidate.criterion + objective + penalty,
-        candidate.objective + objective,
-        candidate.n_parameters + (penalty > 0.0),
-    )
 
 
 def _penalty(n: int) -> float:
@@ -260,13 +276,13 @@ def _candidates(
             criterion = point.objective + penalty * design.n_free
             candidate = Candidate(model, criterion, point.objective, design.n_free)
             found.append((candidate, point))
-    return found
+    return found or [_fallback(wv, target, root)]
 
 
-def _fallback(wv: WaveletVariance, weights: FloatArray) -> tuple[Candidate, Point]:
+def _fallback(wv: WaveletVariance, target: FloatArray, root: FloatArray) -> tuple[Candidate, Point]:
     """White noise alone, for records too short for anything else."""
     model = Model((WhiteNoise(),))
     design = Design(model, wv.tau, wv.dt, wv.n)
-    point = search(Profile(design, wv.variance, weight_root(weights)))
+    point = search(Profile(design, target, root))
     criterion = point.objective + _penalty(wv.n)
     return Candidate(model, criterion, point.objective, 1), point

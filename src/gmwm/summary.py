@@ -101,8 +101,8 @@ def sentence(fitted: Fit) -> str:
     if quantity == "gyro":
         angle = np.degrees(density) * np.sqrt(60.0)
         noise = (
-            f"Integrated for a minute, the white noise alone gives an angle error of {angle:.2g} deg "
-            "(1 sigma)"
+            "Integrated for a minute, the white noise alone gives an angle error of "
+            f"{angle:.2g} deg (1 sigma)"
         )
     elif quantity == "accel":
         noise = (

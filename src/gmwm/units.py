@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gmwm.errors import InputError
 
@@ -48,16 +48,16 @@ _DEFINITIONS = (
 
 
 @lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry:
+def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
-    registry: pint.UnitRegistry = pint.UnitRegistry(None)
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None)
     for line in _DEFINITIONS:
         registry.define(line)
     return registry
 
 
-def _quantity(text: str) -> pint.Quantity:
+def _quantity(text: str) -> pint.Quantity[Any]:
     """Parse a unit such as ``deg/h/sqrt(Hz)`` or ``m/s2``."""
     source = text.strip()
     expression = re.sub(r"sqrt\(([^()]*)\)|√\(?(\w+)\)?", r"((\1\2)**0.5)", source)

@@ -37,7 +37,9 @@ TABLE_3 = (
     },
 )
 TABLE_4 = (
-    GaussMarkov(29.5e-6**0.5, 0.5) + GaussMarkov(4.5e-6**0.5, 20.0) + GaussMarkov(2.5e-6**0.5, 125.0),
+    GaussMarkov(29.5e-6**0.5, 0.5)
+    + GaussMarkov(4.5e-6**0.5, 20.0)
+    + GaussMarkov(2.5e-6**0.5, 125.0),
     1_000_000,
     20,
     {

@@ -1,5 +1,7 @@
 """Model choice: the right size where the data can tell, nothing invented where they cannot."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -44,9 +46,7 @@ def test_a_larger_model_is_never_worse():
             objectives[len(item.model.terms)] = item.objective
     sizes = sorted(objectives)
     assert len(sizes) >= 1
-    assert all(
-        objectives[b] <= objectives[a] + 1e-6 for a, b in zip(sizes, sizes[1:], strict=False)
-    )
+    assert all(objectives[b] <= objectives[a] + 1e-6 for a, b in pairwise(sizes))
 
 
 def test_ranking_is_sorted_and_printed():

@@ -224,7 +224,9 @@ class Design:
         """The terms with estimated values."""
         amplitude = self.amplitudes(x)
         result: list[Process] = []
-        for i, (term, shape) in enumerate(zip(self.terms, _distinct(self.terms, shapes), strict=True)):
+        for i, (term, shape) in enumerate(
+            zip(self.terms, _distinct(self.terms, shapes), strict=True)
+        ):
             process = term.with_shape(shape)
             linear = process.linear_parameter
             if linear is not None and term.free_scale:

@@ -11,6 +11,7 @@ equals its degrees of freedom (the moment estimator of a random effect, DerSimon
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
@@ -18,6 +19,7 @@ from gmwm._typing import FloatArray
 from gmwm.estimate.profile import weight_root
 
 _SIGNIFICANT = 0.001
+_WELL_KNOWN = 0.3  # relative standard error of a level
 _NOT_SMALL = 0.02
 _SETTLED = 1e-3  # relative change of delta
 
@@ -27,8 +29,9 @@ def chi_square(
 ) -> tuple[FloatArray, float]:
     """Standardised residuals per level and their chi-square, on the cube-root scale.
 
-    ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs. A wavelet variance of few degrees of freedom is far from normal, its cube root is not (Wilson
-    & Hilferty 1931, *PNAS* 17, 684-688).
+    ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs. A wavelet variance of
+    few degrees of freedom is far from normal, its cube root is not (Wilson & Hilferty 1931, *PNAS*
+    17, 684-688).
     """
     scale = np.sqrt(np.diag(covariance))
     share = (scale / basis) ** 2 / 9.0  # 2/(9 dof)
@@ -36,6 +39,53 @@ def chi_square(
     standard = (root - expected) / np.sqrt(share)
     whitened = weight_root(covariance / np.outer(scale, scale)) @ standard
     return standard, float(whitened @ whitened)
+
+
+def suffices(
+    value: float,
+    residual: FloatArray,
+    covariance: FloatArray,
+    target: FloatArray,
+    basis: FloatArray,
+    dof: int,
+) -> bool:
+    """Whether residuals (J,) agree with their covariance under a discrepancy of ``value``.
+
+    Without one, the chi-square test decides; with one, the sum of squares must not exceed its
+    degrees of freedom. Only levels that are known well enough to show a discrepancy count.
+    """
+    known, dof = _well_known(covariance, target, dof)
+    residual, target, basis = residual[known], target[known], basis[known]
+    covariance = covariance[np.ix_(known, known)]
+    if value == 0.0:
+        implied = target - residual
+        if np.any(implied <= 0.0) or np.any(basis <= 0.0):
+            return False
+        objective = chi_square(target, implied, covariance, basis)[1]
+        return bool(chi2.sf(objective, dof) > _SIGNIFICANT)
+    return _objective(value, residual, covariance, target) <= dof
+
+
+def _well_known(
+    covariance: FloatArray, target: FloatArray, dof: int
+) -> tuple[npt.NDArray[np.intp], int]:
+    """Levels of small relative error, and the degrees of freedom that they leave.
+
+    What a coarse level lacks or has too much is chance, and allowing for it at all levels would
+    let go of the fine ones.
+    """
+    relative = np.sqrt(np.diag(covariance)) / np.maximum(target, 1e-300)
+    known = np.flatnonzero(relative < _WELL_KNOWN)
+    if known.size == 0:
+        known = np.array([int(np.argmin(relative))])
+    return known, max(dof - (target.size - known.size), 1)
+
+
+def _objective(
+    value: float, residual: FloatArray, covariance: FloatArray, target: FloatArray
+) -> float:
+    whitened = weight_root(covariance + np.diag((value * target) ** 2)) @ residual
+    return float(whitened @ whitened)
 
 
 class Discrepancy:
@@ -86,12 +136,8 @@ class Discrepancy:
         if not self._estimated:
             return False
         dof = dof or self._dof
-        if self.value == 0.0:
-            implied = target - residual
-            if np.all(implied > 0.0) and np.all(basis > 0.0):
-                objective = chi_square(target, implied, covariance, basis)[1]
-                if chi2.sf(objective, dof) > _SIGNIFICANT:
-                    return False
+        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof):
+            return False
         before, self.value = self.value, _moment_estimate(residual, covariance, target, dof)
         return abs(self.value - before) > _SETTLED * max(self.value, before, 1e-6)
 
@@ -99,10 +145,12 @@ class Discrepancy:
 def _moment_estimate(
     residual: FloatArray, covariance: FloatArray, target: FloatArray, dof: int
 ) -> float:
+    known, dof = _well_known(covariance, target, dof)
+    residual, target = residual[known], target[known]
+    covariance = covariance[np.ix_(known, known)]
+
     def excess(log_delta: float) -> float:
-        root = weight_root(covariance + np.diag((np.exp(log_delta) * target) ** 2))
-        whitened = root @ residual
-        return float(whitened @ whitened) - dof
+        return _objective(float(np.exp(log_delta)), residual, covariance, target) - dof
 
     low, high = np.log(1e-5), np.log(10.0)
     if excess(low) <= 0.0:

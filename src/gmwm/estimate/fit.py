@@ -188,7 +188,9 @@ class Fit:
         for item in self.model.parameters:
             key, unit = item.key, item.parameter.unit
             low, high = intervals.get(key, (params[key], params[key]))
-            kind = "bound" if key in self.upper_bounds else "estimated" if key in errors else "given"
+            kind = (
+                "bound" if key in self.upper_bounds else "estimated" if key in errors else "given"
+            )
             if kind == "given" and self.model.terms[item.term].values.get("sigma") == 0.0:
                 kind = "undefined"
             result.append(

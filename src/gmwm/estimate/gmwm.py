@@ -1,8 +1,8 @@
 """The Generalized Method of Wavelet Moments.
 
 Guerrier, Skaloud, Stebler & Victoria-Feser (2013), *JASA* 108, 1021-1030; Stebler et al. (2012).
-The parameters minimise ``(nu_hat - nu(theta))' Omega (nu_hat - nu(theta))``. By default Omega is the
-inverse covariance of the estimates that the fitted model itself implies, iterated to a fixed
+The parameters minimise ``(nu_hat - nu(theta))' Omega (nu_hat - nu(theta))``. By default Omega is
+the inverse covariance of the estimates that the fitted model itself implies, iterated to a fixed
 point: it is smooth where one computed from the data is noisy.
 """
 
@@ -227,9 +227,7 @@ def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> St
         before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))
         converged = bool(np.max(np.abs(step)) < _TOLERANCE)
         if converged or _discrepancy_is_due(level.value, rounds):
-            changed = level.update(
-                moments.target - curve, statistical, moments.target, previous
-            )
+            changed = level.update(moments.target - curve, statistical, moments.target, previous)
             if converged and not changed:
                 return State(moments, covariance, point, curve)
         elif rounds > 1:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.estimate.design import Design
-from gmwm.estimate.discrepancy import Discrepancy
+from gmwm.estimate.design import Design, Term
+from gmwm.estimate.discrepancy import suffices
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
 from gmwm.process import (
     GaussMarkov,
@@ -25,7 +25,8 @@ from gmwm.variance.covariance import haar_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _EXCHANGES = 2
-_REWEIGHTINGS = 5
+_REWEIGHTINGS = 3
+_BISECTIONS = 14
 _IMPROVEMENT = 1e-3  # of the objective, below which an exchange is not worth a refinement
 
 
@@ -113,9 +114,7 @@ def _refine_present(profile: Profile, point: Point) -> Point:
         return profile.refine(point)
     present = [i for i, shape in enumerate(point.shapes) if shape is not None]
     part = Model(tuple(design.terms[i].process for i in present))
-    reduced = Profile(
-        Design(part, design.tau, design.dt, design.n), profile.target, profile.root
-    )
+    reduced = Profile(Design(part, design.tau, design.dt, design.n), profile.target, profile.root)
     found = reduced.refine(reduced.at([point.shapes[i] for i in present]))
     shapes = list(point.shapes)
     for i, shape in zip(present, found.shapes, strict=True):
@@ -143,9 +142,9 @@ class Reference:
     curve: FloatArray
     discrepancy: float
 
-    def weights(self, target: FloatArray) -> FloatArray:
-        """Covariance with the discrepancy, u^4, (J, J)."""
-        return self.covariance + np.diag((self.discrepancy * target) ** 2)
+    def weights(self, target: FloatArray, discrepancy: float) -> FloatArray:
+        """Covariance of the wavelet variances with a discrepancy, u^4, (J, J)."""
+        return self.covariance + np.diag((discrepancy * target) ** 2)
 
 
 def dictionary_fit(
@@ -160,32 +159,80 @@ def dictionary_fit(
     # Lines are left out: a comb of them follows anything, and has no spectrum to weight with.
     kinds = {type(process): process for process in extra if not isinstance(process, Sinusoid)}
     kinds.pop(GaussMarkov, None)
-    processes: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), GaussMarkov())
+    processes: tuple[Process, ...] = (
+        WhiteNoise(),
+        QuantizationNoise(),
+        RandomWalk(),
+        GaussMarkov(),
+    )
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
     design = Design(Model(processes), wv.tau, wv.dt, wv.n)
-    owner, shapes, columns = [], [], []
-    for i in design.linear:
-        for shape, curve in zip(design.grid(i), design.grid_curves(i).T, strict=True):
-            owner.append(i)
-            shapes.append(shape)
-            columns.append(curve)
+    atoms = [
+        (i, shape)
+        for i in design.linear
+        for shape in _denser(design.grid(i), isinstance(design.terms[i].process, GaussMarkov))
+    ]
+    columns = [design.terms[i].curve(shape, wv.tau, wv.dt) for i, shape in atoms]
     matrix = np.stack(columns, axis=1)
-    covariance, curve = wv.covariance, target
-    level = Discrepancy(None, 1)
+    covariance, discrepancy = wv.covariance, 0.0
     for _ in range(_REWEIGHTINGS):
-        # Without the discrepancy, tiny errors of the fine levels would be fitted at the price of
-        # all others, and what is left would tell nothing.
-        root = weight_root(level.added_to(covariance, target))
-        x, _ = solve_nonnegative(root @ matrix, root @ target)
-        mixture: list[Process] = []
-        for k in np.flatnonzero(x > 0.0):
-            term = design.terms[owner[k]]
-            linear = term.process.linear_parameter
-            assert linear is not None
-            value = float(x[k]) ** (1.0 / linear.power)
-            mixture.append(term.with_shape(shapes[k]).with_values(**{linear.name: value}))
-        curve = matrix @ x
+        discrepancy = _needed(matrix, target, covariance)
+        x = _amplitudes(matrix, target, covariance, discrepancy)
+        mixture = [
+            _scaled(design.terms[i], shape, float(value))
+            for (i, shape), value in zip(atoms, x, strict=True)
+            if value > 0.0
+        ]
         covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
-        dof = max(wv.tau.size - len(mixture), 3)
-        level.update(target - curve, covariance, target, curve, dof)
-    return Reference(Model(tuple(mixture)), covariance, curve, level.value)
+    return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
+
+
+def _denser(shapes: list[Shape], wanted: bool) -> list[Shape]:
+    """Shapes of one parameter with their geometric means in between.
+
+    The finest levels of long records are known to a thousandth, and the mixture must not fail on
+    account of its grid.
+    """
+    if not wanted:
+        return shapes
+    values = np.array([shape[0] for shape in shapes])
+    middle = np.sqrt(values[1:] * values[:-1])
+    return [(float(v),) for v in np.sort(np.concatenate([values, middle]))]
+
+
+def _scaled(term: Term, shape: Shape, amplitude: float) -> Process:
+    process = term.with_shape(shape)
+    linear = process.linear_parameter
+    if linear is None:
+        return process
+    return process.with_values(**{linear.name: amplitude ** (1.0 / linear.power)})
+
+
+def _amplitudes(
+    matrix: FloatArray, target: FloatArray, covariance: FloatArray, discrepancy: float
+) -> FloatArray:
+    root = weight_root(covariance + np.diag((discrepancy * target) ** 2))
+    return solve_nonnegative(root @ matrix, root @ target)[0]
+
+
+def _needed(matrix: FloatArray, target: FloatArray, covariance: FloatArray) -> float:
+    """Smallest discrepancy under which the best mixture passes for right.
+
+    The mixture is fitted anew for each value tried: with more allowance it follows the fine
+    levels less closely, and residuals of a loose fit would ask for ever more.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        value = low if high == 1.0 and low == 0.0 else float(np.sqrt(max(low, 1e-4) * high))
+        x = _amplitudes(matrix, target, covariance, value)
+        curve = matrix @ x
+        dof = max(target.size - int(np.sum(x > 0.0)), 3)
+        if suffices(value, target - curve, covariance, target, curve, dof):
+            if value == 0.0:
+                return 0.0
+            high = value
+        else:
+            low = max(value, 1e-4)
+        if high < 1.05 * low:
+            break
+    return high

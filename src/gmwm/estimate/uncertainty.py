@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -163,12 +164,14 @@ def _linearise(
                    if owner == i and k in alive]  # fmt: skip
         if not columns:
             continue
-        block, names = _shape_jacobian(design.terms[i].process, shapes[i], design.terms[i].free_shape)
+        block, names = _shape_jacobian(
+            design.terms[i].process, shapes[i], design.terms[i].free_shape
+        )
         keys.extend(by_term[places[i], name] for name in names)
         transform[np.ix_(columns, columns)] = block
     matrix = transform @ natural @ transform.T
     upper: dict[str, float] = {}
-    for k, i in enumerate(design.linear):
+    for i in design.linear:
         if amplitudes[i] == 0.0:
             parameter = design.terms[i].process.linear_parameter
             assert parameter is not None
@@ -276,7 +279,7 @@ def _merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> 
         and item.key in keys
     ]
     remarks = []
-    for first, second in zip(taus, taus[1:], strict=False):
+    for first, second in pairwise(taus):
         a, b = params[first], params[second]
         assert a is not None
         assert b is not None
@@ -286,8 +289,8 @@ def _merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> 
         error = float(np.sqrt(gradient @ block @ gradient))
         if np.log(b / a) < _MERGED_SIGMA * error or b / a < 1.05:
             remarks.append(
-                f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, {second} = "
-                f"{b:.3g} s): use one less"
+                f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, "
+                f"{second} = {b:.3g} s): use one less"
             )
     return remarks
 

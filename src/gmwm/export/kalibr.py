@@ -24,7 +24,7 @@ def kalibr_text(calibration: Calibration) -> str:
     """The content of ``imu.yaml``.
 
     Each value is that of the noisiest axis. The noise density counts every term that averages out
-    at 1 s; a random walk that no axis shows is given by the largest of the axes' upper bounds of 95 %.
+    at 1 s; a random walk that no axis shows is given by the largest of the axes' 95 % upper bounds.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def kalibr_text(calibration: Calibration) -> str:
         fits = {k: f for k, f in calibration.fits.items() if f.wv.quantity == quantity}
         if not fits:
             raise InputError(
-                f"imu.yaml needs gyro and accelerometer channels, there is no {name}: calibrate both"
+                f"imu.yaml needs gyro and accelerometer, there is no {name}: calibrate both"
             )
         densities = {key: white_density(fitted) for key, fitted in fits.items()}
         lines.append(f"{name}_noise_density: {max(densities.values()):.6e}  # {density_unit}")

@@ -36,7 +36,6 @@ CATALOGUE: tuple[type[Process], ...] = (
 """Every built-in process."""
 
 
-
 def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
     """The model whose terms were written with ``to_dict``.
 

@@ -19,7 +19,7 @@ from gmwm.process.noise import require_haar_order
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
-Coefficients = int | float | Sequence[float] | None
+Coefficients = int | float | Sequence[float | None] | None
 
 _MAX_LAGS = 1 << 18
 _NEGLIGIBLE = 1e-17
@@ -52,7 +52,6 @@ class ARIMA(Process):
     prefix: ClassVar[str] = ""
     repeatable = True
     separable_shape = False
-    sigma2: float | None
 
     def __init__(
         self,
@@ -66,9 +65,7 @@ class ARIMA(Process):
             raise InputError(f"{type(self).__name__}: d = {d!r}, it must be 0, 1 or 2")
         names = [f"ar_{i + 1}" for i in range(len(ar_values))]
         names += [f"ma_{i + 1}" for i in range(len(ma_values))]
-        shapes = tuple(
-            Parameter(name, "-", lower=-np.inf, meaning="coefficient") for name in names
-        )
+        shapes = tuple(Parameter(name, "-", lower=-np.inf, meaning="coefficient") for name in names)
         variance = Parameter("sigma2", "u^2", "variance", meaning="innovation variance")
         object.__setattr__(self, "parameters", (*shapes, variance))
         object.__setattr__(self, "d", d)
@@ -274,10 +271,10 @@ class MA(ARIMA):
         return (cls([0.5], 1.0), cls([-0.9, 0.3], 0.2))
 
 
-def _coefficients(given: Coefficients, name: str) -> tuple[float | None, ...]:
+def _coefficients(given: Any, name: str) -> tuple[float | None, ...]:
     if given is None:
         return ()
-    if isinstance(given, Integral) and not isinstance(given, bool) and given >= 0:
+    if isinstance(given, Integral) and not isinstance(given, bool) and int(given) >= 0:
         return (None,) * int(given)
     if isinstance(given, Real) and not isinstance(given, Integral):
         return (float(given),)
@@ -302,7 +299,7 @@ def _decay_lags(ar: tuple[float, ...], ma: tuple[float, ...]) -> int:
 
 @lru_cache(maxsize=16)
 def _unit_autocovariance(ar: tuple[float, ...], ma: tuple[float, ...], lags: int) -> FloatArray:
-    """Autocovariance at lags 0 .. lags-1 for unit innovations (Brockwell & Davis 1991, sec. 3.3)."""
+    """Autocovariance at lags 0 .. lags-1, unit innovations (Brockwell & Davis 1991, sec. 3.3)."""
     p, q = len(ar), len(ma)
     theta = np.array([1.0, *ma])
     phi = np.array([1.0, *(-c for c in ar)])
@@ -316,7 +313,7 @@ def _unit_autocovariance(ar: tuple[float, ...], ma: tuple[float, ...], lags: int
             system[k, abs(k - i)] += phi[i]
     start = np.linalg.solve(system, constant)
     if lags <= size:
-        return start[:lags]
+        return np.asarray(start[:lags])
     if p == 0:
         return np.pad(start, (0, lags - size))
     # Beyond lag max(p, q) the autocovariance obeys the autoregression alone.

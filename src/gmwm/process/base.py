@@ -25,7 +25,8 @@ class Process(ABC):
     everything else follow. Where a closed form is known, it overrides ``haar_variance``,
     ``autocovariance``, ``state_space`` or ``_draw``.
 
-    A parameter is *given* (a number) or *open* (``None``, to be estimated). Instances do not change.
+    A parameter is *given* (a number) or *open* (``None``, to be estimated). Instances do not
+    change.
 
     Examples
     --------
@@ -93,7 +94,7 @@ class Process(ABC):
         raise AttributeError(f"{type(self).__name__} does not change: make a new one")
 
     def __getattr__(self, name: str) -> Any:
-        # Only reached for names that are not set; tells type checkers that parameters are attributes.
+        # Only reached for names that are not set; tells type checkers that there are parameters.
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     # -- values ---------------------------------------------------------------------------------
@@ -255,7 +256,9 @@ class Process(ABC):
         """
         axes = [_grid_axis(parameter, dt, n) for parameter in self.shape_parameters]
         mesh = np.meshgrid(*axes, indexing="ij")
-        return [tuple(float(v) for v in point) for point in np.stack(mesh, -1).reshape(-1, len(axes))]
+        return [
+            tuple(float(v) for v in point) for point in np.stack(mesh, -1).reshape(-1, len(axes))
+        ]
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
         """Map shape parameters to the whole real line."""
@@ -299,7 +302,7 @@ class Process(ABC):
         return f"{type(self).__name__}({given})"
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+        return type(self) is type(other) and self.values == other.values
 
     def __hash__(self) -> int:
         return hash((type(self), *self.values.items()))

@@ -33,8 +33,6 @@ class GaussMarkov(Process):
         Parameter("tau", "s", meaning="Gauss-Markov correlation time"),
     )
     label: ClassVar[str] = "Gauss-Markov"
-    sigma: float | None
-    tau: float | None
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
         super().__init__(sigma, tau)
@@ -110,9 +108,6 @@ class Resonance(Process):
     )
     label: ClassVar[str] = "resonance"
     prefix: ClassVar[str] = "resonance_"
-    sigma: float | None
-    frequency: float | None
-    damping: float | None
 
     def __init__(
         self,
@@ -165,9 +160,7 @@ class Resonance(Process):
         sine = np.sin(wd * dt) * w0 / wd
         cosine = np.cos(wd * dt)
         decay = np.exp(-zeta * w0 * dt)
-        transition = decay * np.array(
-            [[cosine + zeta * sine, sine], [-sine, cosine - zeta * sine]]
-        )
+        transition = decay * np.array([[cosine + zeta * sine, sine], [-sine, cosine - zeta * sine]])
         stationary = self.sigma**2 * np.eye(2)
         noise = stationary - transition @ stationary @ transition.T
         return StateSpace(

@@ -81,7 +81,7 @@ class Model:
     @property
     def parameters(self) -> tuple[ModelParameter, ...]:
         """All parameters, term by term."""
-        return self._parameters  # type: ignore[no-any-return, attr-defined]
+        return self._parameters  # type: ignore[attr-defined]
 
     @property
     def params(self) -> dict[str, float | None]:
@@ -113,8 +113,7 @@ class Model:
                 changes[item.term][item.parameter.name] = params[item.key]
         return Model(
             tuple(
-                term.with_values(**change)
-                for term, change in zip(self.terms, changes, strict=True)
+                term.with_values(**change) for term, change in zip(self.terms, changes, strict=True)
             )
         )
 
@@ -125,7 +124,7 @@ class Model:
     # -- moments ----------------------------------------------------------------------------------
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        """Two-sided power spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
+        """Two-sided spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
         self._require_given()
         f = np.asarray(f, dtype=float)
         total = np.zeros_like(f)
@@ -142,8 +141,8 @@ class Model:
         return float(sum(term.drift_rate() for term in self.terms))
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        """Haar wavelet variance (u^2) at averaging times ``tau`` (s); see `Process.haar_variance`."""
-        return np.sum(self.component_variances(tau, dt), axis=0)  # type: ignore[no-any-return]
+        """Haar wavelet variance (u^2) at times ``tau`` (s); see `Process.haar_variance`."""
+        return np.sum(self.component_variances(tau, dt), axis=0)
 
     def component_variances(self, tau: FloatArray, dt: float) -> FloatArray:
         """Haar wavelet variance of each term, shape (terms, *tau.shape), in u^2."""
@@ -154,7 +153,7 @@ class Model:
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance (u^2) at lags in samples, of stationary models."""
         self._require_given()
-        return np.sum([term.autocovariance(lag, dt) for term in self.terms], axis=0)  # type: ignore[no-any-return]
+        return np.sum([term.autocovariance(lag, dt) for term in self.terms], axis=0)
 
     def state_space(self, dt: float) -> StateSpace:
         """State-space form: the terms' states stacked, white noise as measurement noise."""
@@ -257,9 +256,7 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
                 raise InputError(
                     f"two {name} in one model cannot be told apart: keep one (variances add up)"
                 )
-            shapes = [
-                tuple(t.values[p.name] for p in t.shape_parameters) for t in (term, other)
-            ]
+            shapes = [tuple(t.values[p.name] for p in t.shape_parameters) for t in (term, other)]
             if shapes[0] == shapes[1] and None not in shapes[0]:
                 values = ", ".join(
                     f"{p.name} = {v:g}"

@@ -31,7 +31,6 @@ class WhiteNoise(Process):
 
     parameters = (Parameter("N", "u/sqrt(Hz)", "scale", meaning="white noise"),)
     label: ClassVar[str] = "white noise"
-    N: float | None
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -71,7 +70,6 @@ class QuantizationNoise(Process):
 
     parameters = (Parameter("Q", "u s", "scale", meaning="quantization noise"),)
     label: ClassVar[str] = "quantization noise"
-    Q: float | None
 
     def __init__(self, Q: float | None = None) -> None:
         super().__init__(Q)
@@ -117,7 +115,6 @@ class RandomWalk(Process):
 
     parameters = (Parameter("K", "u/s/sqrt(Hz)", "scale", meaning="random walk"),)
     label: ClassVar[str] = "random walk"
-    K: float | None
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)
@@ -154,7 +151,6 @@ class RateRamp(Process):
 
     parameters = (Parameter("R", "u/s", "slope", lower=-np.inf, meaning="rate ramp"),)
     label: ClassVar[str] = "rate ramp"
-    R: float | None
 
     def __init__(self, R: float | None = None) -> None:
         super().__init__(R)
@@ -207,7 +203,6 @@ class BiasInstability(Process):
 
     parameters = (Parameter("B", "u", "scale", meaning="bias instability"),)
     label: ClassVar[str] = "bias instability"
-    B: float | None
 
     states_per_decade: ClassVar[int] = 2
     """Density of the Gauss-Markov bank in the state-space form."""

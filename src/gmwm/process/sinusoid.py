@@ -31,8 +31,6 @@ class Sinusoid(Process):
     )
     label: ClassVar[str] = "sinusoid"
     prefix: ClassVar[str] = "sinusoid_"
-    amplitude: float | None
-    frequency: float | None
 
     def __init__(self, amplitude: float | None = None, frequency: float | None = None) -> None:
         super().__init__(amplitude, frequency)

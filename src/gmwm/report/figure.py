@@ -72,12 +72,21 @@ def deviation_figure(fitted: Fit) -> dict[str, Any]:
         "hovermode": "closest",
         "font": {"family": "system-ui, sans-serif", "size": 13},
     }
-    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
+    config = {
+        "displaylogo": False,
+        "responsive": True,
+        "modeBarButtonsToRemove": ["lasso2d", "select2d"],
+    }
     return {"data": traces, "layout": layout, "config": config}
 
 
 def _line(
-    tau: list[float], value: np.typing.NDArray[np.float64], label: str, colour: str, dash: str, width: float
+    tau: list[float],
+    value: np.typing.NDArray[np.float64],
+    label: str,
+    colour: str,
+    dash: str,
+    width: float,
 ) -> dict[str, Any]:
     return {
         "type": "scatter",

@@ -42,7 +42,7 @@ def haar_counts(n: int, m: FloatArray) -> FloatArray:
 
 def dyadic_levels(n: int) -> FloatArray:
     """Averaging times 1, 2, 4, ... in samples with at least one coefficient."""
-    return 2.0 ** np.arange(int(np.log2(n)))
+    return np.exp2(np.arange(int(n).bit_length() - 1, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -238,5 +238,7 @@ def line_covariance(
         f = np.array([abs(frequency * dt - np.rint(frequency * dt))])
         gain = np.array([haar_gain(value, f)[0] for value in m])
         density = float(np.asarray(psd(f / dt, dt))[0]) / dt
-        total += 2.0 * amplitude**2 * density * np.outer(gain, gain) / np.maximum.outer(counts, counts)
+        total += (
+            2.0 * amplitude**2 * density * np.outer(gain, gain) / np.maximum.outer(counts, counts)
+        )
     return total

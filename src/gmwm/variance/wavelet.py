@@ -147,7 +147,9 @@ class WaveletVariance:
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> WaveletVariance:
         """Inverse of `to_dict`."""
-        arrays = {k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")}
+        arrays = {
+            k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")
+        }
         return cls(**{**content, **arrays})
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -139,8 +139,7 @@ class TestWhatIsOff:
         )
         assert not fit.valid
         assert any(
-            words in fit.message
-            for words in ("use one less", "not identifiable", "leave it out")
+            words in fit.message for words in ("use one less", "not identifiable", "leave it out")
         )
 
     def test_fewer_levels_than_parameters(self):

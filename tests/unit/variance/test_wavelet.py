@@ -35,7 +35,9 @@ def test_all_levels_with_at_least_one_coefficient(n):
     for m, variance, mean, count in zip(
         wv.averaging.astype(int), wv.variance, wv.mean, wv.counts, strict=True
     ):
-        w = [0.5 * (x[t + m : t + 2 * m].mean() - x[t : t + m].mean()) for t in range(n - 2 * m + 1)]
+        w = [
+            0.5 * (x[t + m : t + 2 * m].mean() - x[t : t + m].mean()) for t in range(n - 2 * m + 1)
+        ]
         assert len(w) == count >= 1
         assert variance == pytest.approx(np.mean(np.square(w)), rel=1e-10)
         assert mean == pytest.approx(np.mean(w), rel=1e-9, abs=1e-12)

@@ -1,0 +1,20 @@
+"""The README's picture: four hours of a simulated MEMS gyro, its model selected and fitted.
+
+Run with ``python examples/gyro_figure.py FILE.png``.
+"""
+
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import gmwm
+from gmwm.demo import simulated_imu
+
+recording, truth = simulated_imu(4 * 3600.0, seed=1)
+fit = gmwm.select(recording["gyro_x"]).fit
+print(fit)
+print()
+print("truth:", truth["gyro_x"])
+fit.plot().figure.savefig(sys.argv[1], dpi=110)

@@ -1,0 +1,360 @@
+"""The main job, its file format, and what happens to bad channels and bad files."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import (
+    Calibration,
+    Channel,
+    GaussMarkov,
+    InputError,
+    RandomWalk,
+    RateRamp,
+    Recording,
+    WhiteNoise,
+)
+
+DT = 0.01
+GYRO = WhiteNoise(4e-4) + RandomWalk(2e-4)
+ACCEL = WhiteNoise(1e-3)
+
+
+def channel(name, values):
+    quantity = name.split("_")[0]
+    return Channel(name, values, DT, quantity, {"gyro": "rad/s", "accel": "m/s^2"}[quantity])
+
+
+@pytest.fixture(scope="module")
+def recording():
+    rng = np.random.default_rng(12)
+    n = 10_000
+    return Recording(
+        (
+            channel("gyro_x", GYRO.simulate(n, DT, rng)),
+            channel("gyro_y", np.full(n, 0.25)),
+            channel("accel_x", ACCEL.simulate(n, DT, rng) + 9.8),
+            channel("accel_y", ACCEL.simulate(n, DT, rng)),
+        ),
+        source="bench.csv",
+        notes=("Column 'temp' was not used.",),
+    )
+
+
+@pytest.fixture(scope="module")
+def calibration(recording):
+    return gmwm.calibrate(recording)
+
+
+@pytest.fixture(scope="module")
+def mapped(recording):
+    """With every kind of parameter: estimated, given, at its bound, and a ramp."""
+    models = {
+        "gyro_x": GYRO.opened() + RateRamp(),
+        "gyro_y": WhiteNoise(),
+        "accel_x": WhiteNoise() + RandomWalk(),
+        "accel_y": WhiteNoise() + GaussMarkov(tau=50.0),
+    }
+    return gmwm.calibrate(recording, models)
+
+
+# -- calibrate ------------------------------------------------------------------------------------
+
+
+def test_every_live_channel_has_a_fit_that_holds_the_truth(calibration):
+    assert list(calibration) == ["gyro_x", "accel_x", "accel_y"]
+    assert len(calibration) == 3
+    assert {"N", "K"} <= calibration["gyro_x"].params.keys()
+    for name, truth in (("gyro_x", GYRO), ("accel_x", ACCEL), ("accel_y", ACCEL)):
+        low, high = calibration[name].interval(0.999)["N"]
+        assert low < gmwm.process.as_model(truth).params["N"] < high
+        assert calibration[name].wv.name == name
+    low, high = calibration["gyro_x"].interval(0.999)["K"]
+    assert low < 2e-4 < high
+
+
+def test_what_it_says_of_the_recording(calibration):
+    assert calibration.source == "bench.csv"
+    assert calibration.n == 10_000
+    assert calibration.rate == pytest.approx(100.0)
+    assert calibration.duration == pytest.approx(100.0)
+    assert calibration.notes == ("Column 'temp' was not used.",)
+
+
+def test_dead_channel_is_named_and_skipped(calibration):
+    assert calibration.skipped == {"gyro_y": "constant at 0.25 rad/s"}
+    assert "gyro_y: skipped, constant at 0.25 rad/s" in str(calibration)
+    assert not calibration.valid
+    with pytest.raises(InputError, match="'gyro_y': constant at 0.25 rad/s"):
+        calibration["gyro_y"]
+
+
+def test_unknown_channel_lists_those_there_are(calibration):
+    with pytest.raises(InputError, match="'gyro_w': it has gyro_x, accel_x, accel_y"):
+        calibration["gyro_w"]
+
+
+def test_valid_only_if_every_fit_is(calibration):
+    sound = replace(calibration, skipped={})
+    assert sound.valid == all(fit.valid for fit in calibration.fits.values())
+    fits = {name: replace(fit, valid=True) for name, fit in calibration.fits.items()}
+    assert replace(sound, fits=fits).valid
+    assert not replace(calibration, fits=fits).valid  # one is skipped
+    assert not replace(sound, fits=fits | {"gyro_x": replace(fits["gyro_x"], valid=False)}).valid
+
+
+def test_all_channels_dead():
+    rec = Recording((channel("gyro_x", np.zeros(100)), channel("accel_x", np.ones(100))), "dead.csv")
+    with pytest.raises(InputError, match=r"^dead\.csv: every channel is constant.*: check the"):
+        gmwm.calibrate(rec)
+
+
+def test_too_short_a_recording():
+    rec = Recording((channel("gyro_x", np.arange(7.0)),))
+    with pytest.raises(InputError, match="^7 samples are too few: record at least 8"):
+        gmwm.calibrate(rec)
+
+
+def test_a_sample_that_is_no_number_is_located(recording):
+    values = recording["accel_y"].values.copy()
+    values[17] = np.nan
+    rec = Recording((recording["gyro_x"], channel("accel_y", values)))
+    with pytest.raises(InputError, match="'accel_y' has 1 NaN or infinite samples.* index 17"):
+        gmwm.calibrate(rec, WhiteNoise())
+
+
+def test_a_channel_without_noise_is_named(recording):
+    # A periodic signal with no noise at all: no sum of noises follows it.
+    periodic = np.sin(0.05 * np.arange(recording.n))
+    rec = Recording((recording["gyro_x"], channel("gyro_z", periodic)))
+    try:
+        result = gmwm.calibrate(rec)
+    except InputError as error:
+        assert "gyro_z" in str(error)
+    else:
+        assert "gyro_x" in result.fits
+
+
+def test_one_model_for_all_channels(recording):
+    result = gmwm.calibrate(recording, WhiteNoise())
+    assert [list(fit.params) for fit in result.fits.values()] == [["N"]] * 3
+
+
+def test_a_model_by_channel(mapped):
+    assert list(mapped["gyro_x"].params) == ["N", "K", "R"]
+    assert list(mapped["accel_x"].params) == ["N", "K"]
+    assert mapped["accel_y"].params["tau"] == 50.0
+    assert "tau" not in mapped["accel_y"].keys
+
+
+def test_a_mapping_must_have_every_live_channel(recording):
+    models = {"gyro_x": WhiteNoise(), "accel_x": WhiteNoise()}
+    with pytest.raises(InputError, match="no model is given for channel 'accel_y': add one"):
+        gmwm.calibrate(recording, models)
+
+
+@pytest.mark.parametrize("jobs", [None, 1, 2])
+def test_progress_hears_of_every_channel_once_and_threads_change_nothing(recording, mapped, jobs):
+    heard = []
+    models = {name: mapped[name].model.opened() for name in mapped}
+    result = gmwm.calibrate(recording, models, jobs=jobs, progress=heard.append)
+    assert sorted(heard) == sorted(result.fits)
+    alone = gmwm.calibrate(recording, models, jobs=1)
+    assert str(result) == str(alone)
+
+
+# -- files ----------------------------------------------------------------------------------------
+
+
+def assert_same(one, other):
+    assert list(one) == list(other)
+    assert (one.skipped, one.source, one.rate, one.n, one.notes) == (
+        other.skipped,
+        other.source,
+        other.rate,
+        other.n,
+        other.notes,
+    )
+    assert str(one) == str(other)
+    assert one.valid == other.valid
+    for a, b in zip(one.fits.values(), other.fits.values(), strict=True):
+        assert a.model == b.model
+        assert a.params == b.params
+        assert a.keys == b.keys
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+        assert a.covariance.shape == b.covariance.shape
+        assert a.stderr == b.stderr
+        assert a.interval() == b.interval()
+        assert a.interval(0.5) == b.interval(0.5)
+        assert a.upper_bounds == b.upper_bounds
+        assert a.remarks == b.remarks
+        numbers = [(f.objective, f.dof, f.discrepancy, f.p_value) for f in (a, b)]
+        np.testing.assert_array_equal(*numbers)
+        assert (a.method, a.omega, a.valid) == (b.method, b.omega, b.valid)
+        assert a.rows() == b.rows()
+        for array in ("tau", "variance", "mean", "blocks", "lower", "upper", "covariance"):
+            np.testing.assert_array_equal(getattr(a.wv, array), getattr(b.wv, array))
+        scalars = ("block", "n", "dt", "confidence", "name", "quantity", "unit")
+        assert [getattr(a.wv, s) for s in scalars] == [getattr(b.wv, s) for s in scalars]
+        np.testing.assert_array_equal(a.implied, b.implied)
+
+
+@pytest.mark.parametrize("which", ["calibration", "mapped"])
+def test_round_trip_through_a_file(which, request, tmp_path):
+    original = request.getfixturevalue(which)
+    path = tmp_path / "cal.json"
+    assert original.save(path) == path
+    again = gmwm.load(path)
+    assert isinstance(again, Calibration)
+    assert_same(again, original)
+    again.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+
+
+def test_an_upper_bound_is_in_the_round_trip(mapped):
+    # What `mapped` is for: a bound and a remark must exist to be lost.
+    fit = mapped["accel_x"]
+    assert fit.upper_bounds.keys() == {"K"}
+    assert any("K is not identifiable" in remark for remark in fit.remarks)
+
+
+def test_a_missing_p_value_survives(calibration, tmp_path):
+    fits = {"gyro_x": replace(calibration["gyro_x"], p_value=float("nan"), dof=0)}
+    odd = replace(calibration, fits=fits)
+    odd.save(tmp_path / "cal.json")
+    assert_same(gmwm.load(tmp_path / "cal.json"), odd)
+
+
+def test_an_infinite_bound_survives(mapped, tmp_path):
+    fits = {"accel_x": replace(mapped["accel_x"], upper_bounds={"K": float("inf")})}
+    odd = replace(mapped, fits=fits)
+    odd.save(tmp_path / "cal.json")
+    assert_same(gmwm.load(tmp_path / "cal.json"), odd)
+
+
+def test_the_file_is_plain_json_in_si(calibration, tmp_path):
+    content = json.loads(calibration.save(tmp_path / "cal.json").read_text())
+    assert content["schema"] == "gmwm.calibration"
+    assert content["schema_version"] == 1
+    assert content["rate_hz"] == pytest.approx(100.0)
+    gyro = content["channels"]["gyro_x"]
+    assert gyro["params"] == calibration["gyro_x"].params
+    assert gyro["units"]["N"] == "rad/s/sqrt(Hz)"
+    assert gyro["units"]["K"] == "rad/s/s/sqrt(Hz)"
+
+
+def test_interrupted_write_leaves_nothing(calibration, tmp_path, monkeypatch):
+    def interrupted(content, stream, **options):
+        stream.write('{"schema": ')
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gmwm.calibration.json.dump", interrupted)
+    path = tmp_path / "cal.json"
+    with pytest.raises(KeyboardInterrupt):
+        calibration.save(path)
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        calibration.save(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["cal.json"]
+    assert path.read_text() == "old"
+
+
+def test_a_folder_that_is_not_there(calibration, tmp_path):
+    with pytest.raises(InputError, match=r"cal\.json: cannot be written"):
+        calibration.save(tmp_path / "nowhere" / "cal.json")
+
+
+# -- files that are not ours, or not whole --------------------------------------------------------
+
+
+def refused(path):
+    with pytest.raises(InputError) as caught:
+        gmwm.load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert len(message.splitlines()) == 1
+    assert message.count(": ") >= 2, "no mend is given"
+    return message
+
+
+def test_missing_file_and_folder(tmp_path):
+    assert "cannot be read" in refused(tmp_path / "nowhere.json")
+    assert "cannot be read" in refused(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is no JSON"),
+        (b"time,gyro_x\n0,1\n", "is no JSON"),
+        (b'{"schema": "gmwm.calibration", "schema_ver', "is no JSON"),
+        (b"\xff\xfe\x00\x93NUMPY", "is no JSON"),
+        (b"[1, 2, 3]", "no calibration"),
+        (b"null", "no calibration"),
+        (b'{"type": "FeatureCollection"}', "no calibration"),
+        (b'{"schema": "gmwm.calibration"}', "schema version None"),
+    ],
+)
+def test_foreign_files(tmp_path, content, words):
+    path = tmp_path / "cal.json"
+    path.write_bytes(content)
+    assert words in refused(path)
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", None])
+def test_other_schema_versions(calibration, tmp_path, version):
+    path = tmp_path / "cal.json"
+    path.write_text(json.dumps(calibration.to_dict() | {"schema_version": version}))
+    message = refused(path)
+    assert f"schema version {version!r}" in message
+    assert "calibrate again or update gmwm" in message
+
+
+GONE = object()
+FIT = ("channels", "gyro_x")
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        *[((key,), GONE) for key in ("channels", "skipped", "source", "rate_hz", "n", "notes")],
+        *[
+            ((*FIT, key), GONE)
+            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "remarks")
+        ],
+        ((*FIT, "wavelet_variance", "variance"), GONE),
+        ((*FIT, "wavelet_variance", "dt"), GONE),
+        ((*FIT, "wavelet_variance", "surplus"), 1.0),
+        ((*FIT, "wavelet_variance", "tau"), ["a", "b"]),
+        ((*FIT, "covariance"), [[1.0]]),
+        ((*FIT, "model"), []),
+        ((*FIT, "model", 0, "process"), "PinkNoise"),
+        ((*FIT, "model", 0, "N"), -1.0),
+        ((*FIT, "model", 0, "M"), 1.0),
+        ((*FIT, "model", 0, "N"), None),
+        ((*FIT, "keys"), ["N", "X"]),
+        ((*FIT, "wavelet_variance", "dt"), None),
+        (FIT, None),
+        (("channels",), []),
+        (("rate_hz",), None),
+        (("rate_hz",), "fast"),
+        (("n",), None),
+    ],
+    ids=lambda v: "gone" if v is GONE else ".".join(map(str, v)) if isinstance(v, tuple) else None,
+)
+def test_damaged_files(calibration, tmp_path, place, value):
+    content = json.loads(json.dumps(calibration.to_dict()))
+    inner = content
+    for key in place[:-1]:
+        inner = inner[key]
+    if value is GONE:
+        del inner[place[-1]]
+    else:
+        inner[place[-1]] = value
+    path = tmp_path / "cal.json"
+    path.write_text(json.dumps(content))
+    assert "calibrate again" in refused(path)
