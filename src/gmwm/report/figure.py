@@ -64,7 +64,7 @@ def deviation_figure(fitted: Fit) -> dict[str, Any]:
             **_axis(f"Allan deviation [{unit}]"),
             "range": [float(np.log10(low)), float(np.log10(high))],
         },
-        "margin": {"l": 75, "r": 15, "t": 15, "b": 50},
+        "margin": {"l": 75, "r": 15, "t": 36, "b": 50},
         "height": 420,
         "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 1, "xanchor": "right", "y": 1},
         "plot_bgcolor": "#ffffff",
