@@ -17,7 +17,7 @@ from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
-from gmwm.estimate.start import dictionary_fit, search
+from gmwm.estimate.start import Reference, dictionary_fit, search
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -36,6 +36,7 @@ _USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the sear
 _STRICTNESS = 1.5  # c of Hannan & Quinn; consistent above 1
 _RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
 _RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
+_RAMP_ROUNDS = 3
 _TIE = 2.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 
@@ -185,8 +186,7 @@ def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
     if without > _RAMP_PLAUSIBLE:
-        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
-        drift_free = dictionary_fit(wv, target)
+        target, drift_free = _drift_free(wv, slope)
         if drift_free.discrepancy < allowed:
             # Both kinds must be compared under the same allowance.
             allowed = drift_free.discrepancy
@@ -202,6 +202,19 @@ def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
     candidate, point = item
     design = Design(candidate.model, wv.tau, wv.dt, wv.n)
     return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+
+
+def _drift_free(wv: WaveletVariance, slope: Slope) -> tuple[FloatArray, Reference]:
+    """Wavelet variances without the drift, and the mixture fitted to them.
+
+    Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
+    estimated again under the mixture that is left.
+    """
+    for _ in range(_RAMP_ROUNDS):
+        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        reference = dictionary_fit(wv, target)
+        slope = gls_slope(wv, reference.mixture.psd)
+    return target, reference
 
 
 def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:

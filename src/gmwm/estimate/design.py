@@ -15,7 +15,7 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process import GaussMarkov, Model, Process
+from gmwm.process import GaussMarkov, Model, Parameter, Process
 from gmwm.process.base import Shape
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
@@ -54,6 +54,11 @@ class Term:
             )
         free_scale = linear is not None and values[linear.name] is None
         return cls(process, index, free_scale, np.array(shape, dtype=bool))
+
+    @property
+    def linear_parameter(self) -> Parameter:
+        """The linear parameter, which every term of free scale has."""
+        return next(p for p in self.process.parameters if p.linear)
 
     def with_shape(self, shape: Shape) -> Process:
         """The process at this shape and unit amplitude (its own one, where given)."""
@@ -228,11 +233,9 @@ class Design:
             zip(self.terms, _distinct(self.terms, shapes), strict=True)
         ):
             process = term.with_shape(shape)
-            linear = process.linear_parameter
-            if linear is not None and term.free_scale:
-                value = float(amplitude[i]) ** (1.0 / linear.power)
-                process = process.with_values(**{linear.name: value})
-            result.append(process)
+            result.append(
+                process.with_amplitude(float(amplitude[i])) if term.free_scale else process
+            )
         return result
 
     def fitted_noise(self, x: FloatArray, shapes: Sequence[Shape]) -> Model:

@@ -17,7 +17,7 @@ from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import Discrepancy
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.profile import Point, Profile, weight_root
+from gmwm.estimate.profile import Point, Profile, omega_root
 from gmwm.estimate.ramp import (
     Slope,
     bias_of_detrending,
@@ -173,7 +173,7 @@ def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | Non
         # What no sum of processes without lines can follow is discrepancy from the start.
         level.start_at(reference.discrepancy)
     weights = level.added_to(reference.covariance, moments.target)
-    point = search(Profile(design, moments.target, _root(weights, omega)))
+    point = search(Profile(design, moments.target, omega_root(weights, omega)))
     state = State(moments, weights, point, reference.curve)
     settled = _iterate(design, state, level, omega)
     if settled is None:
@@ -220,7 +220,7 @@ def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> St
         statistical = moments.covariance(noise)
         covariance = level.added_to(statistical, moments.target)
         weights = covariance if rounds == 1 else (1.0 - part) * weights + part * covariance
-        profile = Profile(design, moments.target, _root(weights, omega))
+        profile = Profile(design, moments.target, omega_root(weights, omega))
         # Weights from a first fit may point elsewhere: search anew once, then follow.
         point = search(profile) if rounds == 1 else profile.refine(profile.at(point.shapes))
         previous, curve = curve, _implied(design, point)
@@ -254,7 +254,7 @@ def _under_reference(
     level.restart()
     for _ in range(_REFERENCE_ROUNDS):
         covariance = level.added_to(statistical, moments.target)
-        point = search(Profile(design, moments.target, _root(covariance, omega)))
+        point = search(Profile(design, moments.target, omega_root(covariance, omega)))
         residual = moments.target - _implied(design, point)
         if not level.update(residual, statistical, moments.target, reference.curve):
             break
@@ -267,14 +267,6 @@ def _discrepancy_is_due(value: float, rounds: int) -> bool:
     It does not enter on the way, where any model looks wrong.
     """
     return value > 0.0 and rounds % _DISCREPANCY_EVERY == 0
-
-
-def _root(covariance: FloatArray, omega: str) -> FloatArray:
-    if omega == "model":
-        return weight_root(covariance)
-    if omega == "diagonal":
-        return np.diag(1.0 / np.sqrt(np.diag(covariance)))
-    return np.eye(covariance.shape[0]) / np.sqrt(np.max(np.diag(covariance)))
 
 
 def _implied(design: Design, point: Point) -> FloatArray:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.estimate.design import Design, Term
+from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import suffices
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
 from gmwm.process import (
@@ -86,7 +87,7 @@ def _columns(profile: Profile, shapes: Sequence[Shape | None]) -> tuple[FloatArr
 def _present(profile: Profile, shapes: Sequence[Shape | None]) -> Point:
     matrix, y = _columns(profile, shapes)
     x, residual = solve_nonnegative(matrix, y)
-    return Point(shapes, x, float(residual @ residual))  # type: ignore[arg-type]
+    return Point(cast("Sequence[Shape]", shapes), x, float(residual @ residual))
 
 
 def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
@@ -179,7 +180,7 @@ def dictionary_fit(
         discrepancy = _needed(matrix, target, covariance)
         x = _amplitudes(matrix, target, covariance, discrepancy)
         mixture = [
-            _scaled(design.terms[i], shape, float(value))
+            design.terms[i].with_shape(shape).with_amplitude(float(value))
             for (i, shape), value in zip(atoms, x, strict=True)
             if value > 0.0
         ]
@@ -198,14 +199,6 @@ def _denser(shapes: list[Shape], wanted: bool) -> list[Shape]:
     values = np.array([shape[0] for shape in shapes])
     middle = np.sqrt(values[1:] * values[:-1])
     return [(float(v),) for v in np.sort(np.concatenate([values, middle]))]
-
-
-def _scaled(term: Term, shape: Shape, amplitude: float) -> Process:
-    process = term.with_shape(shape)
-    linear = process.linear_parameter
-    if linear is None:
-        return process
-    return process.with_values(**{linear.name: amplitude ** (1.0 / linear.power)})
 
 
 def _amplitudes(

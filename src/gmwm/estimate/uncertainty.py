@@ -1,9 +1,8 @@
-"""From the minimum to a result: covariance, upper bounds, and whether it can be trusted."""
+"""From the minimum to a result: the covariance of the parameters, and upper bounds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -12,17 +11,20 @@ from gmwm._typing import FloatArray
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.profile import Point, weight_root
+from gmwm.estimate.profile import Point, omega_root, weight_root
 from gmwm.estimate.ramp import Slope
-from gmwm.process import GaussMarkov, Model, Process
+from gmwm.estimate.remarks import (
+    bound_remarks,
+    count_remarks,
+    merged_remarks,
+    misfit,
+    shape_remarks,
+)
+from gmwm.process import Model, Process
 from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
 
 _UPPER_LEVEL = 0.95
-_SHAPE_EDGE = 0.05  # in z, from the limit of the search
-_MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation times
-_POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
-_POOR_DOF = 30.0
 
 
 def describe(
@@ -81,12 +83,12 @@ def describe(
         matrix[-1, -1] = slope.variance
         keys, matrix = _in_model_order(model, keys, matrix)
     remarks = [
-        *_bound_remarks(model, upper),
-        *_shape_remarks(sub, shapes, x),
-        *_merged_remarks(model, keys, matrix),
-        *_count_remarks(design, sub),
+        *bound_remarks(model, upper),
+        *shape_remarks(sub, shapes, x),
+        *merged_remarks(model, keys, matrix),
+        *count_remarks(design, sub),
     ]
-    misfit, poor = _misfit(wv, target, implied, covariance, discrepancy)
+    misfits, poor = misfit(wv, target, implied, covariance, discrepancy)
     return Fit(
         model=model,
         wv=wv,
@@ -100,7 +102,7 @@ def describe(
         method="gmwm",
         omega=omega,
         valid=not remarks and not poor,
-        remarks=(*remarks, *misfit),
+        remarks=(*remarks, *misfits),
     )
 
 
@@ -153,8 +155,7 @@ def _linearise(
     transform = np.zeros((jacobian.shape[1], jacobian.shape[1]))
     for row, k in enumerate(positive):
         i = design.linear[k]
-        parameter = design.terms[i].process.linear_parameter
-        assert parameter is not None
+        parameter = design.terms[i].linear_parameter
         keys.append(by_term[places[i], parameter.name])
         value = amplitudes[i] ** (1.0 / parameter.power)
         transform[row, row] = value / (parameter.power * amplitudes[i])
@@ -173,8 +174,7 @@ def _linearise(
     upper: dict[str, float] = {}
     for i in design.linear:
         if amplitudes[i] == 0.0:
-            parameter = design.terms[i].process.linear_parameter
-            assert parameter is not None
+            parameter = design.terms[i].linear_parameter
             residual = target - curves @ amplitudes
             bound = _upper_amplitude(jacobian, curves[:, i], residual, covariance)
             upper[by_term[places[i], parameter.name]] = bound ** (1.0 / parameter.power)
@@ -212,12 +212,7 @@ def _sandwich(jacobian: FloatArray, covariance: FloatArray, omega: str) -> Float
     """B V B' on parameters scaled so that they are of like size."""
     if jacobian.shape[1] == 0:
         return np.zeros((0, 0))
-    if omega == "model":
-        root = weight_root(covariance)
-    elif omega == "diagonal":
-        root = np.diag(1.0 / np.sqrt(np.diag(covariance)))
-    else:
-        root = np.eye(covariance.shape[0]) / np.sqrt(np.max(np.diag(covariance)))
+    root = omega_root(covariance, omega)
     weighted = root @ jacobian
     length = np.sqrt(np.sum(weighted**2, axis=0))
     length[length == 0.0] = 1.0
@@ -242,89 +237,3 @@ def _upper_amplitude(
     # Quantile of N(centre, deviation^2) restricted to positive values.
     tail = norm.sf(-centre / deviation) * (1.0 - _UPPER_LEVEL)
     return centre + deviation * float(norm.isf(tail))
-
-
-def _bound_remarks(model: Model, upper: dict[str, float]) -> list[str]:
-    return [
-        f"{key} is not identifiable from these data (estimate zero): below {bound:.3g} with 95 % "
-        "confidence"
-        for key, bound in upper.items()
-    ]
-
-
-def _shape_remarks(design: Design, shapes: Sequence[Shape], x: FloatArray) -> list[str]:
-    """Shapes at the edge of what the search allows."""
-    z = design.pack(shapes)
-    low, high = design.bounds(shapes)
-    amplitudes = design.amplitudes(x)
-    remarks = []
-    for k, i in enumerate(design.owners()):
-        if amplitudes[i] > 0.0 and not low[k] + _SHAPE_EDGE < z[k] < high[k] - _SHAPE_EDGE:
-            title = design.terms[i].process.title()
-            remarks.append(
-                f"a {title} term ran to the edge of what this record can show (shape "
-                f"{shapes[i][0]:.3g}): it is not identifiable, leave it out"
-            )
-    return remarks
-
-
-def _merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:
-    """Neighbouring Gauss-Markov terms whose correlation times do not differ significantly."""
-    params = model.params
-    taus = [
-        item.key
-        for item in model.parameters
-        if isinstance(model.terms[item.term], GaussMarkov)
-        and item.parameter.name == "tau"
-        and item.key in keys
-    ]
-    remarks = []
-    for first, second in pairwise(taus):
-        a, b = params[first], params[second]
-        assert a is not None
-        assert b is not None
-        i, j = keys.index(first), keys.index(second)
-        gradient = np.array([-1.0 / a, 1.0 / b])
-        block = matrix[np.ix_([i, j], [i, j])]
-        error = float(np.sqrt(gradient @ block @ gradient))
-        if np.log(b / a) < _MERGED_SIGMA * error or b / a < 1.05:
-            remarks.append(
-                f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, "
-                f"{second} = {b:.3g} s): use one less"
-            )
-    return remarks
-
-
-def _count_remarks(design: Design, sub: Design) -> list[str]:
-    levels = design.tau.size
-    if levels >= sub.n_free:
-        return []
-    return [
-        f"{levels} levels cannot determine {sub.n_free} parameters: record longer or take a "
-        "smaller model"
-    ]
-
-
-def _misfit(
-    wv: WaveletVariance,
-    target: FloatArray,
-    implied: FloatArray,
-    covariance: FloatArray,
-    discrepancy: float,
-) -> tuple[list[str], bool]:
-    """What to say of a model that fails the chi-square test, and whether it fails too badly."""
-    if discrepancy == 0.0:
-        return [], False
-    statistical = np.diag(covariance) - (discrepancy * target) ** 2
-    known = 2.0 * target**2 / np.maximum(statistical, 1e-300) > _POOR_DOF
-    if not np.any(known):
-        return [], False
-    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
-    worst = int(np.argmax(ratio))
-    remark = (
-        "the model differs from the data by more than their statistical errors; a discrepancy of "
-        f"{100.0 * discrepancy:.2g} % of the variance at each level was allowed for and widens the "
-        f"intervals (largest misfit of the deviation {100.0 * ratio[worst]:.2g} % at tau = "
-        f"{wv.tau[known][worst]:.3g} s)"
-    )
-    return [remark], bool(ratio[worst] > _POOR_DEVIATION)

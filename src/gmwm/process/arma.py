@@ -128,7 +128,7 @@ class ARIMA(Process):
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def __eq__(self, other: object) -> bool:
-        return super().__eq__(other) and self.d == other.d  # type: ignore[attr-defined]
+        return super().__eq__(other) and isinstance(other, ARIMA) and self.d == other.d
 
     __hash__ = Process.__hash__
 

@@ -129,6 +129,16 @@ class Process(ABC):
         """
         return type(self)(**{**self.values, **values})
 
+    def with_amplitude(self, amplitude: float) -> Self:
+        """A copy whose wavelet variance is ``amplitude`` times that at unit amplitude.
+
+        A process without a linear parameter is returned as it is.
+        """
+        linear = self.linear_parameter
+        if linear is None:
+            return self
+        return self.with_values(**{linear.name: amplitude ** (1.0 / linear.power)})
+
     def _require_given(self) -> None:
         missing = [name for name, value in self.values.items() if value is None]
         if missing:

@@ -64,6 +64,7 @@ class Model:
     """
 
     terms: tuple[Process, ...]
+    _parameters: tuple[ModelParameter, ...]
 
     def __init__(self, terms: tuple[Process, ...]) -> None:
         terms = _in_order(tuple(terms))
@@ -81,7 +82,7 @@ class Model:
     @property
     def parameters(self) -> tuple[ModelParameter, ...]:
         """All parameters, term by term."""
-        return self._parameters  # type: ignore[attr-defined]
+        return self._parameters
 
     @property
     def params(self) -> dict[str, float | None]:

@@ -1,0 +1,103 @@
+"""What is said of a fit that cannot be trusted as it stands, one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.estimate.design import Design
+from gmwm.process import GaussMarkov, Model
+from gmwm.process.base import Shape
+from gmwm.variance.wavelet import WaveletVariance
+
+_SHAPE_EDGE = 0.05  # in z, from the limit of the search
+_MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation times
+_POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
+_POOR_DOF = 30.0
+
+
+def bound_remarks(model: Model, upper: dict[str, float]) -> list[str]:
+    """Parameters estimated as zero."""
+    return [
+        f"{key} is not identifiable from these data (estimate zero): below {bound:.3g} with 95 % "
+        "confidence"
+        for key, bound in upper.items()
+    ]
+
+
+def shape_remarks(design: Design, shapes: Sequence[Shape], x: FloatArray) -> list[str]:
+    """Shapes at the edge of what the search allows."""
+    z = design.pack(shapes)
+    low, high = design.bounds(shapes)
+    amplitudes = design.amplitudes(x)
+    remarks = []
+    for k, i in enumerate(design.owners()):
+        if amplitudes[i] > 0.0 and not low[k] + _SHAPE_EDGE < z[k] < high[k] - _SHAPE_EDGE:
+            title = design.terms[i].process.title()
+            remarks.append(
+                f"a {title} term ran to the edge of what this record can show (shape "
+                f"{shapes[i][0]:.3g}): it is not identifiable, leave it out"
+            )
+    return remarks
+
+
+def merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:
+    """Neighbouring Gauss-Markov terms whose correlation times do not differ significantly."""
+    taus = [
+        (item.key, item.value or 0.0)
+        for item in model.parameters
+        if isinstance(model.terms[item.term], GaussMarkov)
+        and item.parameter.name == "tau"
+        and item.key in keys
+    ]
+    remarks = []
+    for (first, a), (second, b) in pairwise(taus):
+        i, j = keys.index(first), keys.index(second)
+        gradient = np.array([-1.0 / a, 1.0 / b])
+        block = matrix[np.ix_([i, j], [i, j])]
+        error = float(np.sqrt(gradient @ block @ gradient))
+        if np.log(b / a) < _MERGED_SIGMA * error or b / a < 1.05:
+            remarks.append(
+                f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, "
+                f"{second} = {b:.3g} s): use one less"
+            )
+    return remarks
+
+
+def count_remarks(design: Design, sub: Design) -> list[str]:
+    """More parameters than levels."""
+    levels = design.tau.size
+    if levels >= sub.n_free:
+        return []
+    return [
+        f"{levels} levels cannot determine {sub.n_free} parameters: record longer or take a "
+        "smaller model"
+    ]
+
+
+def misfit(
+    wv: WaveletVariance,
+    target: FloatArray,
+    implied: FloatArray,
+    covariance: FloatArray,
+    discrepancy: float,
+) -> tuple[list[str], bool]:
+    """What to say of a model that fails the chi-square test, and whether it fails too badly."""
+    if discrepancy == 0.0:
+        return [], False
+    statistical = np.diag(covariance) - (discrepancy * target) ** 2
+    known = 2.0 * target**2 / np.maximum(statistical, 1e-300) > _POOR_DOF
+    if not np.any(known):
+        return [], False
+    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
+    worst = int(np.argmax(ratio))
+    remark = (
+        "the model differs from the data by more than their statistical errors; a discrepancy of "
+        f"{100.0 * discrepancy:.2g} % of the variance at each level was allowed for and widens the "
+        f"intervals (largest misfit of the deviation {100.0 * ratio[worst]:.2g} % at tau = "
+        f"{wv.tau[known][worst]:.3g} s)"
+    )
+    return [remark], bool(ratio[worst] > _POOR_DEVIATION)
