@@ -122,6 +122,8 @@ class Calibration:
                 n=content["n"],
                 notes=tuple(content["notes"]),
             )
+        except InputError:
+            raise
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"the calibration is damaged ({error!r}): calibrate again") from None
 
@@ -194,6 +196,9 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
+    if isinstance(model, Mapping):
+        for channel in recording:
+            _model_of(channel, model)
     dead = {c.name: f"constant at {c.values[0]:.6g} {c.unit}" for c in recording if c.is_constant}
     alive = [c for c in recording if c.name not in dead]
     if not alive:
@@ -204,17 +209,25 @@ def calibrate(
     if recording.n < MIN_SAMPLES:
         raise InputError(f"{recording.n} samples are too few: record at least {MIN_SAMPLES}")
 
-    def one(channel: Channel) -> Fit:
-        fitted = _channel_fit(channel, _model_of(channel, model))
-        if progress is not None:
-            progress(channel.name)
-        return fitted
+    def one(channel: Channel) -> Fit | InputError:
+        try:
+            return _channel_fit(channel, _model_of(channel, model))
+        except InputError as error:
+            return error  # of this channel; the others go on
+        finally:
+            if progress is not None:
+                progress(channel.name)
 
     workers = Parallel(n_jobs=jobs or -1, prefer="threads")
-    fits = workers(delayed(one)(channel) for channel in alive)
+    found = dict(zip(alive, workers(delayed(one)(channel) for channel in alive), strict=True))
+    skipped = dead | {
+        c.name: str(error) for c, error in found.items() if isinstance(error, InputError)
+    }
+    if len(skipped) == len(recording):
+        raise InputError(f"{recording.source or 'the recording'}: {next(iter(skipped.values()))}")
     return Calibration(
-        fits={channel.name: found for channel, found in zip(alive, fits, strict=True)},
-        skipped=dead,
+        fits={c.name: fitted for c, fitted in found.items() if isinstance(fitted, Fit)},
+        skipped=skipped,
         source=recording.source,
         rate=recording.rate,
         n=recording.n,

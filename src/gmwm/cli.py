@@ -135,7 +135,7 @@ def main() -> None:
     except click.exceptions.Exit as error:
         sys.exit(error.exit_code)
     except click.ClickException as error:
-        error.show()
+        click.echo(f"gmwm: {error.format_message()}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.Abort:
         click.echo("gmwm: interrupted, nothing was written", err=True)
@@ -146,7 +146,7 @@ def main() -> None:
 
 
 def _column(text: str) -> str | int:
-    return int(text) if text.isdigit() else text
+    return int(text) if text.isascii() and text.isdigit() else text
 
 
 def _roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
@@ -155,6 +155,8 @@ def _roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
         name, separator, column = pair.partition("=")
         if not (name and separator and column):
             raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
+        if name in roles:
+            raise InputError(f"--channel {name}=... is given twice: a channel has one column")
         roles[name] = _column(column)
     return roles or None
 
@@ -218,7 +220,7 @@ def _console() -> Console:
 
 
 def _table(result: Calibration) -> Table:
-    table = _new_table("channel", "parameter", ">estimate", "95 % interval", "unit", "")
+    table = _new_table("channel", "parameter", ">estimate", "95 % interval", "unit")
     for name, fit in result.fits.items():
         rows = fit.rows()
         for i, row in enumerate(rows):
@@ -226,13 +228,17 @@ def _table(result: Calibration) -> Table:
             value, low, high, unit = row["field"][0] if row["field"] else si
             cells = [name if i == 0 else "", row["key"]]
             if row["kind"] == "bound":
-                cells += ["0", f"below {high:.3g}", unit]
+                cells += [f"{value:.3g}", f"below {high:.3g}", unit]
             elif row["kind"] == "estimated":
                 cells += [f"{value:.4g}", f"{low:.4g} .. {high:.4g}", unit]
             else:
                 cells += [f"{value:.4g}", row["kind"], unit]
-            mark = "" if fit.valid or i else "not valid"
-            table.add_row(*cells, mark, end_section=i == len(rows) - 1)
+            if i == 1 and not fit.valid:
+                cells[0] = "not valid"
+            last = i == len(rows) - 1
+            table.add_row(*cells, end_section=last and (fit.valid or i > 0))
+        if len(rows) == 1 and not fit.valid:
+            table.add_row("not valid", "", "", "", "", end_section=True)
     return table
 
 
@@ -251,8 +257,8 @@ def _show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
             cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
             if not row.determined:
                 cells = ["-", "too short to tell"]
-            elif row.estimate == 0.0:
-                cells = ["0", f"below {row.upper:.4g}"]
+            elif row.lower == 0.0:
+                cells = [f"{row.estimate:.3g}", f"below {row.upper:.4g}"]
             mark = "" if row.covered else "outside"
             first = name if i == 0 else ""
             table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit, mark,
@@ -280,16 +286,21 @@ def _new_table(*columns: str) -> Table:
 
 def _write(result: Calibration, folder: Path) -> None:
     from gmwm.export import write_kalibr
+    from gmwm.files import replaceable
 
-    written = [
-        result.save(folder / "calibration.json"),
-        result.report(folder / "report.html"),
-    ]
+    names = ("calibration.json", "report.html", "imu.yaml")
+    paths = [replaceable(folder / name) for name in names]
     quantities = {fit.wv.quantity for fit in result.fits.values()}
-    if {"gyro", "accel"} <= quantities:
-        written.append(write_kalibr(result, folder / "imu.yaml"))
-    for path in written:
+    with_kalibr = {"gyro", "accel"} <= quantities
+    if with_kalibr:
+        write_kalibr(result, paths[2])
+    result.report(paths[1])
+    result.save(paths[0])
+    for path in paths if with_kalibr else paths[:2]:
         click.echo(f"wrote {path}")
+    if not with_kalibr:
+        left = "; the one in the folder is from an earlier run" if paths[2].exists() else ""
+        click.echo(f"no imu.yaml: Kalibr needs gyro and accelerometer{left}")
 
 
 if __name__ == "__main__":

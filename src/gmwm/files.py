@@ -38,6 +38,19 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
             os.unlink(name)
 
 
+def replaceable(path: Path) -> Path:
+    """The path, if a file can take its place.
+
+    Raises
+    ------
+    InputError
+        If a folder stands there.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: a folder of that name is in the way, move it")
+    return path
+
+
 def output_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder for outputs, and make sure that it can be written.
 

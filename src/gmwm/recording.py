@@ -11,6 +11,8 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.units import SI_UNIT, factor, quantity_of
 
+_SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -89,7 +91,7 @@ class Recording:
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
-            Channel name -> unit, e.g. ``{"gyro_x": "deg/s", "accel_x": "g"}``.
+            Channel name, or "gyro" and "accel" for all of them -> unit, e.g. ``{"gyro": "deg/s"}``.
         source : str, optional
         notes : tuple of str, optional
 
@@ -98,15 +100,18 @@ class Recording:
         InputError
             If the rate is not positive, or a unit is missing or unknown.
         """
-        if not (np.isfinite(rate) and rate > 0.0):
-            raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz")
+        if not _SLOWEST <= rate <= _FASTEST:
+            raise InputError(
+                f"rate = {rate!r}: give a sampling rate between {_SLOWEST:g} and {_FASTEST:g} Hz"
+            )
         channels = []
         for name, values in arrays.items():
-            if name not in units:
+            unit = units.get(name) or units.get(name.partition("_")[0])
+            if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
-            quantity = quantity_of(units[name])
+            quantity = quantity_of(unit)
             si = SI_UNIT[quantity]
-            scaled = np.asarray(values, dtype=float) * factor(units[name], si)
+            scaled = np.asarray(values, dtype=float) * factor(unit, si)
             channels.append(Channel(name, scaled, 1.0 / rate, quantity, si))
         return cls(tuple(channels), source, notes)
 

@@ -28,7 +28,7 @@ from gmwm.process import (
     WhiteNoise,
 )
 from gmwm.recording import Channel
-from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+from gmwm.variance.wavelet import WaveletVariance, as_wavelet_variance
 
 MAX_GAUSS_MARKOV = 5
 
@@ -149,7 +149,7 @@ def select(
     ranking. Models within 2 of the best are a tie, in which the smaller one wins. Of the best
     candidates the first one is chosen whose own fit finds all of its terms identifiable.
     """
-    wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
+    wv = as_wavelet_variance(data, dt)
     if not 0 <= max_gauss_markov <= MAX_GAUSS_MARKOV:
         raise InputError(
             f"max_gauss_markov = {max_gauss_markov!r}: give a number from 0 to {MAX_GAUSS_MARKOV}"

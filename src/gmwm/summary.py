@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit
-from gmwm.process import RandomWalk
+from gmwm.process import Process, RandomWalk, WhiteNoise
 from gmwm.units import field_units
 
 _REFERENCE = 1.0  # s, the averaging time at which white noise is read off an Allan plot
@@ -65,33 +66,53 @@ def floor(fitted: Fit) -> Floor:
 
 
 @dataclass(frozen=True)
-class RandomWalkBound:
-    """A random walk, or how large it may be.
+class Level:
+    """A noise level, or how large it may be.
 
     Attributes
     ----------
     value : float
-        K, u/s/sqrt(Hz).
+        In the unit of the parameter.
     found : bool
-        Whether the model has a random walk; otherwise ``value`` is an upper bound of 95 %.
+        Whether the model has it; otherwise ``value`` is an upper bound of 95 %.
     """
 
     value: float
     found: bool
 
 
-def random_walk(fitted: Fit) -> RandomWalkBound:
-    """The random walk of a model, or its upper bound where it has none.
+def noise_density(fitted: Fit) -> Level:
+    """`white_density`, or the upper bound of a white noise where no term is fast."""
+    density = white_density(fitted)
+    return (
+        Level(density, True) if density > 0.0 else Level(_bound(fitted, WhiteNoise(), "N"), False)
+    )
 
-    The bound is that of a random walk added to the model and fitted together with it.
-    """
+
+def random_walk(fitted: Fit) -> Level:
+    """The random walk of a model, or its upper bound where it has none."""
     present = fitted.params.get("K", 0.0)
-    if present > 0.0:
-        return RandomWalkBound(present, True)
+    if present > 0.0 and "K" not in fitted.upper_bounds:
+        return Level(present, True)
+    return Level(_bound(fitted, RandomWalk(), "K"), False)
+
+
+def _bound(fitted: Fit, process: Process, key: str) -> float:
+    """Upper bound of a term added to the model and fitted together with it.
+
+    Raises
+    ------
+    InputError
+        If the data do not bound it.
+    """
     opened = fitted.model.opened()
-    extended = opened if "K" in fitted.params else opened + RandomWalk()
-    again = fit(extended, fitted.wv)
-    return RandomWalkBound(float(again.interval()["K"][1]), False)
+    again = fit(opened if key in fitted.params else opened + process, fitted.wv)
+    bound = float(again.interval()[key][1])
+    if not np.isfinite(bound):
+        raise InputError(
+            f"channel {fitted.wv.name!r}: {key} cannot be bounded by this record: record longer"
+        )
+    return bound
 
 
 def sentence(fitted: Fit) -> str:

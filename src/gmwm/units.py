@@ -57,15 +57,20 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
+# Letters, and 2 or 3 as exponents: a unit is no formula.
+_PLAIN = re.compile(r"(?:[A-Za-zµ/*·()√² ]|(?<=[a-z])[23](?!\d)|\^[23](?!\d))+")
+
+
 def _quantity(text: str) -> pint.Quantity[Any]:
     """Parse a unit such as ``deg/h/sqrt(Hz)`` or ``m/s2``."""
     source = text.strip()
     expression = re.sub(r"sqrt\(([^()]*)\)|√\(?(\w+)\)?", r"((\1\2)**0.5)", source)
     expression = expression.replace("²", "**2").replace("^", "**").replace("·", "*")
     expression = re.sub(r"\b(s|sec)2\b", r"s**2", expression)
+    expression = re.sub(r"\bsec\b", "s", expression)
     try:
-        if not source:
-            raise ValueError("empty")
+        if not _PLAIN.fullmatch(source):
+            raise ValueError("no unit")
         return 1.0 * _registry().parse_expression(expression)
     except Exception as error:  # pint raises a dozen types, some of them from the tokenizer
         raise InputError(

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_UNDETERMINED = 1.0  # relative standard error at which an interval says nothing
+UNDETERMINED = 1.0
+"""Relative standard error of a positive parameter above which its interval says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +34,11 @@ class Fit:
     wv : WaveletVariance
         The data.
     keys : tuple of str
-        Names of the estimated parameters, without those at their bound.
+        Names of the estimated parameters, without those estimated as zero.
     covariance : (p, p) ndarray
         Covariance of the estimates, in the order of ``keys``, in products of their SI units.
     upper_bounds : dict
-        95 % upper bound of each parameter that was estimated as zero.
+        95 % upper bound of each amplitude that is zero or not significantly above it.
     objective : float
         Weighted sum of squares (nu_hat - nu)' Sigma^-1 (nu_hat - nu) at the estimate; chi-square
         with ``dof`` degrees of freedom if the model is right.
@@ -93,8 +94,8 @@ class Fit:
         """Confidence intervals that keep to the parameters' ranges.
 
         Positive parameters have intervals in the logarithm, with quantiles of Student's t for the
-        degrees of freedom that their relative error stands for; a parameter estimated as zero
-        goes from zero to its upper bound (which is one of 95 %).
+        degrees of freedom that their relative error stands for; one that is not significantly above
+        zero goes from zero to its upper bound (which is one of 95 %).
 
         Parameters
         ----------
@@ -117,7 +118,7 @@ class Fit:
         for item in self.model.parameters:
             key, value = item.key, params[item.key]
             if key in self.upper_bounds:
-                result[key] = (0.0, self.upper_bounds[key])
+                result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
                 result[key] = _interval(item, value, errors[key], level)
         return result
@@ -125,7 +126,7 @@ class Fit:
     @property
     def n_estimated(self) -> int:
         """Number of parameters that were left open."""
-        return len(self.keys) + len(self.upper_bounds)
+        return len({*self.keys, *self.upper_bounds})
 
     # -- curves -----------------------------------------------------------------------------------
 
@@ -257,7 +258,10 @@ class Fit:
             "stderr": self.stderr,
             "keys": list(self.keys),
             "covariance": self.covariance.tolist(),
-            "upper_bounds": self.upper_bounds,
+            "upper_bounds": {
+                key: bound if np.isfinite(bound) else None
+                for key, bound in self.upper_bounds.items()
+            },
             "objective": self.objective,
             "dof": self.dof,
             "discrepancy": self.discrepancy,
@@ -279,7 +283,10 @@ class Fit:
             wv=WaveletVariance.from_dict(content["wavelet_variance"]),
             keys=tuple(content["keys"]),
             covariance=np.array(content["covariance"], dtype=float).reshape(p, p),
-            upper_bounds=dict(content["upper_bounds"]),
+            upper_bounds={
+                key: float("inf") if bound is None else bound
+                for key, bound in content["upper_bounds"].items()
+            },
             objective=content["objective"],
             dof=content["dof"],
             discrepancy=content["discrepancy"],
@@ -297,7 +304,7 @@ def _interval(
     parameter = item.parameter
     if parameter.lower == 0.0 and value > 0.0:
         relative = error / value
-        if relative > _UNDETERMINED:
+        if relative > UNDETERMINED:
             return 0.0, parameter.upper
         # A variance known to a relative error of r is one of 2/r^2 degrees of freedom.
         quantile = float(t.ppf(0.5 + 0.5 * level, max(2.0 / relative**2, 1.0)))
@@ -314,6 +321,7 @@ def _row(row: dict[str, Any]) -> str:
     if row["kind"] == "given":
         return f"{head} {row['value']:>11.5g} {'':>10}  {'given':<23} {row['unit']}"
     if row["kind"] == "bound":
-        return f"{head} {0:>11} {'':>10}  {'< ' + format(row['upper'], '.4g'):<23} {row['unit']}"
+        bound = f"< {row['upper']:.4g}"
+        return f"{head} {row['value']:>11.5g} {'':>10}  {bound:<23} {row['unit']}"
     interval = f"{row['lower']:.4g} .. {row['upper']:.4g}"
     return f"{head} {row['value']:>11.5g} {row['stderr']:>10.2g}  {interval:<23} {row['unit']}"

@@ -30,7 +30,7 @@ from gmwm.estimate.uncertainty import describe
 from gmwm.process import Model, Process, RateRamp, Sinusoid, as_model
 from gmwm.recording import Channel
 from gmwm.variance.covariance import haar_covariance, line_covariance
-from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+from gmwm.variance.wavelet import WaveletVariance, as_wavelet_variance
 
 WEIGHTS = ("model", "diagonal", "identity")
 METHODS = ("gmwm",)
@@ -155,7 +155,7 @@ def fit(
     if discrepancy is not None and not 0.0 <= discrepancy < 1.0:
         raise InputError(f"discrepancy = {discrepancy!r}: give a share of the variance, e.g. 0.02")
     model = as_model(model)
-    wv = data if isinstance(data, WaveletVariance) else wavelet_variance(data, dt)
+    wv = as_wavelet_variance(data, dt)
     if not model.is_open:
         raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
     return _fit(model, wv, omega, discrepancy)

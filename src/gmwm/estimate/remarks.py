@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from scipy.stats import chi2
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.design import Design
+from gmwm.estimate.fit import UNDETERMINED
+from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.process import GaussMarkov, Model
 from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
@@ -17,13 +20,14 @@ _SHAPE_EDGE = 0.05  # in z, from the limit of the search
 _MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation times
 _POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
 _POOR_DOF = 30.0
+_IDLE_P = 0.01
 
 
 def bound_remarks(model: Model, upper: dict[str, float]) -> list[str]:
-    """Parameters estimated as zero."""
+    """Amplitudes that are zero or not significantly above it."""
     return [
-        f"{key} is not identifiable from these data (estimate zero): below {bound:.3g} with 95 % "
-        "confidence"
+        f"{key} is not identifiable from these data (not significantly above zero): below "
+        f"{bound:.3g} with 95 % confidence"
         for key, bound in upper.items()
     ]
 
@@ -65,6 +69,47 @@ def merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> l
                 f"{second} = {b:.3g} s): use one less"
             )
     return remarks
+
+
+def idle_remarks(
+    design: Design, point: Point, target: FloatArray, covariance: FloatArray
+) -> list[str]:
+    """Terms whose shape was searched for, and that the data can do without.
+
+    The amplitude alone does not tell: among all shapes one always fits some accident of the data.
+    The objective without the term does, at one per cent shared among the levels where a term of
+    this kind might have been found.
+    """
+    root = weight_root(covariance)
+    remarks = []
+    amplitudes = design.amplitudes(point.x)
+    for i in design.shaped:
+        others = [k for k in range(len(design.terms)) if k != i]
+        if amplitudes[i] == 0.0 or i not in design.linear or not others:
+            continue
+        model = Model(tuple(design.terms[k].process for k in others))
+        reduced = Profile(Design(model, design.tau, design.dt, design.n), target, root)
+        without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
+        freed = 1 + int(np.sum(design.terms[i].free_shape))
+        if without - point.objective < chi2.isf(_IDLE_P / target.size, freed):
+            remarks.append(
+                f"a {design.terms[i].process.title()} term does not improve the fit significantly: "
+                "it is not identifiable, leave it out"
+            )
+    return remarks
+
+
+def undetermined_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:
+    """Shapes whose standard error is as large as they are."""
+    errors = dict(zip(keys, np.sqrt(np.diag(matrix)), strict=True))
+    return [
+        f"{item.key} is not determined by this record (standard error {errors[item.key]:.2g})"
+        for item in model.parameters
+        if item.key in errors
+        and item.parameter.role == "shape"
+        and item.parameter.lower == 0.0
+        and errors[item.key] > UNDETERMINED * (item.value or 0.0)
+    ]
 
 
 def count_remarks(design: Design, sub: Design) -> list[str]:

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import suffices
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
@@ -184,6 +185,11 @@ def dictionary_fit(
             for (i, shape), value in zip(atoms, x, strict=True)
             if value > 0.0
         ]
+        if not mixture:
+            raise InputError(
+                f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
+                "line or a pattern): check the data"
+            )
         covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
     return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
 

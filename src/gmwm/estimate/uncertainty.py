@@ -16,15 +16,18 @@ from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
     bound_remarks,
     count_remarks,
+    idle_remarks,
     merged_remarks,
     misfit,
     shape_remarks,
+    undetermined_remarks,
 )
 from gmwm.process import Model, Process
 from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
 
 _UPPER_LEVEL = 0.95
+_SIGNIFICANT = 1.645  # standard errors above zero, one-sided 5 %
 
 
 def describe(
@@ -85,6 +88,8 @@ def describe(
     remarks = [
         *bound_remarks(model, upper),
         *shape_remarks(sub, shapes, x),
+        *idle_remarks(sub, Point(shapes, x, objective), target, covariance),
+        *undetermined_remarks(model, keys, matrix),
         *merged_remarks(model, keys, matrix),
         *count_remarks(design, sub),
     ]
@@ -135,12 +140,13 @@ def _linearise(
     places: Sequence[int],
     model: Model,
 ) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
-    """Keys and covariance of the free parameters; upper bounds of those estimated as zero.
+    """Keys and covariance of the free parameters; upper bounds of those not above zero.
 
     The covariance is the sandwich B V B' with B = (D' Omega D)^-1 D' Omega of the wavelet
     variances' covariance V, in the parameters' own units. A term of zero amplitude has no
     covariance; the bound of its amplitude is the quantile of the normal distribution of the
-    unconstrained estimate, cut at zero.
+    unconstrained estimate, cut at zero. The same bound is given for an amplitude that is not
+    significantly above zero.
     """
     amplitudes = design.amplitudes(x)
     curves = design.curves(shapes)
@@ -152,6 +158,7 @@ def _linearise(
     natural = _sandwich(jacobian, covariance, omega)
     by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
     keys: list[str] = []
+    upper: dict[str, float] = {}
     transform = np.zeros((jacobian.shape[1], jacobian.shape[1]))
     for row, k in enumerate(positive):
         i = design.linear[k]
@@ -159,6 +166,10 @@ def _linearise(
         keys.append(by_term[places[i], parameter.name])
         value = amplitudes[i] ** (1.0 / parameter.power)
         transform[row, row] = value / (parameter.power * amplitudes[i])
+        deviation = float(np.sqrt(natural[row, row]))
+        if i not in design.shaped and amplitudes[i] < _SIGNIFICANT * deviation:
+            bound = _quantile_above_zero(float(amplitudes[i]), deviation)
+            upper[keys[-1]] = bound ** (1.0 / parameter.power)
     start = len(positive)
     for i in design.shaped:
         columns = [start + alive.index(k) for k, owner in enumerate(owners)
@@ -171,7 +182,6 @@ def _linearise(
         keys.extend(by_term[places[i], name] for name in names)
         transform[np.ix_(columns, columns)] = block
     matrix = transform @ natural @ transform.T
-    upper: dict[str, float] = {}
     for i in design.linear:
         if amplitudes[i] == 0.0:
             parameter = design.terms[i].linear_parameter
@@ -234,6 +244,10 @@ def _upper_amplitude(
         return float("inf")
     deviation = 1.0 / np.sqrt(information)
     centre = float(column @ (root @ residual)) / information
-    # Quantile of N(centre, deviation^2) restricted to positive values.
+    return _quantile_above_zero(centre, deviation)
+
+
+def _quantile_above_zero(centre: float, deviation: float) -> float:
+    """Quantile of N(centre, deviation^2) restricted to positive values."""
     tail = norm.sf(-centre / deviation) * (1.0 - _UPPER_LEVEL)
     return centre + deviation * float(norm.isf(tail))

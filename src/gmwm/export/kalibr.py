@@ -12,7 +12,7 @@ from pathlib import Path
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.files import written
-from gmwm.summary import random_walk, white_density
+from gmwm.summary import Level, noise_density, random_walk
 
 _SENSORS = (
     ("accel", "accelerometer", "m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"),
@@ -29,7 +29,8 @@ def kalibr_text(calibration: Calibration) -> str:
     Raises
     ------
     InputError
-        If the calibration has no gyro or no accelerometer, which Kalibr needs both.
+        If the calibration has no gyro or no accelerometer, which Kalibr needs both, or the record
+        bounds a value in no way.
     """
     lines = [f"# {calibration.source or 'recording'}, {calibration.duration:.0f} s static"]
     for quantity, name, density_unit, walk_unit in _SENSORS:
@@ -38,22 +39,29 @@ def kalibr_text(calibration: Calibration) -> str:
             raise InputError(
                 f"imu.yaml needs gyro and accelerometer, there is no {name}: calibrate both"
             )
-        densities = {key: white_density(fitted) for key, fitted in fits.items()}
-        lines.append(f"{name}_noise_density: {max(densities.values()):.6e}  # {density_unit}")
-        lines.append(f"#   by axis: {_listed(densities)}")
+        densities = {key: noise_density(fitted) for key, fitted in fits.items()}
+        lines += _entry(f"{name}_noise_density", density_unit, "white noise", densities)
         walks = {key: random_walk(fitted) for key, fitted in fits.items()}
-        found = {key: walk.value for key, walk in walks.items() if walk.found}
-        if found:
-            lines.append(f"{name}_random_walk: {max(found.values()):.6e}  # {walk_unit}")
-            lines.append(f"#   by axis: {_listed(found)}")
-        else:
-            bounds = {key: walk.value for key, walk in walks.items()}
-            lines.append(f"{name}_random_walk: {max(bounds.values()):.6e}  # {walk_unit}")
-            lines.append("#   no random walk was found: this is the largest 95 % upper bound")
-            lines.append(f"#   of the axes: {_listed(bounds)}")
+        lines += _entry(f"{name}_random_walk", walk_unit, "random walk", walks)
+    doubtful = [name for name, fitted in calibration.fits.items() if not fitted.valid]
+    if doubtful:
+        lines.append(f"# not valid, see the report before use: {', '.join(doubtful)}")
     lines.append("rostopic: /imu0  # set to the topic of your bag")
     lines.append(f"update_rate: {calibration.rate:.6g}  # Hz")
     return "\n".join(lines) + "\n"
+
+
+def _entry(key: str, unit: str, what: str, levels: dict[str, Level]) -> list[str]:
+    """A value with its comments; the largest that was found, or else the largest bound."""
+    found = {name: level.value for name, level in levels.items() if level.found}
+    chosen = found or {name: level.value for name, level in levels.items()}
+    lines = [f"{key}: {max(chosen.values()):.6e}  # {unit}"]
+    if not found:
+        lines.append(f"#   no {what} was found: this is the largest 95 % upper bound")
+    by_axis = [
+        f"{name} {'' if level.found else '< '}{level.value:.3e}" for name, level in levels.items()
+    ]
+    return [*lines, f"#   by axis: {', '.join(by_axis)}"]
 
 
 def write_kalibr(calibration: Calibration, path: str | os.PathLike[str]) -> Path:
@@ -68,7 +76,3 @@ def write_kalibr(calibration: Calibration, path: str | os.PathLike[str]) -> Path
     with written(path) as stream:
         stream.write(text)
     return Path(path)
-
-
-def _listed(values: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.3e}" for name, value in values.items())

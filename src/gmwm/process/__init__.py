@@ -42,20 +42,29 @@ def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
     Raises
     ------
     InputError
-        For a process that is not built in, or parameters it does not have.
+        For a process that is neither built in nor defined in a module imported so far, or
+        parameters it does not have.
     """
-    kinds = {kind.__name__: kind for kind in CATALOGUE}
+    kinds = {kind.__name__: kind for kind in _subclasses(Process)}
     terms = []
     for item in content:
         arguments = dict(item)
         name = arguments.pop("process", None)
         if name not in kinds:
-            raise InputError(f"unknown process {name!r}: built in are {', '.join(kinds)}")
+            raise InputError(
+                f"unknown process {name!r}: import the module that defines it first (built in are "
+                f"{', '.join(kind.__name__ for kind in CATALOGUE)})"
+            )
         try:
             terms.append(kinds[name](**arguments))
         except TypeError as error:
             raise InputError(f"{name}: {error}") from None
     return Model(tuple(terms))
+
+
+def _subclasses(kind: type[Any]) -> list[type[Any]]:
+    direct = kind.__subclasses__()
+    return [*direct, *(child for item in direct for child in _subclasses(item))]
 
 
 __all__ = [

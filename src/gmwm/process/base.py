@@ -302,6 +302,11 @@ class Process(ABC):
 
         return Model((self,)) + other
 
+    def __radd__(self, other: Any) -> Any:
+        from gmwm.process.model import Model
+
+        return other + Model((self,)) if other else Model((self,))
+
     def __rmul__(self, times: int) -> Any:
         from gmwm.process.model import Model
 

@@ -199,6 +199,10 @@ class Model:
             return Model((*self.terms, *other.terms))
         return NotImplemented
 
+    def __radd__(self, other: Any) -> Model:
+        # sum([...]) starts from 0
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
     def __rmul__(self, times: int) -> Model:
         if isinstance(times, bool) or not isinstance(times, int):
             return NotImplemented

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.special import expit
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
 
 PSD = Callable[[FloatArray, float], FloatArray]
 """``psd(f, dt)``: two-sided density in u^2/Hz at frequencies f in Hz."""
@@ -60,11 +61,32 @@ class Quadrature:
 
     def sampled(self, psd: PSD, dt: float) -> FloatArray:
         """``psd`` at the nodes per unit of normalised frequency, in u^2, shape (K,)."""
-        return np.asarray(psd(self.frequency / dt, dt), dtype=float) / dt
+        return evaluated(psd, self.frequency / dt, dt) / dt
 
     def haar_variance(self, psd: PSD, dt: float) -> FloatArray:
         """Wavelet variance of every averaging time, in u^2, shape (J,)."""
         return 2.0 * (self.gain @ (self.weight * self.sampled(psd, dt)))
+
+
+def evaluated(psd: PSD, f: FloatArray, dt: float) -> FloatArray:
+    """``psd(f, dt)``, checked: a user's own may be anything.
+
+    Raises
+    ------
+    InputError
+        If it is not one finite, non-negative number a frequency.
+    """
+    density = np.asarray(psd(f, dt), dtype=float)
+    if density.shape != f.shape:
+        raise InputError(
+            f"psd gives shape {density.shape} for frequencies of shape {f.shape}: return one value "
+            "for each frequency"
+        )
+    if not (np.all(np.isfinite(density)) and np.all(density >= 0.0)):
+        raise InputError(
+            "psd gives negative, NaN or infinite values: check it over 0 < f <= 1/(2 dt)"
+        )
+    return density
 
 
 def haar_gain(m: float, frequency: FloatArray) -> FloatArray:

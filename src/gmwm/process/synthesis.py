@@ -7,7 +7,7 @@ import numpy as np
 from scipy import fft
 
 from gmwm._typing import FloatArray
-from gmwm.process.spectral import PSD
+from gmwm.process.spectral import PSD, evaluated
 from gmwm.process.state_space import StateSpace
 
 _BLOCK = 100_000
@@ -98,7 +98,7 @@ def from_psd(psd: PSD, n: int, dt: float, rng: np.random.Generator) -> FloatArra
     size += size % 2
     frequency = np.arange(size // 2 + 1) / size
     frequency[0] = 1e-4 / size
-    spectrum = np.asarray(psd(frequency / dt, dt), dtype=float) / dt
+    spectrum = evaluated(psd, frequency / dt, dt) / dt
     if spectrum[0] <= 2.0 * spectrum[1]:
         return circulant(spectrum, n, rng)
     difference = spectrum * 4.0 * np.sin(np.pi * frequency) ** 2

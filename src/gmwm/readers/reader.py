@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -90,10 +91,12 @@ def read(
 
 
 def _open(path: Path) -> Table:
-    if path.is_dir():
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):  # ValueError: a null character in the name
+        raise InputError(f"{str(path)[:200]!r} does not exist: check the path") from None
+    if stat.S_ISDIR(mode):
         raise InputError(f"{path} is a directory: name a file in it")
-    if not path.exists():
-        raise InputError(f"{path} does not exist: check the path")
     if path.suffix.lower() in (".npy", ".npz"):
         return ArrayTable.open(path)
     return CsvTable.open(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MAX_BLOCKS = 2048
+_SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
 MIN_SAMPLES = 8
 """Fewest samples of which a wavelet variance is made."""
 
@@ -211,6 +213,9 @@ def wavelet_variance(
         raise InputError(f"confidence = {confidence!r}: give a number between 0 and 1, e.g. 0.95")
     if channel.is_constant:
         raise InputError(f"{where} is constant ({values[0]:g}): a dead channel has no noise model")
+    size = float(np.max(np.abs(values - values[0])))
+    if not _SMALLEST < size < _LARGEST:
+        raise InputError(f"{where} varies by {size:.1g}: that is no sensor noise, check the unit")
     mean = float(np.mean(values))
     integral = cumulative(values, mean)
     averaging = dyadic_levels(values.size)
@@ -232,10 +237,27 @@ def wavelet_variance(
     )
 
 
+def as_wavelet_variance(
+    data: WaveletVariance | Channel | FloatArray, dt: float | None
+) -> WaveletVariance:
+    """A wavelet variance as it is, or that of a series.
+
+    Raises
+    ------
+    InputError
+        If a sampling interval is given for a wavelet variance, which has its own.
+    """
+    if not isinstance(data, WaveletVariance):
+        return wavelet_variance(data, dt)
+    if dt is not None:
+        raise InputError("a wavelet variance has its own sampling interval: leave dt out")
+    return data
+
+
 def _as_channel(data: FloatArray, dt: float | None) -> Channel:
     if dt is None:
         raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")
-    if not (np.isfinite(dt) and dt > 0.0):
+    if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
     try:
         values = np.asarray(data, dtype=float)
