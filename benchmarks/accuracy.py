@@ -70,7 +70,9 @@ def main(runs):
             ratio = np.array([params[key] for params, _, _ in results]) ** power / true**power
             rmse = np.sqrt(np.mean((ratio - 1.0) ** 2))
             inside = [
-                bounds[key][0] <= true <= bounds[key][1] for _, bounds, _ in results if key in bounds
+                bounds[key][0] <= true <= bounds[key][1]
+                for _, bounds, _ in results
+                if key in bounds
             ]
             print(
                 f"| {title} | {name} | {rmse:.3g} | {rmse / bound:.2f} | "

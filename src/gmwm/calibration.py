@@ -118,12 +118,14 @@ class Calibration:
                 fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
                 skipped=dict(content["skipped"]),
                 source=content["source"],
-                rate=content["rate_hz"],
-                n=content["n"],
+                rate=float(content["rate_hz"]),
+                n=int(content["n"]),
                 notes=tuple(content["notes"]),
             )
-        except InputError:
-            raise
+        except InputError as error:
+            raise InputError(
+                f"the calibration cannot be rebuilt ({error}): calibrate again"
+            ) from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"the calibration is damaged ({error!r}): calibrate again") from None
 
@@ -198,7 +200,8 @@ def calibrate(
     """
     if isinstance(model, Mapping):
         for channel in recording:
-            _model_of(channel, model)
+            if not channel.is_constant:
+                _model_of(channel, model)
     dead = {c.name: f"constant at {c.values[0]:.6g} {c.unit}" for c in recording if c.is_constant}
     alive = [c for c in recording if c.name not in dead]
     if not alive:

@@ -63,7 +63,7 @@ def calibrate(
     time_column: str | None,
     jobs: int | None,
 ) -> None:
-    r"""Calibrate every channel of a static recording.
+    """Calibrate every channel of a static recording.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
     For each channel an error model is selected and estimated; the table shows it in the units of
@@ -84,8 +84,10 @@ def calibrate(
     )
     with _progress(recording, "calibrating") as progress:
         result = run(recording, jobs=jobs, progress=progress)
+    # The files first: who pipes the table into head must not lose them.
+    written = _write(result, folder)
     _show(result)
-    _write(result, folder)
+    click.echo(written)
 
 
 @cli.command()
@@ -94,7 +96,7 @@ def calibrate(
               help="Length of the simulated recording in hours.")  # fmt: skip
 @click.option("--seed", type=int, default=1, show_default=True)
 def demo(output: Path, hours: float, seed: int) -> None:
-    r"""Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
+    """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
 
     The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
 
@@ -115,14 +117,14 @@ def demo(output: Path, hours: float, seed: int) -> None:
         fitted = run(recording, forms, progress=progress)
     with _progress(recording, "selecting") as progress:
         selected = run(recording, progress=progress)
+    written = _write(selected, folder)
     click.echo(f"{recording.source}: {duration_text(recording.duration)} at {recording.rate:g} Hz")
     click.echo("\nTruth and estimate, the form of each model known:\n")
     _show_truth(fitted, truth)
     click.echo("\nSelected where the form is not known, as gmwm calibrate does:\n")
     for name, fit in selected.fits.items():
         click.echo(f"  {name:8}  {describe(fit.model)}")
-    click.echo()
-    _write(selected, folder)
+    click.echo(f"\n{written}")
 
 
 def main() -> None:
@@ -176,13 +178,15 @@ def _progress(recording: Recording, what: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    console = Console(stderr=True)
     bar = Progress(
         TextColumn(what),
         BarColumn(),
         TextColumn("{task.completed}/{task.total} channels {task.description}"),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=console,
         transient=True,
+        disable=not console.is_terminal,
     )
     with bar:
         task = bar.add_task("", total=len(recording))
@@ -202,7 +206,7 @@ def _show(result: Calibration) -> None:
         f"{result.n:,} samples a channel",
         highlight=False,
     )
-    console.print(_table(result))
+    _print_whole(console, _table(result))
     for note in result.notes:
         console.print(f"- {note}", highlight=False)
     for name, why in result.skipped.items():
@@ -212,11 +216,19 @@ def _show(result: Calibration) -> None:
             console.print(f"- {name}: {remark}", highlight=False)
 
 
-def _console() -> Console:
+def _console(width: int | None = None) -> Console:
     from rich.console import Console
 
     # Piped output is as wide as a terminal that people use, not as rich guesses.
-    return Console(width=None if sys.stdout.isatty() else 80)
+    return Console(width=width or (None if sys.stdout.isatty() else 80))
+
+
+def _print_whole(console: Console, table: Table) -> None:
+    """Print a table at the width that it needs: a number that is cut off is a wrong number."""
+    from rich.measure import Measurement
+
+    needed = Measurement.get(console, console.options.update(width=10_000), table).maximum
+    _console(max(console.width, needed)).print(table)
 
 
 def _table(result: Calibration) -> Table:
@@ -246,7 +258,7 @@ def _show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
     """One table of truth beside estimate."""
     from gmwm.demo import compare
 
-    table = _new_table("channel", "param.", ">truth", ">estimate", "95 % interval", "unit", "")
+    table = _new_table("channel", "param.", ">truth", ">estimate", "95 % interval", "unit")
     determined = covered = total = 0
     for name, fit in fitted.fits.items():
         rows = compare(fit, truth[name])
@@ -259,15 +271,16 @@ def _show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
                 cells = ["-", "too short to tell"]
             elif row.lower == 0.0:
                 cells = [f"{row.estimate:.3g}", f"below {row.upper:.4g}"]
-            mark = "" if row.covered else "outside"
+            if not row.covered:
+                cells[1] += " *"
             first = name if i == 0 else ""
-            table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit, mark,
+            table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit,
                           end_section=i == len(rows) - 1)  # fmt: skip
     console = _console()
-    console.print(table)
+    _print_whole(console, table)
     console.print(
         f"{determined} of {total} parameters are determined by this record; {covered} of these "
-        f"{determined} intervals hold the truth.",
+        f"{determined} intervals hold the truth (* does not).",
         highlight=False,
     )
 
@@ -284,23 +297,23 @@ def _new_table(*columns: str) -> Table:
     return table
 
 
-def _write(result: Calibration, folder: Path) -> None:
+def _write(result: Calibration, folder: Path) -> str:
+    """Write the files; returns what to say of them."""
     from gmwm.export import write_kalibr
     from gmwm.files import replaceable
 
-    names = ("calibration.json", "report.html", "imu.yaml")
-    paths = [replaceable(folder / name) for name in names]
+    paths = [replaceable(folder / name) for name in ("calibration.json", "report.html")]
+    kalibr = replaceable(folder / "imu.yaml")
     quantities = {fit.wv.quantity for fit in result.fits.values()}
-    with_kalibr = {"gyro", "accel"} <= quantities
-    if with_kalibr:
-        write_kalibr(result, paths[2])
+    lines = []
+    if {"gyro", "accel"} <= quantities:
+        write_kalibr(result, kalibr)
+        paths.append(kalibr)
+    elif kalibr.exists():
+        lines = [f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer"]
     result.report(paths[1])
     result.save(paths[0])
-    for path in paths if with_kalibr else paths[:2]:
-        click.echo(f"wrote {path}")
-    if not with_kalibr:
-        left = "; the one in the folder is from an earlier run" if paths[2].exists() else ""
-        click.echo(f"no imu.yaml: Kalibr needs gyro and accelerometer{left}")
+    return "\n".join([f"wrote {path}" for path in paths] + lines)
 
 
 if __name__ == "__main__":

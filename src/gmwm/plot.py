@@ -72,7 +72,11 @@ def deviation(
 
 
 def curves(
-    ax: Axes, tau: FloatArray, total: FloatArray, components: Mapping[str, FloatArray]
+    ax: Axes,
+    tau: FloatArray,
+    total: FloatArray,
+    components: Mapping[str, FloatArray],
+    data: FloatArray | None = None,
 ) -> None:
     """Fitted curve and its components over the data of `deviation`.
 
@@ -85,17 +89,21 @@ def curves(
         Deviation of the sum.
     components : mapping of str to (J,) ndarray
         Deviations of the terms by label.
+    data : (J,) ndarray, optional
+        Deviations of the data, to keep in view.
     """
     for colour, (label, value) in zip(_cycle(len(components)), components.items(), strict=True):
         ax.plot(tau, value, color=colour, linewidth=1.3, linestyle="--", label=label, zorder=2)
     ax.plot(tau, total, color=SUM_COLOUR, linewidth=1.8, label="model", zorder=3)
-    ax.set_ylim(*deviation_range(total))
+    shown = total if data is None else np.concatenate([total, data])
+    ax.set_ylim(*deviation_range(shown))
     ax.legend(fontsize="small", framealpha=0.9)
 
 
-def deviation_range(total: FloatArray) -> tuple[float, float]:
-    """Limits of the deviation axis that show the data and hide components far below them."""
-    low, high = float(np.min(total)), float(np.max(total))
+def deviation_range(shown: FloatArray) -> tuple[float, float]:
+    """Limits of the deviation axis that show these and hide components far below them."""
+    shown = shown[shown > 0.0]
+    low, high = float(np.min(shown)), float(np.max(shown))
     return low / 10**_DECADES_SHOWN_BELOW, high * 10**0.4
 
 

@@ -91,19 +91,19 @@ class Recording:
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
-            Channel name, or "gyro" and "accel" for all of them -> unit, e.g. ``{"gyro": "deg/s"}``.
+            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
         source : str, optional
         notes : tuple of str, optional
 
         Raises
         ------
         InputError
-            If the rate is not positive, or a unit is missing or unknown.
+            If the rate is not positive, a unit is missing or unknown, or the channels are not
+            series of numbers of one length.
         """
         if not _SLOWEST <= rate <= _FASTEST:
-            raise InputError(
-                f"rate = {rate!r}: give a sampling rate between {_SLOWEST:g} and {_FASTEST:g} Hz"
-            )
+            limits = f"{_SLOWEST:g} to {_FASTEST:g}"
+            raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
         channels = []
         for name, values in arrays.items():
             unit = units.get(name) or units.get(name.partition("_")[0])
@@ -111,8 +111,12 @@ class Recording:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
             quantity = quantity_of(unit)
             si = SI_UNIT[quantity]
-            scaled = np.asarray(values, dtype=float) * factor(unit, si)
+            scaled = _series(name, values) * factor(unit, si)
             channels.append(Channel(name, scaled, 1.0 / rate, quantity, si))
+        lengths = {channel.name: channel.n for channel in channels}
+        if len(set(lengths.values())) != 1:
+            listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
+            raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
         return cls(tuple(channels), source, notes)
 
     @property
@@ -155,3 +159,13 @@ class Recording:
     def __str__(self) -> str:
         head = f"{self.source or 'recording'}: {self.rate:g} Hz, {self.duration:.6g} s"
         return "\n".join([head, *(f"  {channel}" for channel in self.channels), *self.notes])
+
+
+def _series(name: str, values: FloatArray) -> FloatArray:
+    try:
+        series = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"channel {name!r} holds something that is not a number") from None
+    if series.ndim != 1:
+        raise InputError(f"channel {name!r} has shape {series.shape}: give one series of samples")
+    return series

@@ -57,8 +57,9 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
-# Letters, and 2 or 3 as exponents: a unit is no formula.
-_PLAIN = re.compile(r"(?:[A-Za-zµ/*·()√² ]|(?<=[a-z])[23](?!\d)|\^[23](?!\d))+")
+# Letters and small exponents: a unit is no formula to be worked out.
+_EXPONENT = r"(?:\^|\*\*|(?<=[a-z]))-?[123](?!\d)"
+_PLAIN = re.compile(rf"(?:1/)?(?:[A-Za-zµ/·()√²]|\s|\*(?=[A-Za-z])|{_EXPONENT})+")
 
 
 def _quantity(text: str) -> pint.Quantity[Any]:
@@ -123,7 +124,9 @@ def quantity_of(unit: str) -> str:
             _quantity(unit)
         else:
             return quantity
-    raise InputError(f"unit {unit!r} is neither an angular rate nor a specific force")
+    raise InputError(
+        f"unit {unit!r} is neither an angular rate nor a specific force: use one such as deg/s or g"
+    )
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,9 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
     base = SI_UNIT.get(quantity or "", "u")
     if not parameter_unit.startswith("u"):
         return parameter_unit
-    return {"u s": f"{base} s", "u": base}.get(parameter_unit, base + parameter_unit[1:])
+    return {"u s": f"{base} s", "u": base, "u^2": f"({base})^2"}.get(
+        parameter_unit, base + parameter_unit[1:]
+    )
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:

@@ -48,7 +48,7 @@ def test_simulated_recording():
         assert channel.name.startswith(channel.quantity)
         assert channel.unit == {"gyro": "rad/s", "accel": "m/s^2"}[channel.quantity]
         assert truth[channel.name] == model
-        # At one sample white noise rules: its level is known to a per cent.
+        # At one sample the level is known to 1.7 % (1 sigma).
         wv = gmwm.wavelet_variance(channel)
         expected = model.haar_variance(wv.tau[:1], wv.dt)
         np.testing.assert_allclose(wv.variance[:1], expected, rtol=0.08)
@@ -61,6 +61,14 @@ def test_the_seed_decides():
         assert not np.array_equal(one[name].values, other[name].values)
     axes = np.array([one[f"gyro_{axis}"].values for axis in "xyz"])
     assert np.abs(np.corrcoef(axes)[np.triu_indices(3, 1)]).max() < 0.2  # axes are independent
+
+
+def test_a_ramp_is_tried_on_three_minutes_of_it():
+    # The coarsest level is two averages of the whole record; without its slope little is left.
+    gyro = simulated_imu(180.0, seed=1)[0]["gyro_x"]
+    fit = gmwm.fit(WhiteNoise() + GaussMarkov() + RateRamp(), gyro)
+    assert np.all(np.isfinite(list(fit.params.values())))
+    assert np.all(np.diag(fit.covariance) > 0.0)
 
 
 # -- truth beside estimate ------------------------------------------------------------------------

@@ -32,7 +32,6 @@ PARAMETER_UNITS = sorted(
         ("m/s^2", "m/s^2", 1.0),
         ("m/s2", "m/s^2", 1.0),
         ("m/s²", "m/s^2", 1.0),
-        ("m/s**2", "m/s^2", 1.0),
         ("g", "m/s^2", GRAVITY),
         (" g ", "m/s^2", GRAVITY),
         ("mg", "m/s^2", 1e-3 * GRAVITY),
@@ -61,7 +60,22 @@ def test_conversion(unit, si_unit, expected):
 
 @pytest.mark.parametrize(
     "unit",
-    ["furlong", "", "  ", "deg//s", "m/s^", "deg/s/0", "__import__('os')", "Deg/s", "deg/sqrt(h"],
+    [
+        "furlong",
+        "",
+        "  ",
+        "deg//s",
+        "m/s^",
+        "Deg/s",
+        "deg/sqrt(h",
+        "__import__('os')",
+        # A unit is no formula.
+        "deg/s/0",
+        "0*g",
+        "-g",
+        "1e400*g",
+        "9**9**9*g",
+    ],
 )
 def test_unknown_unit_is_refused_with_examples(unit):
     with pytest.raises(InputError) as caught:
@@ -78,8 +92,7 @@ def test_unknown_unit_is_refused_with_examples(unit):
         ("g", "rad/s"),
         ("deg/s", "m/s^2"),
         ("deg", "rad/s"),
-        ("1/s", "rad/s"),  # the angle is a dimension: a frequency is no angular rate
-        ("Hz", "rad/s"),
+        ("Hz", "rad/s"),  # the angle is a dimension: a frequency is no angular rate
         ("m/s", "m/s^2"),
         ("deg/s", "rad/s/sqrt(Hz)"),
     ],
@@ -100,7 +113,7 @@ def test_quantity_of():
     assert quantity_of("mg") == "accel"
 
 
-@pytest.mark.parametrize("unit", ["m", "deg", "1/s", "deg/sqrt(h)"])
+@pytest.mark.parametrize("unit", ["m", "deg", "Hz", "deg/sqrt(h)"])
 def test_unit_of_no_sensor_is_refused_with_the_mend(unit):
     with pytest.raises(InputError) as caught:
         quantity_of(unit)

@@ -245,7 +245,8 @@ class Fit:
             ax=ax,
         )
         components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
-        plot.curves(axes, wv.tau, np.sqrt(2.0 * self.implied), components)
+        total = np.sqrt(2.0 * self.implied)
+        plot.curves(axes, wv.tau, total, components, wv.allan_deviation)
         return axes
 
     # -- tables and files -------------------------------------------------------------------------
@@ -277,9 +278,13 @@ class Fit:
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Fit:
         """Inverse of `to_dict`."""
+        model = model_from_list(content["model"])
+        unknown = set(content["keys"]) - set(model.params)
+        if model.is_open or unknown:
+            raise InputError(f"its model {model!r} and its parameters do not belong together")
         p = len(content["keys"])
         return cls(
-            model=model_from_list(content["model"]),
+            model=model,
             wv=WaveletVariance.from_dict(content["wavelet_variance"]),
             keys=tuple(content["keys"]),
             covariance=np.array(content["covariance"], dtype=float).reshape(p, p),

@@ -19,6 +19,8 @@ from gmwm.process.spectral import PSD
 from gmwm.variance.covariance import block_density, mean_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
+_LARGEST_SHARE = 0.95  # of a level's variance that detrending may take
+
 
 @dataclass(frozen=True)
 class Slope:
@@ -77,4 +79,7 @@ def detrended_covariance(
     """
     common = 0.25 * np.outer(wv.tau, wv.tau) * slope.variance
     means = mean_covariance(psd, wv.n, wv.dt)
-    return np.asarray(covariance - 4.0 * common * means + 2.0 * common**2)
+    taken = 4.0 * common * means - 2.0 * common**2
+    # c is a mean over the record; at the coarsest levels it can take more than there is.
+    excess = np.maximum(np.diag(taken) / np.diag(covariance) / _LARGEST_SHARE, 1.0)
+    return np.asarray(covariance - taken / np.sqrt(np.outer(excess, excess)))

@@ -32,7 +32,8 @@ def kalibr_text(calibration: Calibration) -> str:
         If the calibration has no gyro or no accelerometer, which Kalibr needs both, or the record
         bounds a value in no way.
     """
-    lines = [f"# {calibration.source or 'recording'}, {calibration.duration:.0f} s static"]
+    source = " ".join(calibration.source.split()) or "recording"
+    lines = [f"# {source}, {calibration.duration:.0f} s static"]
     for quantity, name, density_unit, walk_unit in _SENSORS:
         fits = {k: f for k, f in calibration.fits.items() if f.wv.quantity == quantity}
         if not fits:

@@ -94,7 +94,7 @@ def _open(path: Path) -> Table:
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):  # ValueError: a null character in the name
-        raise InputError(f"{str(path)[:200]!r} does not exist: check the path") from None
+        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
     if stat.S_ISDIR(mode):
         raise InputError(f"{path} is a directory: name a file in it")
     if path.suffix.lower() in (".npy", ".npz"):

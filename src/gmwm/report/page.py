@@ -91,7 +91,8 @@ def _channel(name: str, fit: Fit) -> dict[str, Any]:
         "floor_tau": number(low.tau),
         "sentence": sentence(fit),
         "rows": [_row(row) for row in fit.rows()],
-        "figure": json.dumps(deviation_figure(fit)),
+        # "</" would end the script element, also within a string.
+        "figure": json.dumps(deviation_figure(fit), allow_nan=False).replace("</", "<\\/"),
         "fitness": _fitness(fit),
     }
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MAX_BLOCKS = 2048
+_LEAST_DOF, _LEAST_QUANTILE = 0.01, 1e-9  # keep intervals that say nothing in numbers
 _SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
 MIN_SAMPLES = 8
 """Fewest samples of which a wavelet variance is made."""
@@ -101,18 +102,24 @@ class WaveletVariance:
     @cached_property
     def dof(self) -> FloatArray:
         """Equivalent degrees of freedom 2 nu^4 / var(nu^2) of each level, (J,)."""
-        implied = np.diag(self.covariance)
-        return np.minimum(2.0 * self._positive**2 / implied, self.counts)
+        square = 2.0 * self._positive**2
+        # At most one a coefficient; a level without any variance would divide zero by zero.
+        least = np.maximum(square / self.counts, np.finfo(float).tiny)
+        return np.maximum(square / np.maximum(np.diag(self.covariance), least), _LEAST_DOF)
 
     @property
     def lower(self) -> FloatArray:
         """Lower end of the chi-square interval at ``confidence``, u^2, (J,)."""
-        return self.dof * self.variance / chi2.ppf(0.5 + 0.5 * self.confidence, self.dof)
+        return self._end(0.5 + 0.5 * self.confidence)
 
     @property
     def upper(self) -> FloatArray:
         """Upper end of the chi-square interval at ``confidence``, u^2, (J,)."""
-        return self.dof * self.variance / chi2.ppf(0.5 - 0.5 * self.confidence, self.dof)
+        return self._end(0.5 - 0.5 * self.confidence)
+
+    def _end(self, probability: float) -> FloatArray:
+        quantile = np.maximum(chi2.ppf(probability, self.dof), _LEAST_QUANTILE)
+        return np.asarray(self.dof * self.variance / quantile)
 
     def detrended(self, slope: float) -> FloatArray:
         """Wavelet variances of the series less a drift of ``slope`` (u/s), exactly, u^2, (J,)."""
@@ -152,7 +159,8 @@ class WaveletVariance:
         arrays = {
             k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")
         }
-        return cls(**{**content, **arrays})
+        numbers = {"n": int(content["n"]), "dt": float(content["dt"])}
+        return cls(**{**content, **arrays, **numbers})
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes."""

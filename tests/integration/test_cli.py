@@ -1,0 +1,616 @@
+"""The command line: what it prints and writes, and how it refuses what it cannot use."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise, cli
+from gmwm.calibration import Calibration
+from gmwm.estimate.fit import Fit
+from gmwm.process import as_model
+from gmwm.units import SI_UNIT
+from gmwm.variance.wavelet import WaveletVariance
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+WIDTH = 80
+SI = ("--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
+RATE = ("--rate", "100")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was told."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code
+        printed, told = capsys.readouterr()
+        return code, printed, told
+
+    return _run
+
+
+def run_process(*arguments, cwd):
+    command = [sys.executable, "-m", "gmwm.cli", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+def write_csv(path, columns, digits=9):
+    rows = np.column_stack(list(columns.values()))
+    lines = [",".join(f"{value:.{digits}g}" for value in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines, ""]))
+    return path
+
+
+def stripped(text):
+    """Lines without the blanks at their ends."""
+    return [line.rstrip() for line in text.strip().splitlines()]
+
+
+def golden(name):
+    return stripped((GOLDEN / name).read_text(encoding="utf-8"))
+
+
+NUMBER = re.compile(r"[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]\d+)?")
+
+
+def assert_like(text, name):
+    """Equal to a golden text, but for the last digits of its numbers and the blanks they take."""
+    lines = stripped(text), golden(name)
+    shapes = [
+        [" ".join(re.sub("─+", "─", NUMBER.sub("#", line)).split()) for line in part]
+        for part in lines
+    ]
+    assert shapes[0] == shapes[1]
+    numbers = [NUMBER.findall("\n".join(part).replace(",", "")) for part in lines]
+    np.testing.assert_allclose(*(np.array(part, dtype=float) for part in numbers), rtol=1e-3)
+
+
+# -- help -----------------------------------------------------------------------------------------
+
+
+def test_help_lists_the_commands():
+    shown = CliRunner().invoke(cli.cli, ["--help"])
+    assert shown.exit_code == 0
+    assert {"calibrate", "demo"} <= cli.cli.commands.keys()
+    for name in cli.cli.commands:
+        assert re.search(rf"^  {name}  +\S", shown.output, re.MULTILINE), name
+
+
+@pytest.mark.parametrize("command", sorted(cli.cli.commands))
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_help_of_each_command_has_units_and_an_example(command, option):
+    shown = CliRunner().invoke(cli.cli, [command, option])
+    assert shown.exit_code == 0
+    assert re.search(rf"Examples?:\n +gmwm {command} ", shown.output)
+    assert re.search(r"\b(Hz|hours|seconds|rad/s|m/s\^2)\b", shown.output)
+    assert max(map(len, shown.output.splitlines())) <= WIDTH
+
+
+def test_help_of_calibrate_names_units():
+    shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
+    for words in ("--rate FLOAT", "in Hz", "rad/s, deg/s, deg/h", "m/s^2, g, mg", "NAME=COLUMN"):
+        assert words in shown
+
+
+def test_example_of_calibrate_works(run, tmp_path):
+    # The very line that the help shows, on a file of that name.
+    rng = np.random.default_rng(0)
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xy"]
+    write_csv(tmp_path / "static.csv", {name: rng.normal(size=500) for name in names})
+    shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
+    (line,) = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
+    code, _, told = run(*line.split())
+    assert code == 0, told
+    assert (tmp_path / "out" / "calibration.json").exists()
+
+
+def test_version(run):
+    assert run("--version") == (0, f"gmwm, version {gmwm.__version__}\n", "")
+
+
+def test_help_answers_at_once():
+    # Nothing heavy is loaded before there is something to compute.
+    heavy = ["numpy", "scipy", "numba", "matplotlib", "plotly", "pyarrow", "joblib", "rich"]
+    script = f"import sys, gmwm.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
+
+
+# -- calibrate ------------------------------------------------------------------------------------
+
+
+GYRO = WhiteNoise(4e-4) + RandomWalk(3e-4)
+ACCEL = WhiteNoise(1e-3)
+
+
+@pytest.fixture(scope="module")
+def good_file(tmp_path_factory):
+    """20,000 samples: a gyro that walks, an accelerometer of white noise, a dead axis, others."""
+    rng = np.random.default_rng(2)
+    n, dt = 20_000, 0.01
+    columns = {
+        "gyro_x": np.degrees(GYRO.simulate(n, dt, rng)),
+        "gyro_y": np.zeros(n),
+        "accel_z": ACCEL.simulate(n, dt, rng) / 9.80665 + 1.0,
+        "temp": np.full(n, 25.0),
+    }
+    return write_csv(tmp_path_factory.mktemp("data") / "static.csv", columns)
+
+
+FIELD = ("--gyro-unit", "deg/s", "--accel-unit", "g")
+
+
+@pytest.fixture
+def calibrated(run, good_file, tmp_path):
+    code, printed, told = run("calibrate", good_file, *RATE, *FIELD, "-o", "out")
+    assert code == 0, told
+    return printed, told, tmp_path / "out"
+
+
+def test_calibrate(calibrated):
+    printed, _, folder = calibrated
+    # One table, no wider than a terminal, and where everything went.
+    assert_like(printed, "cli_calibrate.txt")
+    assert printed.count("estimate") == 1
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    assert "\x1b" not in printed
+    header, row = (line for line in printed.splitlines() if re.match(r"channel|gyro_x", line))
+    assert header.index("unit") == row.index("deg/sqrt(h)")
+    # The files.
+    files = ["calibration.json", "imu.yaml", "report.html"]
+    assert sorted(path.name for path in folder.iterdir()) == files
+    for name in files:
+        assert f"wrote out/{name}\n" in printed.replace("\\", "/")
+    calibration = gmwm.load(folder / "calibration.json")
+    assert list(calibration) == ["gyro_x", "accel_z"]
+    assert calibration.skipped == {"gyro_y": "constant at 0 rad/s"}
+    assert calibration.source == "static.csv"
+    for name, truth in (("gyro_x", GYRO), ("accel_z", ACCEL)):
+        for key, value in as_model(truth).params.items():
+            low, high = calibration[name].interval(0.999)[key]
+            assert low < value < high, (name, key)
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    assert html.startswith("<!DOCTYPE html>")
+    assert html.rstrip().endswith("</html>")
+    assert "static.csv" in html
+    content = yaml.safe_load((folder / "imu.yaml").read_text())
+    assert content["update_rate"] == 100
+    assert content["gyroscope_noise_density"] == pytest.approx(calibration["gyro_x"].params["N"])
+
+
+def test_nothing_but_results_where_there_is_no_terminal(calibrated):
+    assert calibrated[1] == ""
+
+
+def test_a_second_run_replaces_the_files(run, good_file, calibrated, tmp_path):
+    folder = calibrated[2]
+    before = (folder / "calibration.json").read_bytes()
+    (folder / "calibration.json").write_text("old")
+    code, _, _ = run("calibrate", good_file, *RATE, *FIELD, "-o", folder, "--jobs", "1")
+    assert code == 0
+    assert (folder / "calibration.json").read_bytes() == before
+
+
+def test_without_both_sensors_there_is_no_imu_yaml(run, good_file, tmp_path):
+    arguments = ("--channel", "gyro_z=gyro_x", "--gyro-unit", "deg/s", "-o", "one")
+    code, printed, _ = run("calibrate", good_file, *RATE, *arguments)
+    assert code == 0
+    assert "wrote one/imu.yaml" not in printed.replace("\\", "/")
+    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == [
+        "calibration.json",
+        "report.html",
+    ]
+    assert list(gmwm.load(tmp_path / "one" / "calibration.json")) == ["gyro_z"]
+
+
+def test_columns_by_number_and_time_by_name(run, tmp_path):
+    rng = np.random.default_rng(0)
+    columns = {"a": np.arange(200) * 0.02, "b": rng.normal(size=200), "c": rng.normal(size=200)}
+    write_csv(tmp_path / "f.csv", columns)
+    arguments = ("--channel", "gyro_x=1", "--channel", "accel_x=c", "--time", "a")
+    code, printed, told = run("calibrate", "f.csv", *arguments, *SI, "-o", "out")
+    assert code == 0, told
+    calibration = gmwm.load(tmp_path / "out" / "calibration.json")
+    assert calibration.rate == pytest.approx(50.0)
+    assert list(calibration) == ["gyro_x", "accel_x"]
+    assert "at 50 Hz, 200 samples a channel" in printed
+    # The same columns, time left aside.
+    code, printed, told = run(
+        "calibrate", "f.csv", *arguments[:4], *SI, "--time", "none", *RATE, "-o", "out"
+    )
+    assert code == 0, told
+    assert "at 100 Hz" in printed
+
+
+def test_the_shortest_recordings_are_calibrated(run, tmp_path):
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        columns = {name: rng.normal(size=64) for name in ("gyro_x", "accel_x")}
+        write_csv(tmp_path / "f.csv", columns)
+        code, _, told = run("calibrate", "f.csv", *RATE, *SI, "-o", f"out{seed}")
+        assert code == 0, (seed, told)
+        assert (tmp_path / f"out{seed}" / "calibration.json").exists()
+        assert (tmp_path / f"out{seed}" / "report.html").exists()
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+
+ROWS = 200
+
+
+def good_lines():
+    rng = np.random.default_rng(1)
+    rows = rng.normal(size=(ROWS, 2))
+    return ["gyro_x,accel_x", *(f"{a:.6f},{b:.6f}" for a, b in rows)]
+
+
+def with_line(number, text):
+    lines = good_lines()
+    lines[number - 1] = text
+    return lines
+
+
+def with_time(gap):
+    t = np.arange(ROWS) * 0.01
+    t[120:] += gap
+    lines = good_lines()
+    return [f"time_s,{lines[0]}", *(f"{a:.4f},{b}" for a, b in zip(t, lines[1:], strict=True))]
+
+
+ALL = (*RATE, *SI)
+
+# what: (lines of the file or None, arguments, words that the sentence must have)
+BAD = {
+    "missing file": (None, ALL, ("f.csv", "does not exist", "check the path")),
+    "empty file": ([], ALL, ("f.csv is empty", "give a file with samples")),
+    "header alone": (good_lines()[:1], ALL, ("f.csv", "no data", "add samples")),
+    "text in a number column": (
+        with_line(50, "0.1,broken"),
+        ALL,
+        ("f.csv, line 50, column 'accel_x'", "'broken' is not a number", "mend the line"),
+    ),
+    "NaN": (with_line(60, "nan,0.1"), ALL, ("f.csv, line 60, column 'gyro_x'", "'nan'", "cut")),
+    "empty field": (with_line(61, "0.1,"), ALL, ("f.csv, line 61, column 'accel_x'", "empty")),
+    "ragged row": (with_line(70, "1,2,3"), ALL, ("f.csv, line 70", "3 fields where 2 were")),
+    "too few samples": (good_lines()[:64], ALL, ("63 samples", "at least 64", "record longer")),
+    "unknown unit": (
+        good_lines(),
+        (*RATE, "--gyro-unit", "furlong", *SI[2:]),
+        ("unknown unit 'furlong'", "write it like deg/s"),
+    ),
+    "unit of the other sensor": (
+        good_lines(),
+        (*RATE, "--gyro-unit", "g", *SI[2:]),
+        ("gyro_x", "'g'", "rad/s"),
+    ),
+    "no unit": (good_lines(), (*RATE, *SI[:2]), ("unit of accel_x", "--accel-unit g")),
+    "no rate": (good_lines(), SI, ("no rate was given", "--rate 100")),
+    "rate of zero": (good_lines(), ("--rate", "0", *SI), ("rate = 0", "positive", "in Hz")),
+    "rate against the time stamps": (
+        with_time(0.0),
+        ("--rate", "200", *SI),
+        ("stamps give 100 Hz, not the 200 Hz stated", "leave out the rate"),
+    ),
+    "gap in the time stamps": (
+        with_time(1.0),
+        SI,
+        ("f.csv, column 'time_s', line 122", "a step of 1.01 where 0.01 is usual"),
+    ),
+    "time that goes back": (with_time(-0.5), SI, ("column 'time_s', line 122", "goes back")),
+    "all channels constant": (
+        ["gyro_x,accel_x", *["0.5,9.8"] * ROWS],
+        ALL,
+        ("f.csv: every channel is constant", "check the sensor and the columns"),
+    ),
+    "channel without a column": (
+        good_lines(),
+        (*ALL, "--channel", "gyro_x"),
+        ("--channel gyro_x: write NAME=COLUMN",),
+    ),
+    "channel without a name": (
+        good_lines(),
+        (*ALL, "--channel", "=gyro_x"),
+        ("--channel =gyro_x: write NAME=COLUMN",),
+    ),
+    "channel of nothing": (
+        good_lines(),
+        (*ALL, "--channel", "gyro_x="),
+        ("--channel gyro_x=: write NAME=COLUMN",),
+    ),
+    "channel of an unknown column": (
+        good_lines(),
+        (*ALL, "--channel", "gyro_x=wx"),
+        ("no column 'wx' for gyro_x", "'gyro_x', 'accel_x'"),
+    ),
+    "channel of a column number too high": (
+        good_lines(),
+        (*ALL, "--channel", "gyro_x=7"),
+        ("no column 7 for gyro_x", "from 0 to 1"),
+    ),
+    "channel given twice": (
+        good_lines(),
+        (*ALL, "--channel", "gyro_x=0", "--channel", "gyro_x=1"),
+        ("--channel", "gyro_x"),
+    ),
+    "unknown time column": (good_lines(), (*ALL, "--time", "clock"), ("'clock'", "for time")),
+}
+
+
+def assert_refused(code, printed, told, words=()):
+    assert code == 2
+    assert printed == ""
+    assert told.startswith("gmwm: ")
+    assert told.endswith("\n")
+    assert told.count("\n") == 1
+    assert ": " in told.removeprefix("gmwm: "), "no mend is given"
+    for word in words:
+        assert word in told
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input_is_one_sentence_and_exit_code_2(run, tmp_path, what):
+    lines, arguments, words = BAD[what]
+    if lines is not None:
+        (tmp_path / "f.csv").write_text("\n".join([*lines, ""]) if lines else "")
+    assert_refused(*run("calibrate", "f.csv", *arguments, "-o", "out"), words)
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("what", ["NaN", "all channels constant"])
+def test_bad_input_leaves_earlier_results_alone(run, tmp_path, what):
+    (tmp_path / "f.csv").write_text("\n".join(BAD[what][0]))
+    (tmp_path / "calibration.json").write_text("old")
+    code, _, _ = run("calibrate", "f.csv", *ALL, "-o", ".")
+    assert code == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["calibration.json", "f.csv"]
+    assert (tmp_path / "calibration.json").read_text() == "old"
+
+
+def test_a_folder_or_a_picture_for_a_file(run, tmp_path):
+    assert_refused(*run("calibrate", ".", *ALL, "-o", "out"), ("is a directory",))
+    (tmp_path / "f.csv").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    assert_refused(*run("calibrate", "f.csv", *ALL, "-o", "out"), ("f.csv",))
+
+
+@pytest.mark.parametrize("command", ["calibrate", "demo"])
+@pytest.mark.parametrize("output", ["taken", "taken/under"])
+def test_output_folder_that_cannot_be(run, tmp_path, command, output):
+    (tmp_path / "taken").write_text("mine")
+    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
+    arguments = ("f.csv", *ALL) if command == "calibrate" else ()
+    words = (f"{Path(output)}: cannot be written (", "choose another place with -o")
+    assert_refused(*run(command, *arguments, "-o", output), words)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["f.csv", "taken"]
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (("calibrate",), "FILE"),
+        (("calibrate", "f.csv", "--rate", "fast"), "--rate"),
+        (("calibrate", "f.csv", "--jobs", "0"), "--jobs"),
+        (("demo", "--hours", "0"), "--hours"),
+        (("demo", "--seed", "x"), "--seed"),
+        (("demo", "--nonsense"), "--nonsense"),
+        (("nonsense",), "nonsense"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_wrong_usage_is_told_with_exit_code_2(run, tmp_path, arguments, culprit):
+    code, printed, told = run(*arguments)
+    assert code == 2
+    assert printed == ""
+    assert culprit in told
+    assert "Traceback" not in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interruption_is_told_and_leaves_nothing(run, tmp_path, monkeypatch):
+    def interrupted(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gmwm.calibration.calibrate", interrupted)
+    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
+    code, printed, told = run("calibrate", "f.csv", *ALL, "-o", "out")
+    assert code == 130
+    assert printed == ""
+    assert told.strip() == "gmwm: interrupted, nothing was written"
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_exit_code_of_the_process(tmp_path):
+    done = run_process("calibrate", "nowhere.csv", cwd=tmp_path)
+    assert_refused(done.returncode, done.stdout, done.stderr, ("nowhere.csv", "does not exist"))
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes are those of POSIX")
+def test_who_stops_reading_does_not_lose_the_results(tmp_path):
+    # As in "gmwm calibrate ... | head -1".
+    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
+    command = [sys.executable, "-m", "gmwm.cli", "calibrate", "f.csv", *ALL, "-o", "out"]
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    try:
+        done = subprocess.run(
+            command, cwd=tmp_path, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=120
+        )
+    finally:
+        os.close(write_end)
+    assert "Traceback" not in done.stderr
+    files = ["calibration.json", "imu.yaml", "report.html"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
+
+
+# -- demo -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    return run_process("demo", "--hours", "0.05", "-o", "out", cwd=folder), folder / "out"
+
+
+def test_demo_runs(demo):
+    done, folder = demo
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    files = ["calibration.json", "imu.yaml", "report.html"]
+    assert sorted(path.name for path in folder.iterdir()) == files
+    axes = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    assert list(gmwm.load(folder / "calibration.json")) == axes
+
+
+def test_demo_shows_truth_beside_estimate(demo):
+    printed = demo[0].stdout
+    assert printed.startswith("simulated IMU, seed 1: 3 min at 100 Hz\n")
+    assert re.search(r"^channel .*truth +estimate +95 % interval +unit", printed, re.MULTILINE)
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    total = 3 * (1 + 2 * 3) + 3 * (1 + 2 * 2)
+    text = " ".join(printed.split())
+    counted = re.search(r"(\d+) of (\d+) parameters are determined by this record; (\d+)", text)
+    determined, parameters, covered = map(int, counted.groups())
+    assert parameters == total
+    assert covered <= determined <= total
+    assert determined == total - printed.count("too short to tell")
+
+
+def test_demo_finds_the_white_noise_of_every_axis(demo):
+    # Three minutes tell it to a per cent, 140 deg/h/sqrt(Hz) = 2.333 deg/sqrt(h), unless a fast
+    # Gauss-Markov took its place, which leaves an upper bound.
+    lines = demo[0].stdout.splitlines()
+    for sensor, truth, unit in (("gyro", 2.333, "deg/sqrt(h)"), ("accel", 140.0, "ug/sqrt(Hz)")):
+        for axis in "xyz":
+            row = next(line for line in lines if line.startswith(f"{sensor}_{axis} "))
+            bound = re.search(r" N +(\S+) +(\S+)   below (\S+)", row)
+            if bound:
+                assert float(bound[3]) > truth
+                continue
+            match = re.search(r" N +(\S+) +(\S+)   (\S+) \.\. (\S+) +(\S+)", row)
+            assert match, row
+            shown, estimate, low, high = map(float, match.groups()[:4])
+            assert match[5] == unit
+            assert shown == pytest.approx(truth, rel=1e-3)
+            assert low <= estimate <= high
+            assert estimate == pytest.approx(truth, rel=0.1)
+
+
+def test_demo_lists_what_would_be_selected(demo):
+    part = demo[0].stdout.partition("Selected where the form is not known")[2]
+    assert len(re.findall(r"^  (?:gyro|accel)_[xyz] +\S.*(?:noise|Markov)", part, re.M)) == 6
+
+
+# -- tables of results made by hand ---------------------------------------------------------------
+
+
+def made_up(name, model, stderr, bounds=None, valid=True, remarks=()):
+    """A fit that says what we like."""
+    quantity = name.split("_")[0]
+    tau = 0.01 * 2.0 ** np.arange(10)
+    wv = WaveletVariance(
+        tau=tau, variance=1.0 / tau, mean=0.0 * tau, blocks=np.zeros(4), block=500, n=2000,
+        dt=0.01, name=name, quantity=quantity, unit=SI_UNIT[quantity],
+    )  # fmt: skip
+    return Fit(
+        model=as_model(model), wv=wv, keys=tuple(stderr), upper_bounds=bounds or {},
+        covariance=np.diag(np.square(list(stderr.values()))), objective=7.0, dof=8,
+        discrepancy=0.0, p_value=0.5, method="gmwm", omega="model", valid=valid,
+        remarks=tuple(remarks),
+    )  # fmt: skip
+
+
+def made_up_calibration(*fits, **options):
+    options = {"skipped": {}, "source": "static.csv", "rate": 100.0, "n": 2000} | options
+    return Calibration(fits={fit.wv.name: fit for fit in fits}, **options)
+
+
+def test_table_of_every_kind_of_parameter(capsys):
+    gyro = made_up("gyro_x", WhiteNoise(4e-4) + RandomWalk(0.0), {"N": 4e-6}, {"K": 2e-4})
+    accel = made_up(
+        "accel_x",
+        WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0),
+        {"N": 2e-5, "sigma": 5e-4},
+        valid=False,
+        remarks=["the model differs from the data by more than their statistical errors"],
+    )
+    cli._show(
+        made_up_calibration(
+            gyro,
+            accel,
+            skipped={"gyro_y": "constant at 0 rad/s"},
+            notes=("Column 'temp' was not used.",),
+        )
+    )
+    assert stripped(capsys.readouterr().out) == golden("cli_table.txt")
+
+
+DEMO_TRUTH = WhiteNoise(7e-4) + GaussMarkov(1e-3, 0.1) + GaussMarkov(3e-4, 20.0)
+
+
+def test_table_of_truth_beside_estimate(capsys):
+    values = {"N": 6.9e-4, "sigma_1": 1.3e-3, "tau_1": 0.11, "sigma_2": 3e-4, "tau_2": 15.0}
+    errors = {"N": 1e-5, "sigma_1": 1e-4, "tau_1": 0.02, "sigma_2": 2e-4, "tau_2": 40.0}
+    gyro = made_up("gyro_x", DEMO_TRUTH.with_params(values), errors)
+    nil = values | {"sigma_2": 0.0}
+    other = {key: errors[key] for key in ("N", "sigma_1", "tau_1")}
+    bound = made_up("gyro_y", DEMO_TRUTH.with_params(nil), other, {"sigma_2": 5e-4})
+    truth = dict.fromkeys(("gyro_x", "gyro_y"), DEMO_TRUTH)
+    cli._show_truth(made_up_calibration(gyro, bound), truth)
+    assert stripped(capsys.readouterr().out) == golden("cli_truth.txt")
+
+
+def test_no_number_or_name_is_cut_off(capsys):
+    # The widest that a table has to hold: small numbers with all their digits, and a star.
+    values = {"N": 6.9e-4, "sigma_1": 1.3e-3, "tau_1": 1.8131e-3, "sigma_2": 3e-4, "tau_2": 1234.0}
+    errors = {"N": 1e-4, "sigma_1": 1e-4, "tau_1": 1e-3, "sigma_2": 1e-5, "tau_2": 200.0}
+    names = [f"accel_{axis}" for axis in "xyz"]
+    fits = [made_up(name, DEMO_TRUTH.with_params(values), errors, valid=False) for name in names]
+    cli._show_truth(made_up_calibration(*fits), dict.fromkeys(names, DEMO_TRUTH))
+    truth = capsys.readouterr().out
+    cli._show(made_up_calibration(*fits))
+    table = capsys.readouterr().out
+    for printed in (truth, table):
+        assert "…" not in printed
+        for name in names:
+            assert re.search(rf"^{name} ", printed, re.MULTILINE)
+        assert max(map(len, printed.splitlines())) <= WIDTH
+
+
+def test_a_long_channel_name_takes_nothing_from_the_numbers(run, tmp_path):
+    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
+    name = "accel_of_the_left_front_wheel_x"
+    code, printed, told = run(
+        "calibrate", "f.csv", *RATE, "--channel", f"{name}=accel_x", *SI[2:], "-o", "out"
+    )
+    assert code == 0, told
+    fit = gmwm.load(tmp_path / "out" / "calibration.json")[name]
+    (_, low, high, unit) = fit.rows()[0]["field"][0]
+    for text in (name, f"{low:.4g} .. {high:.4g}", unit):
+        assert text in printed
+
+
+def test_json_of_the_command_line_is_strict(calibrated):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    text = (calibrated[2] / "calibration.json").read_text()
+    json.loads(text, parse_constant=refuse)
