@@ -137,4 +137,4 @@ def sentence(fitted: Fit) -> str:
     if unit:
         floor_text = f"{low.deviation * unit[0].per_si:.3g} {unit[0].unit}"
     end = "" if low.tau < fitted.wv.tau[-1] else " (still falling at the end of the record)"
-    return f"{noise}. Averaging helps up to {low.tau:.3g} s, down to {floor_text}{end}."
+    return f"{noise}. Averaging helps up to {low.tau:.4g} s, down to {floor_text}{end}."
