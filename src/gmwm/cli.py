@@ -140,7 +140,7 @@ def main() -> None:
         click.echo(f"gmwm: {error.format_message()}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.Abort:
-        click.echo("gmwm: interrupted, nothing was written", err=True)
+        click.echo("gmwm: interrupted, no file is half-written", err=True)
         sys.exit(130)
 
 
@@ -307,8 +307,10 @@ def _write(result: Calibration, folder: Path) -> str:
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
     if {"gyro", "accel"} <= quantities:
-        write_kalibr(result, kalibr)
-        paths.append(kalibr)
+        try:
+            paths.append(write_kalibr(result, kalibr))
+        except InputError as error:
+            lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     elif kalibr.exists():
         lines = [f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer"]
     result.report(paths[1])

@@ -434,7 +434,7 @@ def test_interruption_is_told_and_leaves_nothing(run, tmp_path, monkeypatch):
     code, printed, told = run("calibrate", "f.csv", *ALL, "-o", "out")
     assert code == 130
     assert printed == ""
-    assert told.strip() == "gmwm: interrupted, nothing was written"
+    assert told.strip() == "gmwm: interrupted, no file is half-written"
     assert list((tmp_path / "out").iterdir()) == []
 
 
