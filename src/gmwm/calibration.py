@@ -173,7 +173,7 @@ def calibrate(
     recording: Recording,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
-    jobs: int | None = None,
+    jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
     """Error model of every channel of a static recording.
@@ -185,7 +185,8 @@ def calibrate(
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
     jobs : int, optional
-        Threads; by default one per core.
+        Threads. One is fastest for recordings of usual length, whose fits are small steps that
+        threads of one interpreter take in turns; -1 is one per core.
     progress : callable, optional
         Called with each channel's name when it is done.
 
@@ -221,7 +222,7 @@ def calibrate(
             if progress is not None:
                 progress(channel.name)
 
-    workers = Parallel(n_jobs=jobs or -1, prefer="threads")
+    workers = Parallel(n_jobs=jobs, prefer="threads")
     found = dict(zip(alive, workers(delayed(one)(channel) for channel in alive), strict=True))
     skipped = dead | {
         c.name: str(error) for c, error in found.items() if isinstance(error, InputError)

@@ -52,7 +52,7 @@ def cli() -> None:
                    "repeat. By default roles are guessed from the column names.")  # fmt: skip
 @click.option("--time", "time_column", metavar="COLUMN",
               help="Time column by name or number; 'none' to ignore it.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), help="Threads [default: one per core].")
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
     file: Path,
     output: Path,
@@ -61,7 +61,7 @@ def calibrate(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
-    jobs: int | None,
+    jobs: int,
 ) -> None:
     """Calibrate every channel of a static recording.
 
