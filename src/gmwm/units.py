@@ -20,12 +20,6 @@ if TYPE_CHECKING:
 SI_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
 """The SI unit of each quantity."""
 
-DEFAULT_UNIT_CHOICES = {
-    "gyro": ("rad/s", "deg/s", "deg/h", "mdeg/s"),
-    "accel": ("m/s^2", "g", "mg", "ug"),
-}
-"""Units named in error messages and help texts."""
-
 # Own registry with just these lines: it loads in milliseconds, keeps the angle as a dimension
 # (deg/s must not pass for 1/s) and lets "g" mean standard gravity, not gram.
 _DEFINITIONS = (

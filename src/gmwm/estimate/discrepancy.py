@@ -127,7 +127,6 @@ class Discrepancy:
         covariance: FloatArray,
         target: FloatArray,
         basis: FloatArray,
-        dof: int | None = None,
     ) -> bool:
         """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
 
@@ -135,10 +134,10 @@ class Discrepancy:
         """
         if not self._estimated:
             return False
-        dof = dof or self._dof
-        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof):
+        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, self._dof):
             return False
-        before, self.value = self.value, _moment_estimate(residual, covariance, target, dof)
+        before = self.value
+        self.value = _moment_estimate(residual, covariance, target, self._dof)
         return abs(self.value - before) > _SETTLED * max(self.value, before, 1e-6)
 
 

@@ -123,11 +123,6 @@ class Fit:
                 result[key] = _interval(item, value, errors[key], level)
         return result
 
-    @property
-    def n_estimated(self) -> int:
-        """Number of parameters that were left open."""
-        return len({*self.keys, *self.upper_bounds})
-
     # -- curves -----------------------------------------------------------------------------------
 
     @property

@@ -15,7 +15,6 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import spectral, synthesis
 from gmwm.process.base import Process, Shape
-from gmwm.process.noise import require_haar_order
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
@@ -148,7 +147,11 @@ class ARIMA(Process):
         return self.sigma2 * _unit_autocovariance(self.ar, self.ma, int(lag.max()) + 1)[lag]
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        require_haar_order(self.d, repr(self))
+        if self.d > 1:
+            raise InputError(
+                f"{self!r}: the Haar wavelet variance exists up to one integration, d = {self.d} "
+                "is more"
+            )
         tau = np.asarray(tau, dtype=float)
         m = np.rint(tau / dt)
         decay = _decay_lags(self.ar, self.ma)

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import digamma
 
 from gmwm._typing import FloatArray
-from gmwm.errors import InputError
 from gmwm.process import synthesis
 from gmwm.process.base import Process
 from gmwm.process.parameter import Parameter
@@ -260,11 +259,3 @@ class BiasInstability(Process):
 def _odd_harmonic(k: FloatArray) -> FloatArray:
     """1 + 1/3 + ... + 1/(2k - 1), continued to real k."""
     return np.asarray(0.5 * (digamma(k + 0.5) - digamma(0.5)))
-
-
-def require_haar_order(order: int, name: str) -> None:
-    """Raise where the Haar wavelet variance of an ``order``-fold integrated process is infinite."""
-    if order > 1:
-        raise InputError(
-            f"{name}: the Haar wavelet variance exists up to one integration, d = {order} is more"
-        )

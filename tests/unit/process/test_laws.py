@@ -147,6 +147,18 @@ def test_spectrum_integrates_to_the_variance(process):
     assert integral == pytest.approx(variance, rel=1e-6)
 
 
+def test_only_integrated_processes_and_flicker_noise_have_no_variance():
+    """What the tests above may pass over, and nothing else."""
+    without = []
+    for process in EXAMPLES:
+        try:
+            process.autocovariance(np.arange(2), 1.0)
+        except gmwm.InputError:
+            without.append(type(process).__name__)
+    assert set(without) == {"RandomWalk", "RateRamp", "BiasInstability", "ARIMA"}
+    assert without.count("ARIMA") == 1
+
+
 def test_random_walk_state_space_grows_as_it_should():
     form = gmwm.RandomWalk(0.3).state_space(2.0)
     np.testing.assert_allclose(form.output_variance(5), 0.09 * 2.0 * np.arange(5))
