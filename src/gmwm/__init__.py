@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gmwm.calibration import Calibration, calibrate, load
     from gmwm.errors import InputError
     from gmwm.estimate.fit import Fit
-    from gmwm.estimate.gmwm import fit
+    from gmwm.estimate.methods import fit
     from gmwm.process import (
         AR,
         ARIMA,
@@ -49,7 +49,7 @@ _HOME = {
     **dict.fromkeys(("Calibration", "calibrate", "load"), "calibration"),
     "InputError": "errors",
     "Fit": "estimate.fit",
-    "fit": "estimate.gmwm",
+    "fit": "estimate.methods",
     **dict.fromkeys(
         (
             "AR",

@@ -13,7 +13,7 @@ from joblib import Parallel, delayed
 
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.gmwm import fit
+from gmwm.estimate.methods import fit
 from gmwm.files import written
 from gmwm.process import Model, Process
 from gmwm.recording import Channel, Recording

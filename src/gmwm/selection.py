@@ -14,7 +14,7 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.gmwm import fit
+from gmwm.estimate.methods import fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
 from gmwm.estimate.start import Reference, dictionary_fit, search

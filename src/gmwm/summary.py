@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.gmwm import fit
+from gmwm.estimate.methods import fit
 from gmwm.process import Process, RandomWalk, WhiteNoise
 from gmwm.units import field_units
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +19,38 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+_METHOD_NAMES = {
+    "allan": "slopes of the Allan deviation",
+    "em": "EM",
+    "mle": "exact maximum likelihood",
+    "whittle": "debiased Whittle likelihood",
+}
+
 UNDETERMINED = 1.0
 """Relative standard error of a positive parameter above which its interval says nothing."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A straight part of the log-log Allan plot from which a parameter was read.
+
+    Attributes
+    ----------
+    key : str
+        The parameter.
+    slope : float
+        Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
+    tau_min, tau_max : float
+        First and last averaging time of the region, s.
+    coefficient : float
+        Of the line ``coefficient * tau^slope``, u/s^slope.
+    """
+
+    key: str
+    slope: float
+    tau_min: float
+    tau_max: float
+    coefficient: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +81,17 @@ class Fit:
         Of the chi-square test, taken on the cube roots of the wavelet variances, which are close
         to normal at coarse levels too; NaN without degrees of freedom.
     method, omega : str
-        How it was estimated.
+        How it was estimated; ``omega`` is empty but for ``method="gmwm"``.
     valid : bool
         Whether every parameter is supported by the data and the model describes them.
     remarks : tuple of str
         What is off, one sentence each.
+    log_likelihood : float
+        At the estimate, of the methods that maximise it; NaN for the others.
+    trace : tuple of float
+        Log-likelihood after each iteration of EM.
+    regions : tuple of Region
+        What ``method="allan"`` read the parameters from.
     """
 
     model: Model
@@ -71,6 +107,9 @@ class Fit:
     omega: str
     valid: bool
     remarks: tuple[str, ...]
+    log_likelihood: float = float("nan")
+    trace: tuple[float, ...] = ()
+    regions: tuple[Region, ...] = ()
 
     # -- numbers ----------------------------------------------------------------------------------
 
@@ -212,8 +251,7 @@ class Fit:
         name = wv.name or "series"
         lines = [
             f"{name}: {' + '.join(self.model.term_labels())}",
-            f"{wv.n:,} samples at {1.0 / wv.dt:g} Hz, {wv.tau.size} levels; "
-            f"{self.method.upper()}, {self.omega} weights",
+            f"{wv.n:,} samples at {1.0 / wv.dt:g} Hz, {wv.tau.size} levels; {self._how()}",
             "",
             f"{'parameter':<20} {'estimate':>11} {'std. error':>10}  {'95 % interval':<23} unit",
         ]
@@ -221,9 +259,20 @@ class Fit:
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"
+        if np.isfinite(self.log_likelihood):
+            fitness = (
+                f"log-likelihood {self.log_likelihood:.8g}; of the wavelet variances: " + fitness
+            )
         lines += ["", fitness, "valid" if self.valid else "NOT VALID"]
         lines += [f"- {remark}" for remark in self.remarks]
         return "\n".join(lines)
+
+    def _how(self) -> str:
+        if self.method == "gmwm":
+            return f"GMWM, {self.omega} weights"
+        if self.trace:
+            return f"EM, {len(self.trace)} iterations"
+        return _METHOD_NAMES[self.method]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars, fitted curve and components; returns the axes."""
@@ -243,6 +292,20 @@ class Fit:
         total = np.sqrt(2.0 * self.implied)
         plot.curves(axes, wv.tau, total, components, wv.allan_deviation)
         return axes
+
+    def plot_trace(self, ax: Axes | None = None) -> Axes:
+        """Log-likelihood against the iterations of EM; returns the axes.
+
+        Raises
+        ------
+        InputError
+            If the fit was not made by EM.
+        """
+        from gmwm import plot
+
+        if not self.trace:
+            raise InputError(f"a fit by {self.method!r} has no iterations to show")
+        return plot.trace(np.array(self.trace), ax=ax)
 
     # -- tables and files -------------------------------------------------------------------------
 
@@ -267,6 +330,9 @@ class Fit:
             "valid": self.valid,
             "remarks": list(self.remarks),
             "units": {row["key"]: row["unit"] for row in self.rows()},
+            "log_likelihood": None if np.isnan(self.log_likelihood) else self.log_likelihood,
+            "trace": list(self.trace),
+            "regions": [asdict(region) for region in self.regions],
             "wavelet_variance": self.wv.to_dict(),
         }
 
@@ -290,12 +356,19 @@ class Fit:
             objective=content["objective"],
             dof=content["dof"],
             discrepancy=content["discrepancy"],
-            p_value=float("nan") if content["p_value"] is None else content["p_value"],
+            p_value=_number(content["p_value"]),
             method=content["method"],
             omega=content["omega"],
             valid=content["valid"],
             remarks=tuple(content["remarks"]),
+            log_likelihood=_number(content.get("log_likelihood")),
+            trace=tuple(content.get("trace", ())),
+            regions=tuple(Region(**region) for region in content.get("regions", ())),
         )
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
 
 
 def _interval(

@@ -8,7 +8,7 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,23 +17,14 @@ from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import Discrepancy
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.moments import Moments
 from gmwm.estimate.profile import Point, Profile, omega_root
-from gmwm.estimate.ramp import (
-    Slope,
-    bias_of_detrending,
-    detrended_covariance,
-    gls_slope,
-    ols_slope,
-)
 from gmwm.estimate.start import dictionary_fit, search
 from gmwm.estimate.uncertainty import describe
-from gmwm.process import Model, Process, RateRamp, Sinusoid, as_model
-from gmwm.recording import Channel
-from gmwm.variance.covariance import haar_covariance, line_covariance
-from gmwm.variance.wavelet import WaveletVariance, as_wavelet_variance
+from gmwm.process import Model, Process, Sinusoid
+from gmwm.variance.wavelet import WaveletVariance
 
 WEIGHTS = ("model", "diagonal", "identity")
-METHODS = ("gmwm",)
 
 _MAX_ROUNDS = 40
 _REFERENCE_ROUNDS = 3
@@ -42,126 +33,18 @@ _DISCREPANCY_EVERY = 3
 _TOLERANCE = 1e-4  # of the implied curve from round to round, in standard deviations of the data
 
 
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """What is known of a series before and while its noise is fitted.
-
-    Attributes
-    ----------
-    wv : WaveletVariance
-    slope : Slope or None
-        Drift removed from the wavelet variances, ``None`` where the model has no ramp.
-    slope_is_free : bool
-        Whether it is estimated (rather than given).
-    """
-
-    wv: WaveletVariance
-    slope: Slope | None
-    slope_is_free: bool
-
-    @classmethod
-    def of(cls, wv: WaveletVariance, model: Model) -> Moments:
-        ramps = [term for term in model.terms if isinstance(term, RateRamp)]
-        if not ramps:
-            return cls(wv, None, False)
-        if ramps[0].R is not None:
-            return cls(wv, Slope(ramps[0].R, 0.0), False)
-        return cls(wv, ols_slope(wv), True)
-
-    @property
-    def target(self) -> FloatArray:
-        """Wavelet variances without the drift, and without what removing it took, u^2, (J,)."""
-        if self.slope is None:
-            return self.wv.variance
-        return self.wv.detrended(self.slope.value) + bias_of_detrending(self.wv, self.slope)
-
-    def under(self, noise: Model, part: float = 1.0) -> Moments:
-        """The same with the slope moved by ``part`` of the way to its estimate under this noise."""
-        if self.slope is None or not self.slope_is_free or not _has_power(noise, self.wv.dt):
-            return self
-        new, old = gls_slope(self.wv, noise.psd), self.slope
-        moved = Slope(
-            (1.0 - part) * old.value + part * new.value,
-            (1.0 - part) * old.variance + part * new.variance,
-        )
-        return replace(self, slope=moved)
-
-    def covariance(self, noise: Model) -> FloatArray:
-        """Covariance of `target` that the fitted noise implies, u^4, (J, J)."""
-        wv = self.wv
-        if not _has_power(noise, wv.dt):
-            return wv.covariance
-        covariance = haar_covariance(noise.psd, wv.n, wv.dt)
-        if noise.lines():
-            covariance += line_covariance(noise.lines(), noise.psd, wv.n, wv.dt)
-        if self.slope_is_free and self.slope is not None:
-            covariance = detrended_covariance(covariance, wv, noise.psd, self.slope)
-        return covariance
-
-
-def _has_power(noise: Model, dt: float) -> bool:
-    return bool(np.any(noise.psd(np.array([1e-6, 0.01, 0.25]) / dt, dt) > 0.0))
-
-
-def fit(
-    model: Process | Model,
-    data: WaveletVariance | Channel | FloatArray,
-    dt: float | None = None,
+def fit_gmwm(
+    model: Model,
+    wv: WaveletVariance,
     *,
-    method: str = "gmwm",
     omega: str = "model",
     discrepancy: float | None = None,
 ) -> Fit:
-    """Estimate the open parameters of an error model from a static series.
-
-    Parameters
-    ----------
-    model : Process or Model
-        Parameters that are given stay as they are, open ones are estimated. No starting values
-        are needed.
-    data : WaveletVariance, Channel or (n,) array_like
-    dt : float, optional
-        Sampling interval, s; needed for an array.
-    method : {"gmwm"}
-    omega : {"model", "diagonal", "identity"}
-        Weights: inverse covariance of the wavelet variances implied by the fitted model
-        (efficient), its diagonal, or none.
-    discrepancy : float, optional
-        Relative error that the model is granted at each level beyond the statistical one. By
-        default it is estimated where the model fails the chi-square test, and zero elsewhere; see
-        `gmwm.estimate.discrepancy`.
-
-    Returns
-    -------
-    Fit
-
-    Raises
-    ------
-    InputError
-        If the data cannot be used, or the model has nothing to estimate.
-
-    Examples
-    --------
-    >>> import gmwm
-    >>> truth = gmwm.WhiteNoise(N=0.2) + gmwm.GaussMarkov(sigma=0.5, tau=20.0)
-    >>> fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, n=100_000, dt=1.0, seed=1), dt=1.0)
-    >>> fit.valid
-    True
-    """
-    if method not in METHODS:
-        raise InputError(f"method = {method!r}: known are {', '.join(METHODS)}")
+    """Estimate by the method of wavelet moments; see `gmwm.fit` for the parameters."""
     if omega not in WEIGHTS:
         raise InputError(f"omega = {omega!r}: known are {', '.join(WEIGHTS)}")
     if discrepancy is not None and not 0.0 <= discrepancy < 1.0:
         raise InputError(f"discrepancy = {discrepancy!r}: give a share of the variance, e.g. 0.02")
-    model = as_model(model)
-    wv = as_wavelet_variance(data, dt)
-    if not model.is_open:
-        raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
-    return _fit(model, wv, omega, discrepancy)
-
-
-def _fit(model: Model, wv: WaveletVariance, omega: str, discrepancy: float | None) -> Fit:
     design = Design(model, wv.tau, wv.dt, wv.n)
     if not design.terms:
         raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")

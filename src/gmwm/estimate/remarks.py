@@ -134,15 +134,28 @@ def misfit(
     if discrepancy == 0.0:
         return [], False
     statistical = np.diag(covariance) - (discrepancy * target) ** 2
-    known = 2.0 * target**2 / np.maximum(statistical, 1e-300) > _POOR_DOF
-    if not np.any(known):
+    worst, tau, poor = worst_misfit(wv, target, implied, statistical)
+    if tau == 0.0:
         return [], False
-    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
-    worst = int(np.argmax(ratio))
     remark = (
         "the model differs from the data by more than their statistical errors; a discrepancy of "
         f"{100.0 * discrepancy:.2g} % of the variance at each level was allowed for and widens the "
-        f"intervals (largest misfit of the deviation {100.0 * ratio[worst]:.2g} % at tau = "
-        f"{wv.tau[known][worst]:.3g} s)"
+        f"intervals (largest misfit of the deviation {100.0 * worst:.2g} % at tau = {tau:.3g} s)"
     )
-    return [remark], bool(ratio[worst] > _POOR_DEVIATION)
+    return [remark], poor
+
+
+def worst_misfit(
+    wv: WaveletVariance, target: FloatArray, implied: FloatArray, variance: FloatArray
+) -> tuple[float, float, bool]:
+    """Largest relative misfit of the deviation at well-known levels, its time (s), if it is poor.
+
+    ``variance`` (J,) are the statistical variances of ``target``, u^4. The time is zero where no
+    level is known well.
+    """
+    known = 2.0 * target**2 / np.maximum(variance, 1e-300) > _POOR_DOF
+    if not np.any(known):
+        return 0.0, 0.0, False
+    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
+    worst = int(np.argmax(ratio))
+    return float(ratio[worst]), float(wv.tau[known][worst]), bool(ratio[worst] > _POOR_DEVIATION)

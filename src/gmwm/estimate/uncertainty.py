@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from gmwm._typing import FloatArray
+from gmwm.estimate.coordinates import shape_jacobian
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
@@ -27,7 +28,7 @@ from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
 
 _UPPER_LEVEL = 0.95
-_SIGNIFICANT = 1.645  # standard errors above zero, one-sided 5 %
+SIGNIFICANT = 1.645  # standard errors above zero, one-sided 5 %
 
 
 def describe(
@@ -84,7 +85,7 @@ def describe(
         keys = (*keys, ramp_key)
         matrix = np.pad(matrix, (0, 1))
         matrix[-1, -1] = slope.variance
-        keys, matrix = _in_model_order(model, keys, matrix)
+        keys, matrix = in_model_order(model, keys, matrix)
     remarks = [
         *bound_remarks(model, upper),
         *shape_remarks(sub, shapes, x),
@@ -167,8 +168,8 @@ def _linearise(
         value = amplitudes[i] ** (1.0 / parameter.power)
         transform[row, row] = value / (parameter.power * amplitudes[i])
         deviation = float(np.sqrt(natural[row, row]))
-        if i not in design.shaped and amplitudes[i] < _SIGNIFICANT * deviation:
-            bound = _quantile_above_zero(float(amplitudes[i]), deviation)
+        if i not in design.shaped and amplitudes[i] < SIGNIFICANT * deviation:
+            bound = quantile_above_zero(float(amplitudes[i]), deviation)
             upper[keys[-1]] = bound ** (1.0 / parameter.power)
     start = len(positive)
     for i in design.shaped:
@@ -176,10 +177,10 @@ def _linearise(
                    if owner == i and k in alive]  # fmt: skip
         if not columns:
             continue
-        block, names = _shape_jacobian(
-            design.terms[i].process, shapes[i], design.terms[i].free_shape
-        )
-        keys.extend(by_term[places[i], name] for name in names)
+        term = design.terms[i]
+        named = zip(term.process.shape_parameters, term.free_shape, strict=True)
+        keys.extend(by_term[places[i], p.name] for p, is_free in named if is_free)
+        block = shape_jacobian(term.process, shapes[i], term.free_shape)
         transform[np.ix_(columns, columns)] = block
     matrix = transform @ natural @ transform.T
     for i in design.linear:
@@ -188,34 +189,17 @@ def _linearise(
             residual = target - curves @ amplitudes
             bound = _upper_amplitude(jacobian, curves[:, i], residual, covariance)
             upper[by_term[places[i], parameter.name]] = bound ** (1.0 / parameter.power)
-    ordered_keys, ordered = _in_model_order(model, tuple(keys), matrix)
+    ordered_keys, ordered = in_model_order(model, tuple(keys), matrix)
     return ordered_keys, ordered, upper
 
 
-def _in_model_order(
+def in_model_order(
     model: Model, keys: tuple[str, ...], matrix: FloatArray
 ) -> tuple[tuple[str, ...], FloatArray]:
+    """Keys and covariance in the order of the model's parameters."""
     ranked = [key for key in model.params if key in keys]
     index = [keys.index(key) for key in ranked]
     return tuple(ranked), matrix[np.ix_(index, index)]
-
-
-def _shape_jacobian(
-    process: Process, shape: Shape, free: FloatArray
-) -> tuple[FloatArray, list[str]]:
-    """Derivative of the free shape parameters by their z, and their names."""
-    z = process.shape_to_free(shape)
-    names = [p.name for p in process.shape_parameters]
-    open_ones = np.flatnonzero(free)
-    block = np.empty((open_ones.size, open_ones.size))
-    for column, k in enumerate(open_ones):
-        moved = []
-        for step in (1e-6, -1e-6):
-            point = z.copy()
-            point[k] += step
-            moved.append(np.array(process.shape_from_free(point)))
-        block[:, column] = ((moved[0] - moved[1]) / 2e-6)[open_ones]
-    return block, [names[k] for k in open_ones]
 
 
 def _sandwich(jacobian: FloatArray, covariance: FloatArray, omega: str) -> FloatArray:
@@ -244,10 +228,10 @@ def _upper_amplitude(
         return float("inf")
     deviation = 1.0 / np.sqrt(information)
     centre = float(column @ (root @ residual)) / information
-    return _quantile_above_zero(centre, deviation)
+    return quantile_above_zero(centre, deviation)
 
 
-def _quantile_above_zero(centre: float, deviation: float) -> float:
-    """Quantile of N(centre, deviation^2) restricted to positive values."""
+def quantile_above_zero(centre: float, deviation: float) -> float:
+    """95 % quantile of N(centre, deviation^2) restricted to positive values."""
     tail = norm.sf(-centre / deviation) * (1.0 - _UPPER_LEVEL)
     return centre + deviation * float(norm.isf(tail))

@@ -204,7 +204,7 @@ def wavelet_variance(
     Stebler et al. (2012). The variance of averaging time tau is half the overlapping Allan
     variance.
     """
-    channel = data if isinstance(data, Channel) else _as_channel(data, dt)
+    channel = data if isinstance(data, Channel) else as_channel(data, dt)
     values = np.ascontiguousarray(channel.values, dtype=float)
     where = f"channel {channel.name!r}" if channel.name else "the series"
     if values.ndim != 1 or values.size < MIN_SAMPLES:
@@ -262,7 +262,14 @@ def as_wavelet_variance(
     return data
 
 
-def _as_channel(data: FloatArray, dt: float | None) -> Channel:
+def as_channel(data: FloatArray, dt: float | None) -> Channel:
+    """A channel without a name from an array and its sampling interval (s).
+
+    Raises
+    ------
+    InputError
+        If either is not usable.
+    """
     if dt is None:
         raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")
     if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):

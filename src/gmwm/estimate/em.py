@@ -1,0 +1,243 @@
+"""Expectation-maximization on the state-space form.
+
+Dempster, Laird & Rubin (1977), *JRSS B* 39, 1-38; Shumway & Stoffer (1982), *Journal of Time
+Series Analysis* 3, 253-264; for inertial sensors Stebler, Guerrier, Skaloud & Victoria-Feser
+(2011), *Measurement Science and Technology* 22, 085204. A constant and the slope of a ramp have
+flat priors, so that the iteration climbs the likelihood of `gmwm.estimate.likelihood`. Its steps
+are extrapolated (the squared iterative method of Varadhan & Roland 2008, *Scandinavian Journal of
+Statistics* 35, 335-353), as plain EM needs thousands of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.conclusion import conclude
+from gmwm.estimate.coordinates import Coordinates
+from gmwm.estimate.expectation import Expectation, expect
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.information import spectral_information
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.maximization import (
+    StateMoments,
+    check_supported,
+    em_space,
+    updated,
+    white,
+)
+from gmwm.estimate.ramp import Slope
+from gmwm.estimate.scoring import observed_information, regular_inverse
+from gmwm.estimate.series import Series
+from gmwm.process import GaussMarkov, Model, Process, RandomWalk, StateSpace, WhiteNoise
+from gmwm.recording import Channel
+
+DRIFTS = ("ramp", "state")
+_TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zero
+_LONGEST = 100.0  # extrapolation, in steps
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Parameters during the iteration.
+
+    Attributes
+    ----------
+    processes : tuple of Process
+    initial, drive : (p,) ndarray or None
+        Mean of the first state and input of each step, where the drift enters a state.
+    """
+
+    processes: tuple[Process, ...]
+    initial: FloatArray | None = None
+    drive: FloatArray | None = None
+
+
+def fit_em(
+    model: Model,
+    channel: Channel,
+    *,
+    start: Process | Model | None = None,
+    tolerance: float = 1e-10,
+    max_iterations: int = 10_000,
+    accelerate: bool = True,
+    drift: str = "ramp",
+) -> Fit:
+    """Expectation-maximization; see `gmwm.fit` for the parameters."""
+    if drift not in DRIFTS:
+        raise InputError(f"drift = {drift!r}: known are {', '.join(DRIFTS)}")
+    if not tolerance > 0.0:
+        raise InputError(f"tolerance = {tolerance!r}: give a small positive number, e.g. 1e-10")
+    if max_iterations < 1:
+        raise InputError(f"max_iterations = {max_iterations!r}: give a positive whole number")
+    for term in Coordinates(model).terms:
+        check_supported(term)
+    series = Series.of(model, channel, start, gaps=True)
+    iteration = Iteration(series, drift == "state")
+    stage, trace, converged = iteration.run(tolerance, max_iterations, accelerate)
+    return _describe(series, iteration, stage, trace, converged)
+
+
+class Iteration:
+    """The EM iteration of one series.
+
+    Parameters
+    ----------
+    series : Series
+    in_state : bool
+        Whether the drift is an input to the first state, as in Stebler et al. (2011). Then the
+        mean of the series is removed, the mean of the first state is estimated, and its covariance
+        is that of one step.
+
+    Raises
+    ------
+    InputError
+        If the drift is to enter a state and there is none, or no drift to estimate.
+    """
+
+    def __init__(self, series: Series, in_state: bool) -> None:
+        self.series, self.in_state = series, in_state
+        self._terms = series.coordinates.terms
+        self.columns = series.columns
+        if in_state:
+            if not self.columns.drift_is_free:
+                raise InputError('drift = "state" needs an open RateRamp() in the model')
+            if all(isinstance(term, WhiteNoise) for term in self._terms):
+                raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
+            self.columns = Columns.without_regressors(series.columns.matrix[:, 0], self.dt)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.series.columns.dt
+
+    def expectation(self, stage: Stage) -> Expectation:
+        """The E step."""
+        space = StateSpace.stack([em_space(p, self.dt) for p in stage.processes])
+        if not self.in_state:
+            return expect(self.columns, space)
+        held = StateSpace(
+            space.transition,
+            space.process_noise,
+            space.output,
+            space.measurement_noise,
+            space.initial_mean,
+            space.process_noise,
+            space.names,
+        )
+        return expect(self.columns, held, stage.initial, stage.drive)
+
+    def maximization(self, stage: Stage, e: Expectation) -> Stage:
+        """The M step."""
+        later, cross = e.later, e.cross
+        drive = stage.drive
+        if drive is not None:
+            # Remove the input from what follows: E (x[k+1] - u)(...)'.
+            later = later - np.outer(drive, e.later_sum) - np.outer(e.later_sum, drive)
+            later = later + e.steps * np.outer(drive, drive)
+            cross = cross - np.outer(drive, e.earlier_sum)
+        processes = []
+        position = 0
+        for process, like in zip(stage.processes, self._terms, strict=True):
+            if isinstance(process, WhiteNoise):
+                processes.append(white(process, like, e.residual, e.count, self.dt))
+                continue
+            size = em_space(process, self.dt).n_states
+            block = np.ix_(*[range(position, position + size)] * 2)
+            moments = StateMoments(
+                later[block], cross[block], e.earlier[block], e.first[block], e.steps
+            )
+            processes.append(updated(process, like, moments, self.dt))
+            position += size
+        if not self.in_state:
+            return Stage(tuple(processes))
+        space = StateSpace.stack([em_space(p, self.dt) for p in processes])
+        drift = (e.later_sum - space.transition @ e.earlier_sum) / e.steps
+        drive = np.zeros(space.n_states)
+        drive[0] = drift[0]
+        return Stage(tuple(processes), e.start, drive)
+
+    def run(
+        self, tolerance: float, max_iterations: int, accelerate: bool
+    ) -> tuple[Stage, list[float], bool]:
+        """Iterate; returns the last stage, the log-likelihoods, and whether it converged."""
+        stage = Stage(self.series.start)
+        if self.in_state:
+            size = sum(em_space(p, self.dt).n_states for p in stage.processes)
+            stage = Stage(stage.processes, np.zeros(size), np.zeros(size))
+        e = self.expectation(stage)
+        trace = [e.log_likelihood]
+        while len(trace) <= max_iterations:
+            before = e.log_likelihood
+            first = self.maximization(stage, e)
+            e = self.expectation(first)
+            trace.append(e.log_likelihood)
+            latest = first
+            if accelerate and len(trace) <= max_iterations:
+                second = self.maximization(first, e)
+                latest, e = self._extrapolated(stage, first, second, before)
+                trace.append(e.log_likelihood)
+            stage = latest
+            gain = e.log_likelihood - before
+            if gain < tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
+                return stage, trace, True
+        return stage, trace, False
+
+    def _extrapolated(
+        self, stage: Stage, first: Stage, second: Stage, before: float
+    ) -> tuple[Stage, Expectation]:
+        """A long step in the direction of two, if it climbs; else the second of them."""
+        coordinates = self.series.coordinates
+        zs = [coordinates.pack(s.processes) for s in (stage, first, second)]
+        r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
+        norm = float(np.linalg.norm(v))
+        length = min(float(np.linalg.norm(r)) / norm, _LONGEST) if norm > 0.0 else 1.0
+        if length > 1.0 and not self.in_state:
+            try:
+                far = coordinates.processes(
+                    zs[0] + 2.0 * length * r + length**2 * v, stage.processes
+                )
+                e = self.expectation(Stage(far))
+            except (InputError, np.linalg.LinAlgError):
+                e = None
+            if e is not None and np.isfinite(e.log_likelihood) and e.log_likelihood >= before:
+                return Stage(far), e
+        return second, self.expectation(second)
+
+
+def _describe(
+    series: Series, iteration: Iteration, stage: Stage, trace: Sequence[float], converged: bool
+) -> Fit:
+    coordinates, columns = series.coordinates, series.columns
+    likelihood = KalmanLikelihood(columns)
+    information = spectral_information(coordinates, stage.processes, columns.n, columns.dt)
+    observed = observed_information(
+        lambda z: likelihood(coordinates.processes(z, stage.processes)),
+        coordinates.pack(stage.processes),
+        information,
+    )
+    remarks = []
+    if not converged:
+        remarks.append(
+            f"EM did not converge in {len(trace)} iterations: raise max_iterations or start closer"
+        )
+    if np.any(np.linalg.eigvalsh(observed) <= 0.0):
+        remarks.append("EM did not reach a maximum of the likelihood: lower tolerance")
+        observed = information
+    slope = None
+    if columns.drift_is_free:
+        slope = Slope(*columns.slope(likelihood.regression(stage.processes)))
+    if iteration.in_state and stage.drive is not None and slope is not None:
+        slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
+        first = next(p for p in stage.processes if not isinstance(p, WhiteNoise))
+        if not isinstance(first, RandomWalk):
+            name = "Gauss-Markov" if isinstance(first, GaussMarkov) else first.title()
+            remarks.append(f"a drift that enters the {name} state is no ramp of the signal")
+    return conclude(
+        coordinates, stage.processes, regular_inverse(observed), slope, series.wv, method="em",
+        log_likelihood=trace[-1], absent={}, remarks=remarks, trace=trace,
+    )  # fmt: skip

@@ -1,0 +1,133 @@
+"""`fit`: one entrance to all methods of estimation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.em import fit_em
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.gmwm import fit_gmwm
+from gmwm.estimate.mle import fit_mle, fit_whittle
+from gmwm.process import Model, Process, as_model
+from gmwm.recording import Channel
+from gmwm.variance.wavelet import WaveletVariance, as_channel, as_wavelet_variance
+
+_OF_VARIANCES: dict[str, Callable[..., Fit]] = {"gmwm": fit_gmwm}
+_OF_SAMPLES: dict[str, Callable[..., Fit]] = {
+    "mle": fit_mle,
+    "whittle": fit_whittle,
+    "em": fit_em,
+}
+_OPTIONS = {
+    "gmwm": ("omega", "discrepancy"),
+    "allan": ("regions",),
+    "mle": ("start",),
+    "whittle": ("start",),
+    "em": ("start", "tolerance", "max_iterations", "accelerate", "drift"),
+}
+METHODS = tuple(_OPTIONS)
+
+
+def fit(
+    model: Process | Model,
+    data: WaveletVariance | Channel | FloatArray,
+    dt: float | None = None,
+    *,
+    method: str = "gmwm",
+    omega: str | None = None,
+    discrepancy: float | None = None,
+    start: Process | Model | None = None,
+    tolerance: float | None = None,
+    max_iterations: int | None = None,
+    accelerate: bool | None = None,
+    drift: str | None = None,
+    regions: Mapping[str, Sequence[float]] | None = None,
+) -> Fit:
+    """Estimate the open parameters of an error model from a static series.
+
+    Parameters
+    ----------
+    model : Process or Model
+        Parameters that are given stay as they are, open ones are estimated. No starting values
+        are needed.
+    data : WaveletVariance, Channel or (n,) array_like
+        The methods "mle", "whittle" and "em" need the samples; "mle" and "em" take NaN for missing
+        ones.
+    dt : float, optional
+        Sampling interval, s; needed for an array.
+    method : {"gmwm", "mle", "whittle", "em", "allan"}
+        Generalized method of wavelet moments; exact maximum likelihood by the Kalman filter; the
+        debiased Whittle likelihood, for long series; expectation-maximization; straight lines in
+        the Allan plot.
+    omega : {"model", "diagonal", "identity"}, optional
+        Weights of "gmwm": inverse covariance of the wavelet variances implied by the fitted model
+        (efficient, the default), its diagonal, or none.
+    discrepancy : float, optional
+        For "gmwm": relative error that the model is granted at each level beyond the statistical
+        one. By default it is estimated where the model fails the chi-square test, and zero
+        elsewhere; see `gmwm.estimate.discrepancy`.
+    start : Process or Model, optional
+        Starting values of "mle", "whittle" and "em"; by default those of "gmwm".
+    tolerance : float, optional
+        "em" stops when the log-likelihood gains less than this share of itself (1e-10).
+    max_iterations : int, optional
+        Of "em" (10000).
+    accelerate : bool, optional
+        Whether "em" extrapolates its steps (it does by default).
+    drift : {"ramp", "state"}, optional
+        For "em": a ramp added to the signal (default), or an input to the first state as in
+        Stebler et al. (2011), which a Gauss-Markov state forgets.
+    regions : mapping of str to (float, float), optional
+        For "allan": key -> first and last averaging time (s) of the region to read it from; found
+        in the plot by default.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        If the data cannot be used, the model has nothing to estimate, or the method does not know
+        a process or an option.
+
+    Examples
+    --------
+    >>> import gmwm
+    >>> truth = gmwm.WhiteNoise(N=0.2) + gmwm.GaussMarkov(sigma=0.5, tau=20.0)
+    >>> fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, n=100_000, dt=1.0, seed=1), dt=1.0)
+    >>> fit.valid
+    True
+    """
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}: known are {', '.join(METHODS)}")
+    options = {
+        "omega": omega, "discrepancy": discrepancy, "start": start, "tolerance": tolerance,
+        "max_iterations": max_iterations, "accelerate": accelerate, "drift": drift,
+        "regions": regions,
+    }  # fmt: skip
+    given = _belonging(method, options)
+    model = as_model(model)
+    if not model.is_open:
+        raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
+    if method in _OF_VARIANCES:
+        return _OF_VARIANCES[method](model, as_wavelet_variance(data, dt), **given)
+    if isinstance(data, WaveletVariance):
+        raise InputError(
+            f"method = {method!r} needs the samples: give the series, not its variance"
+        )
+    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    return _OF_SAMPLES[method](model, channel, **given)
+
+
+def _belonging(method: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that were given, all of which must belong to the method."""
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in given:
+        if name not in _OPTIONS[method]:
+            known = ", ".join(_OPTIONS[method])
+            raise InputError(f"{name} is no option of method {method!r}: it has {known}")
+    return given

@@ -1,0 +1,137 @@
+"""The samples of a channel as the likelihood methods take them, and where they start from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gmwm.errors import InputError
+from gmwm.estimate.coordinates import Coordinates
+from gmwm.estimate.gmwm import fit_gmwm
+from gmwm.estimate.likelihood import Columns
+from gmwm.process import Model, Process, RateRamp, as_model
+from gmwm.recording import Channel
+from gmwm.variance.wavelet import MIN_SAMPLES, WaveletVariance, wavelet_variance
+
+_SMALL = 0.1  # of its upper bound: where an amplitude that was found to be zero starts
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A channel ready for a likelihood.
+
+    Attributes
+    ----------
+    columns : Columns
+        The samples and regressors.
+    wv : WaveletVariance
+        Of the samples; of their longest part without a gap, if some are missing.
+    coordinates : Coordinates
+        Of the model's noise.
+    start : tuple of Process
+        Starting values of its terms, all of them positive.
+    """
+
+    columns: Columns
+    wv: WaveletVariance
+    coordinates: Coordinates
+    start: tuple[Process, ...]
+
+    @classmethod
+    def of(
+        cls, model: Model, channel: Channel, start: Process | Model | None, *, gaps: bool
+    ) -> Series:
+        """Check the samples and find starting values.
+
+        Raises
+        ------
+        InputError
+            If the samples are no series of numbers, if some are missing and ``gaps`` are not
+            allowed, or if ``start`` is not the same model.
+        """
+        wv = wavelet_variance(_longest_part(channel) if gaps else channel)
+        coordinates = Coordinates(model)
+        ramp = next((term for term in model.terms if isinstance(term, RateRamp)), None)
+        columns = Columns(
+            np.asarray(channel.values, dtype=float),
+            channel.dt,
+            None if ramp is None else ramp.R,
+            ramp is not None,
+        )
+        if start is None:
+            first = _from_moments(model, wv, coordinates)
+        else:
+            first = _from_user(model, as_model(start), coordinates)
+        return cls(columns, wv, coordinates, first)
+
+
+def _longest_part(channel: Channel) -> Channel:
+    """The longest run of samples without a missing one; an infinite one is an error later on."""
+    values = np.asarray(channel.values, dtype=float)
+    if values.ndim != 1 or not np.any(np.isnan(values)):
+        return channel
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], ~np.isnan(values), [0]]).astype(int)))
+    starts, ends = edges[::2], edges[1::2]
+    if starts.size == 0 or np.max(ends - starts) < MIN_SAMPLES:
+        raise InputError(
+            f"the series has no {MIN_SAMPLES} samples without a missing one between them: "
+            "nothing can be told of its noise"
+        )
+    longest = int(np.argmax(ends - starts))
+    return replace(channel, values=values[starts[longest] : ends[longest]])
+
+
+def _from_moments(
+    model: Model, wv: WaveletVariance, coordinates: Coordinates
+) -> tuple[Process, ...]:
+    """Estimates by the method of moments, with amplitudes of zero replaced by small ones."""
+    fit = fit_gmwm(model, wv)
+    level = float(np.sqrt(np.min(wv.variance)))
+    fitted = list(fit.model.terms)
+    # Gauss-Markov terms were put in order; any that has the kind and the given values will do.
+    found = []
+    for term in coordinates.terms:
+        match = next(p for p in fitted if _same_given(term, p))
+        fitted.remove(match)
+        linear = match.linear_parameter
+        if linear is not None and match.values[linear.name] == 0.0:
+            key = next(
+                item.key
+                for item in fit.model.parameters
+                if fit.model.terms[item.term] is match and item.parameter.name == linear.name
+            )
+            bound = fit.upper_bounds.get(key, np.inf)
+            small = _SMALL * bound if np.isfinite(bound) and bound > 0.0 else 1e-3 * level
+            match = match.with_values(**{linear.name: small})
+        found.append(match)
+    return tuple(found)
+
+
+def _same_given(term: Process, fitted: Process) -> bool:
+    """Whether ``fitted`` is ``term`` with its open parameters filled in."""
+    if type(term) is not type(fitted) or term.values.keys() != fitted.values.keys():
+        return False
+    return all(v is None or v == fitted.values[k] for k, v in term.values.items())
+
+
+def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Process, ...]:
+    kept = [term for term in start.terms if not isinstance(term, RateRamp)]
+    terms: Sequence[Process] = coordinates.terms
+    found = []
+    for term in terms:
+        match = next((p for p in kept if _same_given(term, p)), None)
+        if match is None or match.is_open:
+            raise InputError(
+                f"start = {start!r} does not give every term of {model!r} a value: repeat the "
+                "model with numbers"
+            )
+        kept.remove(match)
+        linear = match.linear_parameter
+        if linear is not None and not (match.values[linear.name] or 0.0) > 0.0:
+            raise InputError(f"start = {start!r}: {linear.name} must be positive")
+        found.append(match)
+    if kept:
+        raise InputError(f"start = {start!r} has a term that {model!r} has not: {kept[0]!r}")
+    return tuple(found)
