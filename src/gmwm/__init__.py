@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration, calibrate, load
     from gmwm.errors import InputError
+    from gmwm.estimate.bounds import CramerRao, cramer_rao
     from gmwm.estimate.fit import Fit
     from gmwm.estimate.methods import fit
     from gmwm.process import (
@@ -48,6 +49,7 @@ __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(("Calibration", "calibrate", "load"), "calibration"),
     "InputError": "errors",
+    **dict.fromkeys(("CramerRao", "cramer_rao"), "estimate.bounds"),
     "Fit": "estimate.fit",
     "fit": "estimate.methods",
     **dict.fromkeys(
@@ -87,6 +89,7 @@ __all__ = [
     "BiasInstability",
     "Calibration",
     "Channel",
+    "CramerRao",
     "Fit",
     "GaussMarkov",
     "InputError",
@@ -104,6 +107,7 @@ __all__ = [
     "WaveletVariance",
     "WhiteNoise",
     "calibrate",
+    "cramer_rao",
     "fit",
     "haar_covariance",
     "load",

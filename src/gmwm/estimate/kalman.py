@@ -117,7 +117,7 @@ def whiten(
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(
+def filtered(
     F: FloatArray,
     Q: FloatArray,
     h: FloatArray,
@@ -213,7 +213,7 @@ def smooth(
     """
     n, m = Y.shape
     p = h.size
-    X, C, G, V, S = _filter(F, Q, h, r, P0, Y, A0, U)
+    X, C, G, V, S = filtered(F, Q, h, r, P0, Y, A0, U)
     D = np.zeros((max(n - 1, 0), p, p))
     R = np.zeros((m, p))
     N = np.zeros((p, p))

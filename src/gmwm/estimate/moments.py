@@ -72,7 +72,7 @@ class Moments:
         if noise.lines():
             covariance += line_covariance(noise.lines(), noise.psd, wv.n, wv.dt)
         if self.slope_is_free and self.slope is not None:
-            covariance = detrended_covariance(covariance, wv, noise.psd, self.slope)
+            covariance = detrended_covariance(covariance, wv.n, wv.dt, noise.psd, self.slope)
         return covariance
 
 

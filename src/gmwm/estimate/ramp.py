@@ -16,7 +16,7 @@ from scipy.linalg import solve_toeplitz
 
 from gmwm._typing import FloatArray
 from gmwm.process.spectral import PSD
-from gmwm.variance.covariance import block_density, mean_covariance
+from gmwm.variance.covariance import block_density, dyadic_levels, mean_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _LARGEST_SHARE = 0.95  # of a level's variance that detrending may take
@@ -70,15 +70,16 @@ def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:
 
 
 def detrended_covariance(
-    covariance: FloatArray, wv: WaveletVariance, psd: PSD, slope: Slope
+    covariance: FloatArray, n: int, dt: float, psd: PSD, slope: Slope
 ) -> FloatArray:
     """Covariance of the wavelet variances after the estimated slope was removed, u^4, (J, J).
 
     The coefficients lose the covariance c = tau_j tau_k var(slope)/4 at every lag, which turns
     the mean of 2 g^2 into that of 2 (g - c)^2.
     """
-    common = 0.25 * np.outer(wv.tau, wv.tau) * slope.variance
-    means = mean_covariance(psd, wv.n, wv.dt)
+    tau = dyadic_levels(n) * dt
+    common = 0.25 * np.outer(tau, tau) * slope.variance
+    means = mean_covariance(psd, n, dt)
     taken = 4.0 * common * means - 2.0 * common**2
     # c is a mean over the record; at the coarsest levels it can take more than there is.
     excess = np.maximum(np.diag(taken) / np.diag(covariance) / _LARGEST_SHARE, 1.0)
