@@ -100,6 +100,30 @@ def curves(
     ax.legend(fontsize="small", framealpha=0.9)
 
 
+def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, float]]) -> None:
+    """Straight lines across the log-log axes of `deviation`, thick over a region of each.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        With its limits set; they stay as they are.
+    lines : mapping of str to (slope, coefficient, first, last)
+        Label -> the line ``coefficient * tau^slope`` and the averaging times (s) of its region.
+    """
+    ends = np.array(ax.get_xlim())
+    limits = ax.get_ylim()
+    for colour, (label, line) in zip(_cycle(len(lines)), lines.items(), strict=True):
+        slope, coefficient, first, last = line
+        region = np.array([first, last])
+        ax.plot(ends, coefficient * ends**slope, color=colour, linewidth=1.0, linestyle="--",
+                zorder=2)  # fmt: skip
+        ax.plot(region, coefficient * region**slope, color=colour, linewidth=4.5, alpha=0.8,
+                solid_capstyle="round", label=label, zorder=3.5)  # fmt: skip
+    ax.set_xlim(*ends)
+    ax.set_ylim(*limits)
+    ax.legend(fontsize="small", framealpha=0.9)
+
+
 def trace(values: FloatArray, ax: Axes | None = None) -> Axes:
     """Log-likelihood that is still to be gained, against the iteration; returns the axes.
 

@@ -11,6 +11,7 @@ from gmwm._typing import FloatArray
 from gmwm.estimate.coordinates import Coordinates, fitted_model
 from gmwm.estimate.discrepancy import chi_square, suffices
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.information import slope_dof
 from gmwm.estimate.moments import Moments
 from gmwm.estimate.profile import weight_root
 from gmwm.estimate.ramp import Slope
@@ -73,7 +74,9 @@ def conclude(
         keys_of[coordinates.places[i], _linear(processes[i])]: bound for i, bound in absent.items()
     }
     upper |= _insignificant(coordinates, processes, covariance, present, keys)
+    dof = np.inf
     if slope is not None:
+        dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
         keys.append(next(i.key for i in model.parameters if i.parameter.role == "slope"))
         matrix = np.pad(matrix, (0, 1))
         matrix[-1, -1] = slope.variance
@@ -85,7 +88,7 @@ def conclude(
         *merged_remarks(model, ordered, matrix),
     ]
     noise = Model(tuple(p for i, p in enumerate(processes) if i not in absent))
-    objective, p_value, dof, misfits, poor = _agreement(
+    objective, p_value, levels, misfits, poor = _agreement(
         coordinates.model, noise, slope, wv, len(present)
     )
     return Fit(
@@ -95,7 +98,7 @@ def conclude(
         covariance=matrix,
         upper_bounds=upper,
         objective=objective,
-        dof=dof,
+        dof=levels,
         discrepancy=0.0,
         p_value=p_value,
         method=method,
@@ -104,6 +107,7 @@ def conclude(
         remarks=(*said, *misfits),
         log_likelihood=log_likelihood,
         trace=tuple(trace),
+        slope_dof=dof,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,6 +54,11 @@ class Region:
     coefficient: float
 
 
+def slope_name(slope: float) -> str:
+    """A slope of the Allan deviation as people write it: -1, -1/2, 0, +1/2, +1."""
+    return f"{'+' if slope > 0.0 else ''}{Fraction(slope)}"
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """An estimated error model of one channel.
@@ -90,6 +96,8 @@ class Fit:
         At the estimate, of the methods that maximise it; NaN for the others.
     trace : tuple of float
         Log-likelihood after each iteration of EM.
+    slope_dof : float
+        Degrees of freedom of the variance of a ramp's slope.
     regions : tuple of Region
         What ``method="allan"`` read the parameters from.
     """
@@ -109,6 +117,7 @@ class Fit:
     remarks: tuple[str, ...]
     log_likelihood: float = float("nan")
     trace: tuple[float, ...] = ()
+    slope_dof: float = float("inf")
     regions: tuple[Region, ...] = ()
 
     # -- numbers ----------------------------------------------------------------------------------
@@ -133,7 +142,8 @@ class Fit:
         """Confidence intervals that keep to the parameters' ranges.
 
         Positive parameters have intervals in the logarithm, with quantiles of Student's t for the
-        degrees of freedom that their relative error stands for; one that is not significantly above
+        degrees of freedom that their relative error stands for; a slope has those of
+        ``slope_dof``; one that is not significantly above
         zero goes from zero to its upper bound (which is one of 95 %).
 
         Parameters
@@ -159,7 +169,7 @@ class Fit:
             if key in self.upper_bounds:
                 result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
-                result[key] = _interval(item, value, errors[key], level)
+                result[key] = _interval(item, value, errors[key], level, self.slope_dof)
         return result
 
     # -- curves -----------------------------------------------------------------------------------
@@ -275,7 +285,11 @@ class Fit:
         return _METHOD_NAMES[self.method]
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Allan deviation with error bars, fitted curve and components; returns the axes."""
+        """Allan deviation with error bars, fitted curve and components; returns the axes.
+
+        For ``method="allan"`` the lines and the regions that they were read from take the place of
+        the components.
+        """
         from gmwm import plot
 
         wv = self.wv
@@ -288,10 +302,27 @@ class Fit:
             title=wv.name,
             ax=ax,
         )
-        components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
         total = np.sqrt(2.0 * self.implied)
+        if self.regions:
+            plot.curves(axes, wv.tau, total, {}, wv.allan_deviation)
+            plot.straight_lines(axes, self._lines())
+            return axes
+        components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
         plot.curves(axes, wv.tau, total, components, wv.allan_deviation)
         return axes
+
+    def _lines(self) -> dict[str, tuple[float, float, float, float]]:
+        """Lines of the Allan plot as `gmwm.plot.straight_lines` takes them."""
+        units = {row["key"]: row["unit"] for row in self.rows()}
+        return {
+            f"{r.key} = {self.params[r.key]:.3g} {units[r.key]} (slope {slope_name(r.slope)})": (
+                r.slope,
+                r.coefficient,
+                r.tau_min,
+                r.tau_max,
+            )
+            for r in self.regions
+        }
 
     def plot_trace(self, ax: Axes | None = None) -> Axes:
         """Log-likelihood against the iterations of EM; returns the axes.
@@ -332,6 +363,7 @@ class Fit:
             "units": {row["key"]: row["unit"] for row in self.rows()},
             "log_likelihood": None if np.isnan(self.log_likelihood) else self.log_likelihood,
             "trace": list(self.trace),
+            "slope_dof": None if np.isinf(self.slope_dof) else self.slope_dof,
             "regions": [asdict(region) for region in self.regions],
             "wavelet_variance": self.wv.to_dict(),
         }
@@ -363,16 +395,17 @@ class Fit:
             remarks=tuple(content["remarks"]),
             log_likelihood=_number(content.get("log_likelihood")),
             trace=tuple(content.get("trace", ())),
+            slope_dof=_number(content.get("slope_dof"), float("inf")),
             regions=tuple(Region(**region) for region in content.get("regions", ())),
         )
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
+def _number(value: float | None, missing: float = float("nan")) -> float:
+    return missing if value is None else float(value)
 
 
 def _interval(
-    item: ModelParameter, value: float, error: float, level: float
+    item: ModelParameter, value: float, error: float, level: float, slope_dof: float
 ) -> tuple[float, float]:
     parameter = item.parameter
     if parameter.lower == 0.0 and value > 0.0:
@@ -383,7 +416,8 @@ def _interval(
         quantile = float(t.ppf(0.5 + 0.5 * level, max(2.0 / relative**2, 1.0)))
         ratio = float(np.exp(quantile * relative))
         return value / ratio, min(value * ratio, parameter.upper)
-    half_width = float(norm.ppf(0.5 + 0.5 * level)) * error
+    dof = slope_dof if parameter.role == "slope" else np.inf
+    half_width = float(t.ppf(0.5 + 0.5 * level, max(dof, 1.0))) * error
     return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.coordinates import Coordinates
-from gmwm.process import Process
+from gmwm.process import Model, Process
 from gmwm.process.spectral import evaluated, legendre
 
 _STEP = 1e-5
@@ -69,3 +69,41 @@ def spectral_information(
     f, weight = frequency_nodes(n, dt)
     slopes = log_slopes(coordinates, processes, f, dt)
     return np.asarray(slopes.T @ (weight[:, None] * slopes))
+
+
+def slope_dof(
+    model: Model, keys: Sequence[str], covariance: FloatArray, n: int, dt: float
+) -> float:
+    """Degrees of freedom of the variance of a ramp's estimated slope.
+
+    That variance is computed from estimated noise; one of relative error r has 2/r^2 degrees of
+    freedom (Satterthwaite 1946, *Biometrics Bulletin* 2, 110-114). By the spectrum it is the
+    inverse of ``int |T|^2 / S df`` with T the Fourier transform of the ramp.
+
+    Parameters
+    ----------
+    model : Model
+        With the estimates.
+    keys : sequence of str
+        The estimated parameters of its noise.
+    covariance : (d, d) ndarray
+        Of these.
+    n : int
+    dt : float
+        Sampling interval, s.
+    """
+    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
+    processes = [model.terms[i] for i in coordinates.places]
+    by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
+    names = [by_term[coordinates.places[i], name] for i, name in coordinates.names]
+    if not names:
+        return np.inf
+    order = [list(keys).index(name) for name in names]
+    f, weight = frequency_nodes(n, dt)
+    phase = np.pi * f * n * dt
+    ramp = ((np.sin(phase) - phase * np.cos(phase)) / f**2) ** 2
+    share = weight * ramp / density(processes, f, dt)
+    by_z = share @ log_slopes(coordinates, processes, f, dt) / np.sum(share)
+    gradient = np.linalg.solve(coordinates.jacobian(processes).T, by_z)
+    variance = float(gradient @ covariance[np.ix_(order, order)] @ gradient)
+    return 2.0 / variance if variance > 0.0 else np.inf

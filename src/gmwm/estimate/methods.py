@@ -7,6 +7,7 @@ from typing import Any
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.allan import fit_allan
 from gmwm.estimate.em import fit_em
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit_gmwm
@@ -15,7 +16,7 @@ from gmwm.process import Model, Process, as_model
 from gmwm.recording import Channel
 from gmwm.variance.wavelet import WaveletVariance, as_channel, as_wavelet_variance
 
-_OF_VARIANCES: dict[str, Callable[..., Fit]] = {"gmwm": fit_gmwm}
+_OF_VARIANCES: dict[str, Callable[..., Fit]] = {"gmwm": fit_gmwm, "allan": fit_allan}
 _OF_SAMPLES: dict[str, Callable[..., Fit]] = {
     "mle": fit_mle,
     "whittle": fit_whittle,

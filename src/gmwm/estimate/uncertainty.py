@@ -12,6 +12,7 @@ from gmwm.estimate.coordinates import shape_jacobian
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.information import slope_dof
 from gmwm.estimate.profile import Point, omega_root, weight_root
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
@@ -80,7 +81,9 @@ def describe(
     p_value = float("nan")
     if dof > 0 and np.all(basis > 0.0):
         p_value = float(chi2.sf(chi_square(target, implied, covariance, basis)[1], dof))
+    dof_of_slope = np.inf
     if slope_is_free and slope is not None:
+        dof_of_slope = slope_dof(model, keys, matrix, wv.n, wv.dt)
         ramp_key = next(i.key for i in model.parameters if i.parameter.role == "slope")
         keys = (*keys, ramp_key)
         matrix = np.pad(matrix, (0, 1))
@@ -109,6 +112,7 @@ def describe(
         omega=omega,
         valid=not remarks and not poor,
         remarks=(*remarks, *misfits),
+        slope_dof=dof_of_slope,
     )
 
 
