@@ -12,6 +12,7 @@ import click
 
 from gmwm import __version__
 from gmwm.errors import InputError
+from gmwm.study.command import reproduce
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -125,6 +126,9 @@ def demo(output: Path, hours: float, seed: int) -> None:
     for name, fit in selected.fits.items():
         click.echo(f"  {name:8}  {describe(fit.model)}")
     click.echo(f"\n{written}")
+
+
+cli.add_command(reproduce)
 
 
 def main() -> None:

@@ -13,8 +13,8 @@ from gmwm.errors import InputError
 
 
 @contextmanager
-def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
-    """Open a text file for writing under a temporary name; it takes its own when all went well.
+def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary file to be filled; it takes its own name when all went well.
 
     Raises
     ------
@@ -24,11 +24,11 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     target = Path(path)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        os.close(handle)
     except OSError as error:
         raise InputError(_sentence(target, error)) from None
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            yield stream
+        yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, target)
     except OSError as error:
@@ -36,6 +36,19 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     finally:
         with suppress(FileNotFoundError):
             os.unlink(name)
+
+
+@contextmanager
+def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
+    """Open a text file for writing under a temporary name; it takes its own when all went well.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    with moved_into_place(path) as name, open(name, "w", encoding="utf-8") as stream:
+        yield stream
 
 
 def replaceable(path: Path) -> Path:

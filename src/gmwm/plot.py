@@ -14,6 +14,7 @@ from gmwm._typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195")
 """Okabe & Ito's palette, told apart by colour-blind people too; black is the sum."""
@@ -21,6 +22,7 @@ COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56
 DATA_COLOUR = "#444444"
 SUM_COLOUR = "#000000"
 
+_SPREAD_SHOWN = 8.0  # boxes up to this many times the narrowest are kept in view
 _DECADES_SHOWN_BELOW = 0.7  # of a component, below the lowest data point
 
 
@@ -157,3 +159,74 @@ def deviation_range(shown: FloatArray) -> tuple[float, float]:
 def _cycle(count: int) -> list[str]:
     palette = COMPONENT_COLOURS
     return [palette[i % len(palette)] for i in range(count)]
+
+
+def boxes(
+    panels: Mapping[str, Mapping[str, FloatArray]],
+    truths: Mapping[str, float],
+    *,
+    title: str = "",
+) -> Figure:
+    """Boxplots side by side: one panel a quantity, one box a method, the truth as a line.
+
+    The axis of a panel shows the boxes and whiskers of all methods but those whose spread would
+    flatten the others; what lies outside is counted at the edge.
+
+    Parameters
+    ----------
+    panels : mapping of str to mapping of str to (runs,) ndarray
+        Quantity -> method -> estimates.
+    truths : mapping of str to float
+        Quantity -> true value.
+    title : str, optional
+    """
+    import matplotlib.pyplot as plt
+
+    columns = min(len(panels), 4) if len(panels) != 6 else 3
+    rows = -(-len(panels) // columns)
+    methods = len(next(iter(panels.values())))
+    width = columns * max(2.2, 0.62 * methods + 1.0)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(width, 3.1 * rows + 0.3), layout="constrained", squeeze=False
+    )
+    for ax in axes.ravel()[len(panels) :]:
+        ax.set_visible(False)
+    for ax, (name, samples) in zip(axes.ravel(), panels.items(), strict=False):
+        _panel(ax, samples, truths[name])
+        ax.set_title(name, fontsize="medium")
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
+    labels, values = list(samples), list(samples.values())
+    ax.boxplot(
+        values,
+        tick_labels=labels,
+        widths=0.6,
+        flierprops={"marker": ".", "markersize": 3, "markeredgecolor": DATA_COLOUR},
+        medianprops={"color": COMPONENT_COLOURS[0], "linewidth": 1.6},
+    )
+    ax.axhline(truth, color=COMPONENT_COLOURS[1], linewidth=1.2, linestyle="--", zorder=0)
+    spans = [np.quantile(v, [0.001, 0.25, 0.75, 0.999]) for v in values if v.size]
+    narrow = min(span[2] - span[1] for span in spans)
+    shown = [s for s in spans if s[2] - s[1] <= _SPREAD_SHOWN * narrow]
+    low, high = min(s[0] for s in shown), max(s[3] for s in shown)
+    low, high = min(low, truth), max(high, truth)
+    margin = 0.08 * (high - low)
+    ax.set_ylim(low - margin, high + margin)
+    for place, value in enumerate(values, start=1):
+        outside = np.sum(value > high + margin), np.sum(value < low - margin)
+        for count, y, align in ((outside[0], 1.0, "top"), (outside[1], 0.0, "bottom")):
+            if count:
+                arrow = "\u2191" if align == "top" else "\u2193"
+                ax.annotate(
+                    f"{count}{arrow}", (place, y), xycoords=("data", "axes fraction"),
+                    ha="center", va=align, fontsize="small", color=COMPONENT_COLOURS[1],
+                )  # fmt: skip
+    ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    ax.grid(True, axis="y", color="#dddddd", linewidth=0.6)
+    ax.set_axisbelow(True)
+    if len(labels) > 3:
+        ax.tick_params(axis="x", labelsize="small")

@@ -1,0 +1,124 @@
+"""Appendix A of the paper: straight lines in the Allan plot are inconsistent for sums.
+
+The Allan variance of white noise plus random walk is ``sigma2_WN / tau + sigma2_RW (2 tau^2 + 1) /
+(6 tau)`` at dt = 1 s. The classical method fits a line of slope -1 (in the variance) to the first
+scales for the one and a line of slope +1 to the last for the other, as if each had its scales to
+itself. Least squares on fixed scales is linear in the unbiased Allan variances, so its expectation
+is exact and the same for every length of record: more data bring the estimates closer to it, not
+to the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.estimate.methods import fit
+from gmwm.process import RandomWalk, WhiteNoise
+from gmwm.variance.wavelet import wavelet_variance
+
+TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
+LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
+NAMES = ("sigma2_WN", "sigma2_RW")
+_TRUE = np.array([0.04, 4e-4])
+_WHITE_SCALES = np.array([1.0, 2.0, 4.0, 8.0])
+_WALK_SCALES = np.array([16.0, 32.0, 64.0, 128.0])
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Means over the runs at one length.
+
+    Attributes
+    ----------
+    n, runs : int
+    expected : (2,) ndarray
+        Of the Allan estimates of sigma2_WN and sigma2_RW, computed.
+    allan, allan_error : (2,) ndarray
+        Their mean over the runs, and its standard error.
+    gmwm, gmwm_error : (2,) ndarray
+        The same of GMWM.
+    """
+
+    n: int
+    runs: int
+    expected: FloatArray
+    allan: FloatArray
+    allan_error: FloatArray
+    gmwm: FloatArray
+    gmwm_error: FloatArray
+
+
+def allan_least_squares(tau: FloatArray, allan_variance: FloatArray) -> FloatArray:
+    """Least-squares lines through the first and the last scales, (2,).
+
+    Parameters
+    ----------
+    tau : (J,) ndarray
+        Averaging times 1, 2, 4, ... s, at least to 128 s.
+    allan_variance : (J,) ndarray
+    """
+    return np.array(
+        [
+            _line(tau, allan_variance, _WHITE_SCALES, 1.0 / _WHITE_SCALES),
+            _line(tau, allan_variance, _WALK_SCALES, _WALK_SCALES / 3.0),
+        ]
+    )
+
+
+def _line(tau: FloatArray, values: FloatArray, scales: FloatArray, shape: FloatArray) -> float:
+    chosen = np.isin(tau, scales)
+    return float(shape @ values[chosen] / (shape @ shape))
+
+
+def expectation() -> FloatArray:
+    """Expected value of `allan_least_squares` under `TRUTH`, whatever the length, (2,)."""
+    tau = np.concatenate([_WHITE_SCALES, _WALK_SCALES])
+    return allan_least_squares(tau, 2.0 * TRUTH.haar_variance(tau, 1.0))
+
+
+def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
+    """Monte Carlo for growing length, Allan lines and GMWM on the same series."""
+    from joblib import Parallel, delayed
+
+    result = []
+    for n in LENGTHS:
+        work = partial(_one_run, n, seed)
+        pairs = Parallel(n_jobs=jobs)(delayed(work)(run) for run in range(runs))
+        estimates = np.array(pairs)
+        mean = estimates.mean(axis=0)
+        error = estimates.std(axis=0, ddof=1) / np.sqrt(runs)
+        result.append(Convergence(n, runs, expectation(), mean[0], error[0], mean[1], error[1]))
+    return result
+
+
+def _one_run(n: int, seed: int, run: int) -> list[FloatArray]:
+    series = TRUTH.simulate(n, 1.0, np.random.default_rng([seed, n, run]))
+    wv = wavelet_variance(series, 1.0)
+    params = fit(TRUTH.opened(), wv).params
+    return [
+        allan_least_squares(wv.tau, wv.allan_variance),
+        np.array([params["N"] ** 2, params["K"] ** 2]),
+    ]
+
+
+def text(rows: list[Convergence]) -> str:
+    """The table, 80 columns wide."""
+    lines = [
+        "Appendix A: least squares on the Allan variance of white noise + random walk",
+        f"lines over 1-8 s and 16-128 s; means of {rows[0].runs} runs with standard errors",
+    ]
+    for k, name in enumerate(NAMES):
+        lines += [
+            "",
+            f"{name}, truth {_TRUE[k]:g}",
+            f"{'n':>11}{'Allan, expected':>18}{'Allan, mean':>24}{'GMWM, mean':>24}",
+        ]
+        for row in rows:
+            allan = f"{row.allan[k]:.5g} +- {row.allan_error[k]:.2g}"
+            gmwm = f"{row.gmwm[k]:.5g} +- {row.gmwm_error[k]:.2g}"
+            lines.append(f"{row.n:>11,}{row.expected[k]:>18.5g}{allan:>24}{gmwm:>24}")
+    return "\n".join(lines)

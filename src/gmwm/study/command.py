@@ -1,0 +1,140 @@
+"""``gmwm reproduce``: parse, run, print, write."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from gmwm.study.runs import Progress
+    from gmwm.study.scenario import Scenario
+
+EXPERIMENTS = (
+    "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
+)  # fmt: skip
+
+
+@click.command()
+@click.argument("experiment", type=click.Choice(EXPERIMENTS))
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-study"),
+              show_default=True, help="Folder for tables, figures and raw estimates.")  # fmt: skip
+@click.option("--runs", type=click.IntRange(min=2), help="Number of simulated series.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
+@click.option("--method", "methods", multiple=True, metavar="NAME",
+              help="Only this method, e.g. GMWM; repeat. By default all of the table.")  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
+@click.option("--cluster", metavar="ADDRESS",
+              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
+def reproduce(
+    experiment: str,
+    output: Path,
+    runs: int | None,
+    seed: int,
+    jobs: int | None,
+    methods: tuple[str, ...],
+    resume: bool,
+    cluster: str | None,
+) -> None:
+    """Repeat an experiment of Stebler et al. (2012), or our own harder one.
+
+    table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
+    bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
+    the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
+    shows the bias of lines in the Allan plot. Times are in seconds, rates in 1/s. Raw estimates
+    are kept in Parquet.
+
+    \b
+    Example:
+      gmwm reproduce table2 --runs 200 -o study
+      gmwm reproduce fig2 --runs 200 -o study --resume
+    """
+    from gmwm.files import output_folder
+
+    folder = output_folder(output)
+    processes = jobs or os.cpu_count() or 1
+    if experiment == "appendix-a":
+        _appendix(folder, runs or 200, seed, processes)
+        return
+    from gmwm.study.runs import run_scenario
+    from gmwm.study.scenario import FIGURES, SCENARIOS
+
+    scenario = FIGURES.get(experiment) or SCENARIOS[experiment]
+    try:
+        with _progress(scenario.name) as progress:
+            table = run_scenario(
+                scenario, folder, runs=runs or scenario.runs, seed=seed, methods=methods or None,
+                jobs=processes, resume=resume, cluster=cluster, progress=progress,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+        raise
+    written = [_raw(scenario, table, folder)]
+    if experiment in FIGURES:
+        from gmwm.study.figures import boxplots
+
+        written += boxplots(scenario, table, folder / experiment)
+    else:
+        written += _tables(scenario, table, seed, folder)
+    click.echo("\n".join(f"wrote {path}" for path in written))
+
+
+def _raw(scenario: Scenario, table: pa.Table, folder: Path) -> Path:
+    import pyarrow.parquet as pq
+
+    from gmwm.files import moved_into_place
+
+    target = folder / f"{scenario.name}.parquet"
+    with moved_into_place(target) as temporary:
+        pq.write_table(table, temporary)
+    return target
+
+
+def _tables(scenario: Scenario, table: pa.Table, seed: int, folder: Path) -> list[Path]:
+    from gmwm.files import written
+    from gmwm.study.summary import summarise
+
+    summary = summarise(scenario, table, seed)
+    targets = [folder / f"{scenario.name}.txt", folder / f"{scenario.name}.md"]
+    for target, text in zip(targets, (str(summary), summary.markdown()), strict=True):
+        with written(target) as stream:
+            stream.write(text + "\n")
+    click.echo(f"{summary}\n")
+    return targets
+
+
+def _appendix(folder: Path, runs: int, seed: int, jobs: int) -> None:
+    from gmwm.files import written
+    from gmwm.study.appendix import converge, text
+
+    report = text(converge(runs, seed, jobs))
+    target = folder / "appendix-a.txt"
+    with written(target) as stream:
+        stream.write(report + "\n")
+    click.echo(f"{report}\n\nwrote {target}")
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Progress]:
+    """A bar with the time that is left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+               TextColumn("runs,"), TimeRemainingColumn(), TextColumn("left"))  # fmt: skip
+    with Bar(*columns, console=Console(file=sys.stderr), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+
+        def advance(finished: int, total: int) -> None:
+            bar.update(task, completed=finished, total=total)
+
+        yield advance

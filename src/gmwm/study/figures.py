@@ -1,0 +1,50 @@
+"""Boxplots of the estimates, as in Figures 2 to 4 of the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from gmwm import plot
+from gmwm._typing import FloatArray
+from gmwm.files import moved_into_place
+from gmwm.study.scenario import Scenario
+
+
+def boxplots(scenario: Scenario, table: pa.Table, stem: Path) -> list[Path]:
+    """Draw one panel a quantity, one box a method; returns the PNG and the SVG.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    table : pyarrow.Table
+        As `gmwm.study.runs.run_scenario` gives it.
+    stem : Path
+        Where to, without suffix.
+    """
+    import matplotlib.pyplot as plt
+
+    names = np.array(table["method"].to_pylist())
+    methods = [m for m in scenario.methods if m in set(names)]
+    panels = {
+        quantity.name: {
+            method: _finite(table[quantity.name].to_numpy()[names == method]) for method in methods
+        }
+        for quantity in scenario.quantities
+    }
+    truths = {quantity.name: scenario.true_value(quantity) for quantity in scenario.quantities}
+    figure = plot.boxes(panels, truths, title=scenario.title)
+    written = []
+    for suffix in (".png", ".svg"):
+        target = stem.with_suffix(suffix)
+        with moved_into_place(target) as temporary:
+            figure.savefig(temporary, format=suffix[1:], dpi=150)
+        written.append(target)
+    plt.close(figure)
+    return written
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return values[np.isfinite(values)]

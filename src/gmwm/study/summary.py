@@ -1,0 +1,199 @@
+"""What the runs of a scenario say: errors against the truth, the bound and the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+
+from gmwm._typing import FloatArray
+from gmwm.estimate.bounds import cramer_rao
+from gmwm.study.scenario import Quantity, Scenario
+
+
+@dataclass(frozen=True)
+class Score:
+    """One method on one quantity.
+
+    Attributes
+    ----------
+    rmse : float
+        Root mean square error of the runs with an estimate.
+    relative : float
+        The same over the true value.
+    bias : float
+        Mean error over the true value.
+    ratio : float
+        ``relative`` over the Cramer-Rao bound.
+    moment_ratio : float
+        ``relative`` over the bound of estimators by wavelet variances.
+    coverage : float
+        Share of the runs whose 95 % interval holds the truth.
+    missing : int
+        Runs without an estimate.
+    published : float
+        Relative error in the paper, NaN where there is none.
+    """
+
+    rmse: float
+    relative: float
+    bias: float
+    ratio: float
+    moment_ratio: float
+    coverage: float
+    missing: int
+    published: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """All methods on all quantities of a scenario.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    runs : int
+    seed : int
+    scores : mapping
+        (quantity, method) -> Score.
+    bounds : mapping
+        Quantity -> relative Cramer-Rao bound.
+    invalid : mapping
+        Method -> runs that the method itself calls not valid.
+    seconds : mapping
+        Method -> median time of an estimate, s.
+    """
+
+    scenario: Scenario
+    runs: int
+    seed: int
+    scores: Mapping[tuple[str, str], Score]
+    bounds: Mapping[str, float]
+    invalid: Mapping[str, int]
+    seconds: Mapping[str, float]
+
+    @property
+    def methods(self) -> list[str]:
+        """Methods in the order of the scenario."""
+        return [m for m in self.scenario.methods if m in self.invalid]
+
+    def __str__(self) -> str:
+        s = self.scenario
+        lines = [
+            s.title,
+            f"{self.runs:,} runs of {s.n:,} samples at {1.0 / s.dt:g} Hz, seed {self.seed}",
+            "",
+            f"{'quantity':<11}{'method':<9}{'RMSE':>10}{'relative':>10}{'/ bound':>9}"
+            f"{'bias':>9}{'covers':>9}{'paper':>10}",
+        ]
+        for quantity in s.quantities:
+            for method in self.methods:
+                lines.append(_line(quantity, method, self.scores[quantity.name, method]))
+            bound = self.bounds[quantity.name]
+            absolute = bound * abs(s.true_value(quantity))
+            lines += [f"{'':<11}{'bound':<9}{absolute:>10.3g}{bound:>10.3g}", ""]
+        lines += [f"{'':<11}{'method':<9}{'not valid':>10}{'median time':>14}"]
+        for method in self.methods:
+            time = f"{self.seconds[method]:.2g} s"
+            lines.append(f"{'':<11}{method:<9}{self.invalid[method]:>10,}{time:>14}")
+        lines += [
+            "",
+            "relative, bias: over the true value; bound: Cramer-Rao; covers: 95 % intervals",
+        ]
+        return "\n".join([*lines, *(_wrapped(note) for note in s.notes)])
+
+    def markdown(self) -> str:
+        """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""
+        head = ["", *self.methods, "Cramer-Rao bound"]
+        rows = [head, ["---"] * len(head)]
+        for quantity in self.scenario.quantities:
+            name, truth = quantity.name, abs(self.scenario.true_value(quantity))
+            scores = [self.scores[name, method] for method in self.methods]
+            bound = self.bounds[name]
+            rows.append(
+                [name, *(_cell(x.rmse, x.relative) for x in scores), _cell(bound * truth, bound)]
+            )
+            if quantity.published:
+                rows.append(
+                    [
+                        f"{name}, paper",
+                        *(_cell(x.published * truth, x.published) for x in scores),
+                        "",
+                    ]
+                )
+        return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def summarise(scenario: Scenario, table: pa.Table, seed: int) -> Summary:
+    """Scores of all methods in ``table``, as `gmwm.study.runs.run_scenario` gives it."""
+    bound = cramer_rao(scenario.truth, scenario.n, scenario.dt)
+    names = np.array(table["method"].to_pylist())
+    methods = [m for m in scenario.methods if m in set(names)]
+    scores, bounds = {}, {}
+    for quantity in scenario.quantities:
+        true = scenario.truth.params[quantity.key] or 1.0
+        factor = abs(quantity.power / true)
+        best = bound.stderr[quantity.key] * factor
+        moments = bound.wavelet_stderr[quantity.key] * factor
+        bounds[quantity.name] = best
+        value = scenario.true_value(quantity)
+        columns = [table[quantity.name + end].to_numpy() for end in ("", "_lower", "_upper")]
+        for method in methods:
+            chosen = [column[names == method] for column in columns]
+            scores[quantity.name, method] = _score(quantity, method, value, chosen, best, moments)
+    valid = np.array(table["valid"].to_pylist())
+    seconds = table["seconds"].to_numpy()
+    return Summary(
+        scenario=scenario,
+        runs=len(set(table["run"].to_pylist())),
+        seed=seed,
+        scores=scores,
+        bounds=bounds,
+        invalid={m: int(np.sum(~valid[names == m])) for m in methods},
+        seconds={m: float(np.median(seconds[names == m])) for m in methods},
+    )
+
+
+def _score(
+    quantity: Quantity,
+    method: str,
+    value: float,
+    columns: Sequence[FloatArray],
+    bound: float,
+    moments: float,
+) -> Score:
+    estimate, lower, upper = columns
+    there = np.isfinite(estimate)
+    error = estimate[there] / value - 1.0
+    relative = float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
+    inside = (lower[there] <= value) & (value <= upper[there])
+    return Score(
+        rmse=relative * abs(value),
+        relative=relative,
+        bias=float(np.mean(error)) if error.size else float("nan"),
+        ratio=relative / bound,
+        moment_ratio=relative / moments,
+        coverage=float(np.mean(inside)) if error.size else float("nan"),
+        missing=int(np.sum(~there)),
+        published=quantity.published.get(method, float("nan")),
+    )
+
+
+def _line(quantity: Quantity, method: str, x: Score) -> str:
+    paper = "" if np.isnan(x.published) else f"{x.published:.3g}"
+    name = quantity.name
+    numbers = f"{x.rmse:>10.3g}{x.relative:>10.3g}{x.ratio:>9.2f}{x.bias:>9.1%}{x.coverage:>9.1%}"
+    line = f"{name:<11}{method:<9}{numbers}{paper:>10}"
+    return line + (f"  ({x.missing} without)" if x.missing else "")
+
+
+def _cell(absolute: float, relative: float) -> str:
+    return "-" if np.isnan(relative) else f"{absolute:.3g} ({relative:.3g})"
+
+
+def _wrapped(note: str) -> str:
+    import textwrap
+
+    return textwrap.fill(note, 80, initial_indent="- ", subsequent_indent="  ")
