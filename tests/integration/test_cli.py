@@ -616,3 +616,57 @@ def test_json_of_the_command_line_is_strict(calibrated):
 
     text = (calibrated[2] / "calibration.json").read_text()
     json.loads(text, parse_constant=refuse)
+
+
+# -- reproduce ------------------------------------------------------------------------------------
+
+
+def test_reproduce_prints_the_table_and_keeps_the_runs(run, tmp_path):
+    arguments = ("reproduce", "table2", "--runs", 3, "--jobs", 1, "--method", "GMWM", "-o", "s")
+    code, printed, told = run(*arguments)
+    assert code == 0, told
+    lines = printed.splitlines()
+    assert lines[0] == "Table II: white noise + random walk + rate ramp"
+    assert lines[1] == "3 runs of 6,000 samples at 1 Hz, seed 0"
+    assert max(map(len, lines)) <= WIDTH
+    names = sorted(path.name for path in (tmp_path / "s").iterdir())
+    assert names == ["table2-runs", "table2.md", "table2.parquet", "table2.txt"]
+    assert (tmp_path / "s" / "table2.txt").read_text() in printed
+
+
+def test_reproduce_draws_the_figure_from_the_same_runs(run, tmp_path):
+    options = ("--runs", 3, "--jobs", 1, "--method", "GMWM", "-o", "s")
+    run("reproduce", "table2", *options)
+    before = (tmp_path / "s" / "table2.parquet").read_bytes()
+    code, printed, told = run("reproduce", "fig2", *options, "--resume")
+    assert code == 0, told
+    assert (tmp_path / "s" / "fig2.png").exists() and (tmp_path / "s" / "fig2.svg").exists()
+    assert (tmp_path / "s" / "table2.parquet").read_bytes() == before
+    assert "wrote s/fig2.png" in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("table9",), "table9"),
+        (("table2", "--runs", 1), "--runs"),
+        (("table2", "--method", "AV2", "--runs", 2), "it has EM, EM*, AV, MLE, GMWM"),
+        (("table2", "--seed", -1), "--seed"),
+        (("table2", "--cluster", "nonsense://x", "--runs", 2), "no Dask scheduler"),
+    ],
+)
+def test_reproduce_refuses_in_one_sentence(run, arguments, words):
+    if "--cluster" in arguments:
+        pytest.importorskip("distributed")
+    code, _, told = run("reproduce", *arguments, "-o", "s")
+    assert code == 2
+    assert words in told
+    assert "Traceback" not in told
+
+
+def test_reproduce_does_not_touch_earlier_runs(run):
+    arguments = ("reproduce", "table2", "--runs", 2, "--jobs", 1, "--method", "GMWM", "-o", "s")
+    run(*arguments)
+    code, _, told = run(*arguments)
+    assert code == 2
+    assert "add --resume" in told
