@@ -11,7 +11,7 @@ from gmwm._typing import FloatArray
 from gmwm.estimate.coordinates import Coordinates, fitted_model
 from gmwm.estimate.discrepancy import chi_square, suffices
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.information import slope_dof
+from gmwm.estimate.information import error_growth, slope_dof
 from gmwm.estimate.moments import Moments
 from gmwm.estimate.profile import weight_root
 from gmwm.estimate.ramp import Slope
@@ -74,6 +74,7 @@ def conclude(
         keys_of[coordinates.places[i], _linear(processes[i])]: bound for i, bound in absent.items()
     }
     upper |= _insignificant(coordinates, processes, covariance, present, keys)
+    growth = error_growth(model, keys, wv.n, wv.dt)
     dof = np.inf
     if slope is not None:
         dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
@@ -108,6 +109,7 @@ def conclude(
         log_likelihood=log_likelihood,
         trace=tuple(trace),
         slope_dof=dof,
+        error_growth=growth,
     )
 
 

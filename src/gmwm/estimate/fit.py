@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.stats import norm
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.interval import confidence_interval
 from gmwm.process import Model, model_from_list
-from gmwm.process.model import ModelParameter
 from gmwm.units import field_units, si_parameter_unit
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -26,9 +26,6 @@ _METHOD_NAMES = {
     "mle": "exact maximum likelihood",
     "whittle": "debiased Whittle likelihood",
 }
-
-UNDETERMINED = 1.0
-"""Relative standard error of a positive parameter above which its interval says nothing."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +95,9 @@ class Fit:
         Log-likelihood after each iteration of EM.
     slope_dof : float
         Degrees of freedom of the variance of a ramp's slope.
+    error_growth : dict
+        How the relative standard error of a positive parameter goes with its value: the exponent
+        of a power law, by key.
     regions : tuple of Region
         What ``method="allan"`` read the parameters from.
     """
@@ -118,6 +118,7 @@ class Fit:
     log_likelihood: float = float("nan")
     trace: tuple[float, ...] = ()
     slope_dof: float = float("inf")
+    error_growth: dict[str, float] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
 
     # -- numbers ----------------------------------------------------------------------------------
@@ -141,10 +142,8 @@ class Fit:
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that keep to the parameters' ranges.
 
-        Positive parameters have intervals in the logarithm, with quantiles of Student's t for the
-        degrees of freedom that their relative error stands for; a slope has those of
-        ``slope_dof``; one that is not significantly above
-        zero goes from zero to its upper bound (which is one of 95 %).
+        See `gmwm.estimate.interval.confidence_interval`. The interval of an amplitude that is not
+        significantly above zero goes from zero to its upper bound (which is one of 95 %).
 
         Parameters
         ----------
@@ -169,7 +168,10 @@ class Fit:
             if key in self.upper_bounds:
                 result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
-                result[key] = _interval(item, value, errors[key], level, self.slope_dof)
+                result[key] = confidence_interval(
+                    item.parameter, value, errors[key], level,
+                    growth=self.error_growth.get(key, 0.0), slope_dof=self.slope_dof,
+                )  # fmt: skip
         return result
 
     # -- curves -----------------------------------------------------------------------------------
@@ -364,6 +366,7 @@ class Fit:
             "log_likelihood": None if np.isnan(self.log_likelihood) else self.log_likelihood,
             "trace": list(self.trace),
             "slope_dof": None if np.isinf(self.slope_dof) else self.slope_dof,
+            "error_growth": self.error_growth,
             "regions": [asdict(region) for region in self.regions],
             "wavelet_variance": self.wv.to_dict(),
         }
@@ -396,29 +399,13 @@ class Fit:
             log_likelihood=_number(content.get("log_likelihood")),
             trace=tuple(content.get("trace", ())),
             slope_dof=_number(content.get("slope_dof"), float("inf")),
+            error_growth=dict(content.get("error_growth", {})),
             regions=tuple(Region(**region) for region in content.get("regions", ())),
         )
 
 
 def _number(value: float | None, missing: float = float("nan")) -> float:
     return missing if value is None else float(value)
-
-
-def _interval(
-    item: ModelParameter, value: float, error: float, level: float, slope_dof: float
-) -> tuple[float, float]:
-    parameter = item.parameter
-    if parameter.lower == 0.0 and value > 0.0:
-        relative = error / value
-        if relative > UNDETERMINED:
-            return 0.0, parameter.upper
-        # A variance known to a relative error of r is one of 2/r^2 degrees of freedom.
-        quantile = float(t.ppf(0.5 + 0.5 * level, max(2.0 / relative**2, 1.0)))
-        ratio = float(np.exp(quantile * relative))
-        return value / ratio, min(value * ratio, parameter.upper)
-    dof = slope_dof if parameter.role == "slope" else np.inf
-    half_width = float(t.ppf(0.5 + 0.5 * level, max(dof, 1.0))) * error
-    return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
 
 
 def _row(row: dict[str, Any]) -> str:

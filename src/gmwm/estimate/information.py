@@ -19,6 +19,9 @@ from gmwm.process.spectral import evaluated, legendre
 _STEP = 1e-5
 _PANELS_PER_OCTAVE = 8
 _NODES = 8
+_PROFILE_STEP = 0.5  # standard errors
+_STEEPEST = 1.0
+_SINGULAR = 1e10
 
 
 def frequency_nodes(n: int, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -59,7 +62,7 @@ def log_slopes(
             moved[k] += step
             pair.append(coordinates.processes(moved, processes)[i].psd(f, dt))
         columns.append((pair[0] - pair[1]) / (2.0 * _STEP) / total)
-    return np.stack(columns, axis=1)
+    return np.reshape(columns, (len(columns), f.size)).T
 
 
 def spectral_information(
@@ -92,10 +95,7 @@ def slope_dof(
     dt : float
         Sampling interval, s.
     """
-    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
-    processes = [model.terms[i] for i in coordinates.places]
-    by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
-    names = [by_term[coordinates.places[i], name] for i, name in coordinates.names]
+    coordinates, processes, names = _opened(model, keys)
     if not names:
         return np.inf
     order = [list(keys).index(name) for name in names]
@@ -107,3 +107,76 @@ def slope_dof(
     gradient = np.linalg.solve(coordinates.jacobian(processes).T, by_z)
     variance = float(gradient @ covariance[np.ix_(order, order)] @ gradient)
     return 2.0 / variance if variance > 0.0 else np.inf
+
+
+def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[str, float]:
+    """How the relative standard errors of the positive parameters go with their values.
+
+    Between the points half a standard error below and above the estimate, along which the other
+    parameters follow as they are correlated; by the expected information.
+
+    Parameters
+    ----------
+    model : Model
+        With the estimates.
+    keys : sequence of str
+        The estimated parameters of its noise.
+    n : int
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    dict
+        Key -> exponent k of the power law: relative standard error proportional to value^k.
+    """
+    coordinates, processes, names = _opened(model, keys)
+    positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
+    information = spectral_information(coordinates, processes, n, dt)
+    if not names or not _is_regular(information):
+        return {}
+    z = coordinates.pack(processes)
+    covariance = np.linalg.inv(information)
+    result = {}
+    for k, name in enumerate(names):
+        if name not in positive:
+            continue
+        step = _PROFILE_STEP * covariance[:, k] / np.sqrt(covariance[k, k])
+        step /= max(float(np.max(np.abs(step))), 1.0)  # of what is hardly known, too long
+        ends = []
+        for moved in (z - step, z + step):
+            there = coordinates.processes(moved, processes)
+            i, own = coordinates.names[k]
+            value = float(there[i].values[own] or 0.0)
+            error = _relative_error(coordinates, there, k, value, n, dt)
+            ends.append((np.log(value), np.log(error)))
+        rise = (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0])
+        if np.isfinite(rise):
+            result[name] = float(np.clip(rise, -_STEEPEST, _STEEPEST))
+    return result
+
+
+def _opened(model: Model, keys: Sequence[str]) -> tuple[Coordinates, list[Process], list[str]]:
+    """Coordinates of the parameters of these keys, the processes, and the key of each."""
+    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
+    by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
+    names = [by_term[coordinates.places[i], name] for i, name in coordinates.names]
+    return coordinates, [model.terms[i] for i in coordinates.places], names
+
+
+def _relative_error(
+    coordinates: Coordinates, processes: Sequence[Process], k: int, value: float, n: int, dt: float
+) -> float:
+    information = spectral_information(coordinates, processes, n, dt)
+    if not _is_regular(information):
+        return np.nan
+    slope = coordinates.jacobian(processes)[k, k]
+    return float(np.sqrt(np.linalg.inv(information)[k, k]) * abs(slope) / value)
+
+
+def _is_regular(information: FloatArray) -> bool:
+    """Whether its inverse means anything: a line, or a term of no amplitude, has no spectrum."""
+    deviation = np.sqrt(np.diag(information))
+    if not np.all(np.isfinite(information)) or np.any(deviation == 0.0):
+        return False
+    return bool(np.linalg.cond(information / np.outer(deviation, deviation)) < _SINGULAR)

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.design import Design
-from gmwm.estimate.fit import UNDETERMINED
+from gmwm.estimate.interval import UNDETERMINED
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.process import GaussMarkov, Model
 from gmwm.process.base import Shape

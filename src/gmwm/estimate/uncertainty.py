@@ -12,7 +12,7 @@ from gmwm.estimate.coordinates import shape_jacobian
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.information import slope_dof
+from gmwm.estimate.information import error_growth, slope_dof
 from gmwm.estimate.profile import Point, omega_root, weight_root
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
@@ -81,6 +81,7 @@ def describe(
     p_value = float("nan")
     if dof > 0 and np.all(basis > 0.0):
         p_value = float(chi2.sf(chi_square(target, implied, covariance, basis)[1], dof))
+    growth = error_growth(model, keys, wv.n, wv.dt)
     dof_of_slope = np.inf
     if slope_is_free and slope is not None:
         dof_of_slope = slope_dof(model, keys, matrix, wv.n, wv.dt)
@@ -113,6 +114,7 @@ def describe(
         valid=not remarks and not poor,
         remarks=(*remarks, *misfits),
         slope_dof=dof_of_slope,
+        error_growth=growth,
     )
 
 
