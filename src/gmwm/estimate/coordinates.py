@@ -97,7 +97,17 @@ class Coordinates:
         return np.array(z)
 
     def processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
-        """The terms at ``z``; given parameters are taken from ``like``."""
+        """The terms at ``z``; given parameters are taken from ``like``.
+
+        Raises
+        ------
+        InputError
+            Where a parameter is out of range.
+        """
+        with np.errstate(over="ignore"):
+            return self._processes(z, like)
+
+    def _processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
         result = []
         start = 0
         for process, scaled, free in zip(like, self._scaled, self._free, strict=True):

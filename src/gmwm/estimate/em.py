@@ -17,12 +17,13 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.absent import Top, idle_term, upper_bound
 from gmwm.estimate.conclusion import conclude
 from gmwm.estimate.coordinates import Coordinates
 from gmwm.estimate.expectation import Expectation, expect
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.information import spectral_information
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood, LogLikelihood, objective_of
 from gmwm.estimate.maximization import (
     StateMoments,
     check_supported,
@@ -31,7 +32,7 @@ from gmwm.estimate.maximization import (
     white,
 )
 from gmwm.estimate.ramp import Slope
-from gmwm.estimate.scoring import observed_information, regular_inverse
+from gmwm.estimate.scoring import Maximum, observed_information, regular_inverse
 from gmwm.estimate.series import Series
 from gmwm.process import GaussMarkov, Model, Process, RandomWalk, StateSpace, WhiteNoise
 from gmwm.recording import Channel
@@ -108,7 +109,7 @@ class Iteration:
                 raise InputError('drift = "state" needs an open RateRamp() in the model')
             if all(isinstance(term, WhiteNoise) for term in self._terms):
                 raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
-            self.columns = Columns.without_regressors(series.columns.matrix[:, 0], self.dt)
+            self.columns = Columns.without_regressors(series.columns.centred, self.dt)
 
     @property
     def dt(self) -> float:
@@ -179,7 +180,7 @@ class Iteration:
             latest = first
             if accelerate and len(trace) <= max_iterations:
                 second = self.maximization(first, e)
-                latest, e = self._extrapolated(stage, first, second, before)
+                latest, e = self._extrapolated(stage, first, second, trace[-1])
                 trace.append(e.log_likelihood)
             stage = latest
             gain = e.log_likelihood - before
@@ -188,7 +189,7 @@ class Iteration:
         return stage, trace, False
 
     def _extrapolated(
-        self, stage: Stage, first: Stage, second: Stage, before: float
+        self, stage: Stage, first: Stage, second: Stage, reached: float
     ) -> tuple[Stage, Expectation]:
         """A long step in the direction of two, if it climbs; else the second of them."""
         coordinates = self.series.coordinates
@@ -201,10 +202,11 @@ class Iteration:
                 far = coordinates.processes(
                     zs[0] + 2.0 * length * r + length**2 * v, stage.processes
                 )
-                e = self.expectation(Stage(far))
-            except (InputError, np.linalg.LinAlgError):
+                with np.errstate(all="ignore"):
+                    e = self.expectation(Stage(far))
+            except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
                 e = None
-            if e is not None and np.isfinite(e.log_likelihood) and e.log_likelihood >= before:
+            if e is not None and np.isfinite(e.log_likelihood) and e.log_likelihood >= reached:
                 return Stage(far), e
         return second, self.expectation(second)
 
@@ -213,24 +215,24 @@ def _describe(
     series: Series, iteration: Iteration, stage: Stage, trace: Sequence[float], converged: bool
 ) -> Fit:
     coordinates, columns = series.coordinates, series.columns
-    likelihood = KalmanLikelihood(columns)
-    information = spectral_information(coordinates, stage.processes, columns.n, columns.dt)
-    observed = observed_information(
-        lambda z: likelihood(coordinates.processes(z, stage.processes)),
-        coordinates.pack(stage.processes),
-        information,
-    )
     remarks = []
     if not converged:
         remarks.append(
             f"EM did not converge in {len(trace)} iterations: raise max_iterations or start closer"
         )
-    if np.any(np.linalg.eigvalsh(observed) <= 0.0):
+    absent: list[int] = []
+    if converged and not iteration.in_state:
+        absent = _vanishing(coordinates, stage.processes, KalmanLikelihood(columns))
+    part = coordinates.without(absent)
+    top = _top(part, [p for i, p in enumerate(stage.processes) if i not in absent], columns)
+    if not top.maximum.converged:
         remarks.append("EM did not reach a maximum of the likelihood: lower tolerance")
-        observed = information
+    bounds = {i: upper_bound(stage.processes[i], part, top, columns) for i in absent}
+    final = [p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(stage.processes)]
     slope = None
     if columns.drift_is_free:
-        slope = Slope(*columns.slope(likelihood.regression(stage.processes)))
+        regression = KalmanLikelihood(columns).regression(top.processes)
+        slope = Slope(*columns.slope(regression))
     if iteration.in_state and stage.drive is not None and slope is not None:
         slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
         first = next(p for p in stage.processes if not isinstance(p, WhiteNoise))
@@ -238,6 +240,30 @@ def _describe(
             name = "Gauss-Markov" if isinstance(first, GaussMarkov) else first.title()
             remarks.append(f"a drift that enters the {name} state is no ramp of the signal")
     return conclude(
-        coordinates, stage.processes, regular_inverse(observed), slope, series.wv, method="em",
-        log_likelihood=trace[-1], absent={}, remarks=remarks, trace=trace,
+        coordinates, final, regular_inverse(top.information), slope, series.wv, method="em",
+        log_likelihood=trace[-1], absent=bounds, remarks=remarks, trace=trace,
     )  # fmt: skip
+
+
+def _top(coordinates: Coordinates, processes: Sequence[Process], columns: Columns) -> Top:
+    """Where EM has arrived; the expected information where there is no maximum."""
+    likelihood = KalmanLikelihood(columns)
+    objective, z = objective_of(likelihood, coordinates, processes), coordinates.pack(processes)
+    expected = spectral_information(coordinates, processes, columns.n, columns.dt)
+    observed = observed_information(objective, z, expected)
+    is_maximum = bool(np.all(np.linalg.eigvalsh(observed) > 0.0))
+    information = observed if is_maximum else expected
+    return Top(tuple(processes), Maximum(z, objective(z), is_maximum), information, likelihood)
+
+
+def _vanishing(
+    coordinates: Coordinates, processes: Sequence[Process], likelihood: LogLikelihood
+) -> list[int]:
+    """Terms on their way to zero, which EM never reaches."""
+    absent: list[int] = []
+    while True:
+        present = [i for i in range(len(processes)) if i not in absent]
+        idle = idle_term(coordinates.without(absent), [processes[i] for i in present], likelihood)
+        if idle is None:
+            return absent
+        absent.append(present[idle])

@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.kalman import smooth
-from gmwm.estimate.likelihood import Columns, Regression
+from gmwm.estimate.likelihood import Columns, Regression, started
 from gmwm.process import StateSpace
 
 
@@ -75,7 +75,7 @@ def expect(
         space.process_noise,
         space.output,
         space.measurement_noise,
-        space.initial_covariance,
+        started(space),
         y,
         starts,
         inputs,

@@ -8,14 +8,21 @@ the order of the record are not taken for a drift that was removed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.coordinates import Coordinates
 from gmwm.estimate.kalman import whiten
+from gmwm.estimate.scoring import Objective
 from gmwm.process import Process, StateSpace
+
+LogLikelihood = Callable[[Sequence[Process]], float]
+
+_NO_VARIANCE = 1e-12  # of a first sample, as a share of that of one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +80,15 @@ class Columns:
         k = np.arange(n)
         self._half = max(0.5 * (n - 1), 1.0)
         series = values if not has_drift or drift is None else values - drift * dt * k
-        # Remove the mean first: a large constant would cost digits.
-        columns = [series - np.nanmean(series), np.ones(n)]
+        # Remove the mean and the line first: large ones would cost digits.
+        series = series - np.nanmean(series)
+        columns = [series, np.ones(n)]
+        self._removed = 0.0
         if self.drift_is_free:
-            columns.append(k / self._half - 1.0)
+            ramp = k / self._half - 1.0
+            centred = np.where(np.isnan(series), 0.0, ramp - np.mean(ramp[~np.isnan(series)]))
+            self._removed = float(np.nansum(centred * series) / np.sum(centred**2))
+            columns = [series - self._removed * centred, np.ones(n), ramp]
         self.matrix = np.column_stack(columns)
 
     @classmethod
@@ -86,15 +98,37 @@ class Columns:
         columns.matrix = np.ascontiguousarray(values[:, None])
         return columns
 
+    @property
+    def centred(self) -> FloatArray:
+        """The series less its mean alone, (n,)."""
+        series = self.matrix[:, 0]
+        if self.drift_is_free:
+            series = series + self._removed * self.matrix[:, -1]
+        return series - np.nanmean(series)
+
     def slope(self, regression: Regression) -> tuple[float, float]:
         """Slope (u/s) and its variance ((u/s)^2) from the last regressor."""
         unit = 1.0 / (self._half * self.dt)
-        return float(regression.beta[-1]) * unit, float(regression.covariance[-1, -1]) * unit**2
+        value = (self._removed + float(regression.beta[-1])) * unit
+        return value, float(regression.covariance[-1, -1]) * unit**2
 
 
 def stacked(processes: Sequence[Process], dt: float) -> StateSpace:
     """State space of the sum of processes."""
     return StateSpace.stack([process.state_space(dt) for process in processes])
+
+
+def started(space: StateSpace) -> FloatArray:
+    """Covariance of the first state that leaves the first sample a variance, (p, p).
+
+    A walk from zero with (next to) no other noise leaves it none. As the series begins at an
+    unknown constant, the walk can as well have made a step before; no contrast knows of it.
+    """
+    h = space.output
+    first = space.measurement_noise + h @ space.initial_covariance @ h
+    if first > _NO_VARIANCE * (h @ space.process_noise @ h):
+        return space.initial_covariance
+    return space.initial_covariance + space.process_noise
 
 
 def whitened(columns: Columns, processes: Sequence[Process]) -> tuple[FloatArray, float, int]:
@@ -105,7 +139,7 @@ def whitened(columns: Columns, processes: Sequence[Process]) -> tuple[FloatArray
         space.process_noise,
         space.output,
         space.measurement_noise,
-        space.initial_covariance,
+        started(space),
         columns.matrix,
     )
 
@@ -137,3 +171,28 @@ class KalmanLikelihood:
         """Constant and slope under these processes."""
         innovations, _, _ = whitened(self.columns, processes)
         return Regression.of(innovations.T @ innovations)
+
+
+def defined(likelihood: LogLikelihood, processes: Sequence[Process]) -> float:
+    """The likelihood, minus infinity where the processes give none (no noise at all)."""
+    try:
+        with np.errstate(all="ignore"):
+            value = likelihood(processes)
+    except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+        return -np.inf
+    return value if np.isfinite(value) else -np.inf
+
+
+def objective_of(
+    likelihood: LogLikelihood, coordinates: Coordinates, like: Sequence[Process]
+) -> Objective:
+    """The likelihood by coordinates, with given parameters taken from ``like``."""
+
+    def objective(z: FloatArray) -> float:
+        try:
+            processes = coordinates.processes(z, like)
+        except InputError:
+            return -np.inf  # a step beyond what a parameter can be
+        return defined(likelihood, processes)
+
+    return objective

@@ -49,7 +49,7 @@ def check_supported(process: Process) -> None:
     if not (isinstance(process, WhiteNoise | RandomWalk | GaussMarkov) or autoregressive):
         raise InputError(
             f'method = "em" does not know {process!r}: it takes WhiteNoise, RandomWalk, RateRamp, '
-            'GaussMarkov and AR; "mle" takes the others'
+            'GaussMarkov and AR; "mle" takes the others, "gmwm" a Sinusoid too'
         )
 
 

@@ -19,8 +19,7 @@ Objective = Callable[[FloatArray], float]
 _GRADIENT_STEP = 0.02  # standard errors
 _HESSIAN_STEP = 0.1
 _LARGEST_STEP = 1.0  # in z: a factor e of an amplitude or a time
-_CLOSE = 1e-6  # twice the gain in log-likelihood that is not worth another step
-_MAX_STEPS = 60
+_LEAST = 1e-8  # information: of less, the deviation would be 10^4 factors of e
 _HALVINGS = 12
 
 
@@ -40,25 +39,35 @@ class Maximum:
     converged: bool
 
 
-def maximise(objective: Objective, start: FloatArray, information: FloatArray) -> Maximum:
-    """Maximum reached from ``start``, near which the information matrix is ``information``."""
+def maximise(
+    objective: Objective,
+    start: FloatArray,
+    information: FloatArray,
+    *,
+    close: float = 1e-6,
+    max_steps: int = 60,
+) -> Maximum:
+    """Maximum reached from ``start``, near which the information matrix is ``information``.
+
+    ``close`` is twice the gain in log-likelihood that is not worth another step.
+    """
     z = start.copy()
     value = objective(z)
     if z.size == 0:
         return Maximum(z, value, True)
-    scale = 1.0 / np.sqrt(np.diag(information))
+    scale = deviations(information)
     inverse = regular_inverse(information)
     slope = gradient(objective, z, scale)
-    for _ in range(_MAX_STEPS):
+    for _ in range(max_steps):
         step = inverse @ slope
         promised = float(slope @ step)
-        if promised < _CLOSE:
+        if promised < close:
             return Maximum(z, value, True)
         step /= max(float(np.max(np.abs(step))) / _LARGEST_STEP, 1.0)
         found = _along(objective, z, value, step)
         if found is None:
             # Rounding errors of the objective are all that is left, or the matrix is bad.
-            if promised < 100.0 * _CLOSE:
+            if promised < 100.0 * close:
                 return Maximum(z, value, True)
             if np.array_equal(inverse, np.diag(scale**2)):
                 return Maximum(z, value, False)
@@ -74,12 +83,17 @@ def maximise(objective: Objective, start: FloatArray, information: FloatArray) -
 def observed_information(
     objective: Objective, z: FloatArray, information: FloatArray
 ) -> FloatArray:
-    """Minus the matrix of second derivatives, in steps of ``information``'s standard errors."""
+    """Minus the matrix of second derivatives, in steps of ``information``'s standard errors.
+
+    Zero where the objective is not finite all around ``z``.
+    """
     d = z.size
-    scale = _HESSIAN_STEP / np.sqrt(np.diag(information))
+    scale = _HESSIAN_STEP * np.minimum(deviations(information), 1.0)
     centre = objective(z)
     steps = np.diag(scale)
     ends = np.array([[objective(z + sign * steps[i]) for sign in (1.0, -1.0)] for i in range(d)])
+    if not np.all(np.isfinite(ends)):
+        return np.zeros((d, d))
     matrix = np.empty((d, d))
     for i in range(d):
         matrix[i, i] = 2.0 * centre - ends[i].sum()
@@ -87,15 +101,22 @@ def observed_information(
             corners = objective(z + steps[i] + steps[j]) + objective(z - steps[i] - steps[j])
             mixed = corners + 2.0 * centre - ends[i].sum() - ends[j].sum()
             matrix[i, j] = matrix[j, i] = -0.5 * mixed
+    if not np.all(np.isfinite(matrix)):
+        return np.zeros((d, d))
     return matrix / np.outer(scale, scale)
 
 
 def regular_inverse(information: FloatArray) -> FloatArray:
     """Inverse on unit diagonal, with directions of no information held to a small one."""
-    scale = np.sqrt(np.diag(information))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    values = np.maximum(values, 1e-8 * values[-1])
-    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+    scale = deviations(information)
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    values = np.maximum(values, 1e-8 * np.max(values, initial=1.0))
+    return np.asarray((vectors / values) @ vectors.T * np.outer(scale, scale))
+
+
+def deviations(information: FloatArray) -> FloatArray:
+    """Standard errors of the parameters one by one, finite where there is no information."""
+    return np.asarray(1.0 / np.sqrt(np.maximum(np.abs(np.diag(information)), _LEAST)))
 
 
 def gradient(objective: Objective, z: FloatArray, scale: FloatArray) -> FloatArray:

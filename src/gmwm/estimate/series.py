@@ -51,8 +51,14 @@ class Series:
             If the samples are no series of numbers, if some are missing and ``gaps`` are not
             allowed, or if ``start`` is not the same model.
         """
-        wv = wavelet_variance(_longest_part(channel) if gaps else channel)
         coordinates = Coordinates(model)
+        for term in coordinates.terms:
+            if type(term).state_space is Process.state_space:
+                raise InputError(
+                    f"{type(term).__name__} has no state-space form, which a likelihood needs: "
+                    'take method = "gmwm"'
+                )
+        wv = wavelet_variance(_longest_part(channel) if gaps else channel)
         ramp = next((term for term in model.terms if isinstance(term, RateRamp)), None)
         columns = Columns(
             np.asarray(channel.values, dtype=float),
@@ -61,7 +67,7 @@ class Series:
             ramp is not None,
         )
         if start is None:
-            first = _from_moments(model, wv, coordinates)
+            first = _from_moments(model, _bridged_variance(channel, wv), coordinates)
         else:
             first = _from_user(model, as_model(start), coordinates)
         return cls(columns, wv, coordinates, first)
@@ -81,6 +87,21 @@ def _longest_part(channel: Channel) -> Channel:
         )
     longest = int(np.argmax(ends - starts))
     return replace(channel, values=values[starts[longest] : ends[longest]])
+
+
+def _bridged_variance(channel: Channel, wv: WaveletVariance) -> WaveletVariance:
+    """Wavelet variance with gaps bridged by straight lines, near enough to start from.
+
+    The longest part without a gap may be too short for the model.
+    """
+    values = np.asarray(channel.values, dtype=float)
+    missing = np.isnan(values)
+    if not np.any(missing):
+        return wv
+    k = np.arange(values.size)
+    bridged = np.interp(k, k[~missing], values[~missing])
+    inside = slice(int(k[~missing][0]), int(k[~missing][-1]) + 1)
+    return wavelet_variance(replace(channel, values=bridged[inside]))
 
 
 def _from_moments(

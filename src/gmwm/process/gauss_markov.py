@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
@@ -64,10 +63,10 @@ class GaussMarkov(Process):
         return series
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
-        return np.array([math.log(shape[0])])
+        return np.array([np.log(shape[0])])
 
     def shape_from_free(self, free: FloatArray) -> Shape:
-        return (math.exp(free[0]),)
+        return (float(np.exp(free[0])),)
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         # Below a third of dt it is white noise; beyond a third of the record a random walk.
