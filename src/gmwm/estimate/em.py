@@ -40,6 +40,7 @@ from gmwm.recording import Channel
 DRIFTS = ("ramp", "state")
 _TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zero
 _LONGEST = 100.0  # extrapolation, in steps
+_FARTHEST = 3.0  # of a long step, in logarithms of amplitudes and times
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,11 +198,11 @@ class Iteration:
         r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
         norm = float(np.linalg.norm(v))
         length = min(float(np.linalg.norm(r)) / norm, _LONGEST) if norm > 0.0 else 1.0
-        if length > 1.0 and not self.in_state:
+        step = 2.0 * length * r + length**2 * v
+        # Where an amplitude has all but vanished EM hardly moves: do not jump there.
+        if length > 1.0 and not self.in_state and np.max(np.abs(step)) < _FARTHEST:
             try:
-                far = coordinates.processes(
-                    zs[0] + 2.0 * length * r + length**2 * v, stage.processes
-                )
+                far = coordinates.processes(zs[0] + step, stage.processes)
                 with np.errstate(all="ignore"):
                     e = self.expectation(Stage(far))
             except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
