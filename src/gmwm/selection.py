@@ -17,6 +17,7 @@ from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
+from gmwm.estimate.scales import Scales
 from gmwm.estimate.start import Reference, dictionary_fit, search
 from gmwm.process import (
     GaussMarkov,
@@ -28,7 +29,8 @@ from gmwm.process import (
     WhiteNoise,
 )
 from gmwm.recording import Channel
-from gmwm.variance.wavelet import WaveletVariance, as_wavelet_variance
+from gmwm.variance.analysis import as_wavelet_variance
+from gmwm.variance.wavelet import WaveletVariance
 
 MAX_GAUSS_MARKOV = 5
 
@@ -200,7 +202,7 @@ def _rank(wv: WaveletVariance, max_gauss_markov: int) -> list[Candidate]:
 def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
     """Generalized least-squares slope under the noise of a candidate."""
     candidate, point = item
-    design = Design(candidate.model, wv.tau, wv.dt, wv.n)
+    design = Design(candidate.model, Scales.of(wv))
     return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
 
 
@@ -273,7 +275,7 @@ def _candidates(
             if not base and g == 0:
                 continue
             model = Model((*base, *(GaussMarkov() for _ in range(g))))
-            design = Design(model, wv.tau, wv.dt, wv.n)
+            design = Design(model, Scales.of(wv))
             if design.n_free >= wv.tau.size:
                 break
             if g:
@@ -295,7 +297,7 @@ def _candidates(
 def _fallback(wv: WaveletVariance, target: FloatArray, root: FloatArray) -> tuple[Candidate, Point]:
     """White noise alone, for records too short for anything else."""
     model = Model((WhiteNoise(),))
-    design = Design(model, wv.tau, wv.dt, wv.n)
+    design = Design(model, Scales.of(wv))
     point = search(Profile(design, target, root))
     criterion = point.objective + _penalty(wv.n)
     return Candidate(model, criterion, point.objective, 1), point

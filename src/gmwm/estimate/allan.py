@@ -150,7 +150,7 @@ def fit_allan(
     if "R" in keys and ols_slope(wv).value < 0.0:
         scale[keys.index("R")] *= -1.0
     fitted = _fitted(model, dict(zip(keys, map(float, scale * coefficients), strict=True)))
-    residual = wv.variance - fitted.haar_variance(wv.tau, wv.dt)
+    residual = wv.variance - fitted.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     whitened = weight_root(wv.covariance) @ residual
     remarks = (*_absence_remarks(absent), *_misfit_remarks(fitted, wv))
     return Fit(
@@ -342,7 +342,7 @@ def _absence_remarks(absent: Sequence[_Line]) -> list[str]:
 def _misfit_remarks(model: Model, wv: WaveletVariance) -> list[str]:
     """Whether the sum of the lines describes the data; what noise explains is no misfit."""
     variance = np.diag(wv.covariance)
-    implied = model.haar_variance(wv.tau, wv.dt)
+    implied = model.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     # In logarithms, as the standard error of a variance is proportional to its estimate: one that
     # happens to be small claims to be exact.
     ratio = np.maximum(wv.variance, np.finfo(float).tiny) / implied

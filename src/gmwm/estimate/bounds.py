@@ -26,8 +26,8 @@ from gmwm.process import (
     StateSpace,
     as_model,
 )
-from gmwm.variance.covariance import dyadic_levels, haar_covariance
-from gmwm.variance.wavelet import MIN_SAMPLES
+from gmwm.variance.analysis import MIN_SAMPLES
+from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
 
 _MOST_WORK = 1e9  # multiplications of the exact recursion, some seconds
 _VAGUE = 1e6  # variance of the unknown constant, in variances of the series
@@ -212,7 +212,8 @@ def _wavelet_information(
     noise = Model(tuple(processes))
     covariance = haar_covariance(noise.psd, n, dt)
     if slope is not None:
-        covariance = detrended_covariance(covariance, n, dt, noise.psd, slope)
+        means = mean_covariance(noise.psd, n, dt)
+        covariance = detrended_covariance(covariance, means, 0.5 * tau, slope)
     z = coordinates.pack(processes)
     columns = []
     for k, (i, is_amplitude) in enumerate(coordinates.owners):

@@ -143,9 +143,9 @@ def _agreement(
     """How the wavelet variances agree with the fitted noise: as in the method of moments."""
     moments = Moments.of(wv, model)
     if slope is not None:
-        moments = Moments(wv, slope, True)
+        moments = Moments(wv, slope, True, moments.scales)
     covariance = moments.covariance(noise)
-    target, implied = moments.target, noise.haar_variance(wv.tau, wv.dt)
+    target, implied = moments.target, noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     residual = target - implied
     whitened = weight_root(covariance) @ residual
     dof = target.size - n_free

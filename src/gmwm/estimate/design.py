@@ -15,10 +15,12 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.scales import Scales
 from gmwm.process import GaussMarkov, Model, Parameter, Process
 from gmwm.process.base import Shape
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
+_SIMULATED_STEP = 0.05  # where a simulation may move in jumps
 _REACH = 7.0  # how far beyond the grid of starting values z may go (factor 1000 for a time)
 
 
@@ -69,18 +71,18 @@ class Term:
             values[linear.name] = 1.0
         return self.process.with_values(**values)
 
-    def curve(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+    def curve(self, shape: Shape, scales: Scales) -> FloatArray:
         """Wavelet variance of `with_shape`, (J,)."""
         if self.free_scale:
-            return self.process.unit_haar_variance(shape, tau, dt)
-        return np.asarray(self.with_shape(shape).haar_variance(tau, dt), dtype=float)
+            return scales.unit_curve(self.process, shape)
+        return scales.curve(self.with_shape(shape))
 
-    def grid(self, dt: float, n: int) -> list[Shape]:
+    def grid(self, scales: Scales) -> list[Shape]:
         """Starting shapes; given parameters have their value in all of them."""
         if not np.any(self.free_shape):
             given = tuple(self.process.values[p.name] for p in self.process.shape_parameters)
             return [tuple(float(v) for v in given if v is not None)]
-        shapes = self.process.shape_grid(dt, n)
+        shapes = self.process.shape_grid(scales.dt, scales.n)
         names = [p.name for p in self.process.shape_parameters]
         fixed = {i: self.process.values[name] for i, name in enumerate(names)}
         filled = {
@@ -97,16 +99,11 @@ class Design:
     ----------
     model : Model
         With open parameters.
-    tau : (J,) ndarray
-        Averaging times, s.
-    dt : float
-        Sampling interval, s.
-    n : int
-        Length of the record, samples.
+    scales : Scales
     """
 
-    def __init__(self, model: Model, tau: FloatArray, dt: float, n: int) -> None:
-        self.model, self.tau, self.dt, self.n = model, tau, dt, n
+    def __init__(self, model: Model, scales: Scales) -> None:
+        self.model, self.scales = model, scales
         self.terms = tuple(
             Term.of(process, index)
             for index, process in enumerate(model.terms)
@@ -127,7 +124,7 @@ class Design:
         """Starting shapes of term ``i``; terms that are alike share one list."""
         first = self._alike(i)
         if first not in self._grids:
-            self._grids[first] = self.terms[first].grid(self.dt, self.n)
+            self._grids[first] = self.terms[first].grid(self.scales)
         return self._grids[first]
 
     def grid_curves(self, i: int) -> FloatArray:
@@ -135,7 +132,7 @@ class Design:
         first = self._alike(i)
         if first not in self._curves:
             term = self.terms[first]
-            columns = [term.curve(shape, self.tau, self.dt) for shape in self.grid(first)]
+            columns = [term.curve(shape, self.scales) for shape in self.grid(first)]
             self._curves[first] = np.stack(columns, axis=1)
         return self._curves[first]
 
@@ -145,8 +142,7 @@ class Design:
     def fixed_shapes(self) -> list[Shape | None]:
         """The shape of each term, ``None`` where something of it is free."""
         return [
-            None if np.any(term.free_shape) else term.grid(self.dt, self.n)[0]
-            for term in self.terms
+            None if np.any(term.free_shape) else term.grid(self.scales)[0] for term in self.terms
         ]
 
     # -- z <-> shapes -----------------------------------------------------------------------------
@@ -193,10 +189,9 @@ class Design:
     def curves(self, shapes: Sequence[Shape]) -> FloatArray:
         """Curves of all terms at unit free amplitude, (J, terms)."""
         columns = [
-            term.curve(shape, self.tau, self.dt)
-            for term, shape in zip(self.terms, shapes, strict=True)
+            term.curve(shape, self.scales) for term, shape in zip(self.terms, shapes, strict=True)
         ]
-        return np.stack(columns, axis=1) if columns else np.zeros((self.tau.size, 0))
+        return np.stack(columns, axis=1) if columns else np.zeros((self.scales.tau.size, 0))
 
     def amplitudes(self, x: FloatArray) -> FloatArray:
         """Amplitudes of all terms, 1 where given, (terms,)."""
@@ -210,14 +205,15 @@ class Design:
         for i in self.shaped:
             term = self.terms[i]
             z = term.process.shape_to_free(shapes[i])
+            width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
             for k in np.flatnonzero(term.free_shape):
                 pair = []
-                for step in (_STEP, -_STEP):
+                for step in (width, -width):
                     moved = z.copy()
                     moved[k] += step
-                    pair.append(term.curve(term.process.shape_from_free(moved), self.tau, self.dt))
-                columns.append((pair[0] - pair[1]) / (2.0 * _STEP))
-        return np.stack(columns, axis=1) if columns else np.zeros((self.tau.size, 0))
+                    pair.append(term.curve(term.process.shape_from_free(moved), self.scales))
+                columns.append((pair[0] - pair[1]) / (2.0 * width))
+        return np.stack(columns, axis=1) if columns else np.zeros((self.scales.tau.size, 0))
 
     def owners(self) -> list[int]:
         """For each element of z, the term it belongs to."""

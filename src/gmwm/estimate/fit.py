@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from scipy.stats import norm
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.interval import confidence_interval
+from gmwm.estimate.scales import Scales
 from gmwm.process import Model, model_from_list
 from gmwm.units import field_units, si_parameter_unit
 from gmwm.variance.wavelet import WaveletVariance
@@ -179,12 +180,13 @@ class Fit:
     @property
     def implied(self) -> FloatArray:
         """Wavelet variance of the fitted model at the data's averaging times, u^2, (J,)."""
-        return self.model.haar_variance(self.wv.tau, self.wv.dt)
+        return Scales.of(self.wv).curve(self.model)
 
     @property
     def components(self) -> dict[str, FloatArray]:
         """Wavelet variance of each term, u^2, (J,)."""
-        curves = self.model.component_variances(self.wv.tau, self.wv.dt)
+        scales = Scales.of(self.wv)
+        curves = [scales.curve(term) for term in self.model.terms]
         return dict(zip(self.model.term_labels(), curves, strict=True))
 
     def deviation_interval(
@@ -205,15 +207,14 @@ class Fit:
             the logarithm of the deviation.
         """
         tau = np.asarray(tau, dtype=float)
-        curve = self.model.haar_variance(tau, self.wv.dt)
+        scales = replace(Scales.of(self.wv), tau=tau)
+        curve = scales.curve(self.model)
         errors = np.sqrt(np.diag(self.covariance))
         gradient = np.empty((len(self.keys), tau.size))
         for i, key in enumerate(self.keys):
             step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
             pair = [
-                self.model.with_params({key: self.params[key] + sign * step}).haar_variance(
-                    tau, self.wv.dt
-                )
+                scales.curve(self.model.with_params({key: self.params[key] + sign * step}))
                 for sign in (1.0, -1.0)
             ]
             gradient[i] = ((pair[0] - pair[1]) / (2.0 * step) / (2.0 * curve)).ravel()
@@ -280,8 +281,9 @@ class Fit:
         return "\n".join(lines)
 
     def _how(self) -> str:
-        if self.method == "gmwm":
-            return f"GMWM, {self.omega} weights"
+        if self.omega:
+            moments = "simulated moments" if self.method == "simulated" else "GMWM"
+            return f"{moments}, {self.omega} weights"
         if self.trace:
             return f"EM, {len(self.trace)} iterations"
         return _METHOD_NAMES[self.method]

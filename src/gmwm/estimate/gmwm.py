@@ -8,7 +8,7 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,13 +18,14 @@ from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import Discrepancy
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.moments import Moments
-from gmwm.estimate.profile import Point, Profile, omega_root
+from gmwm.estimate.profile import Point, Profile
+from gmwm.estimate.scales import Scales
+from gmwm.estimate.simulation import Simulation
 from gmwm.estimate.start import dictionary_fit, search
 from gmwm.estimate.uncertainty import describe
+from gmwm.estimate.weights import Weights
 from gmwm.process import Model, Process, Sinusoid
 from gmwm.variance.wavelet import WaveletVariance
-
-WEIGHTS = ("model", "diagonal", "identity")
 
 _MAX_ROUNDS = 40
 _REFERENCE_ROUNDS = 3
@@ -41,29 +42,56 @@ def fit_gmwm(
     discrepancy: float | None = None,
 ) -> Fit:
     """Estimate by the method of wavelet moments; see `gmwm.fit` for the parameters."""
-    if omega not in WEIGHTS:
-        raise InputError(f"omega = {omega!r}: known are {', '.join(WEIGHTS)}")
+    return _fit(model, wv, Scales.of(wv), "gmwm", omega, discrepancy)
+
+
+def fit_simulated(
+    model: Model,
+    wv: WaveletVariance,
+    *,
+    omega: str = "model",
+    discrepancy: float | None = None,
+    replications: int = 10,
+    seed: int = 0,
+) -> Fit:
+    """The same with simulated moments; see `gmwm.fit` for the parameters."""
+    simulation = Simulation.of(replications, seed)
+    scales = replace(Scales.of(wv), simulation=simulation, simulate_all=True)
+    return _fit(model, wv, scales, "simulated", omega, discrepancy)
+
+
+def _fit(
+    model: Model,
+    wv: WaveletVariance,
+    scales: Scales,
+    method: str,
+    omega: str,
+    discrepancy: float | None,
+) -> Fit:
+    weights = Weights.of(omega, wv)
     if discrepancy is not None and not 0.0 <= discrepancy < 1.0:
         raise InputError(f"discrepancy = {discrepancy!r}: give a share of the variance, e.g. 0.02")
-    design = Design(model, wv.tau, wv.dt, wv.n)
+    design = Design(model, scales)
     if not design.terms:
         raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")
-    moments = Moments.of(wv, model)
+    moments = Moments.of(wv, model, scales)
     extra = tuple(term.process for term in design.terms)
     reference = dictionary_fit(wv, moments.target, extra)
     level = Discrepancy(discrepancy, wv.tau.size - design.n_free)
     if not any(isinstance(process, Sinusoid) for process in extra):
         # What no sum of processes without lines can follow is discrepancy from the start.
         level.start_at(reference.discrepancy)
-    weights = level.added_to(reference.covariance, moments.target)
-    point = search(Profile(design, moments.target, omega_root(weights, omega)))
-    state = State(moments, weights, point, reference.curve)
-    settled = _iterate(design, state, level, omega)
+    covariance = level.added_to(reference.covariance, moments.target)
+    point = search(Profile(design, moments.target, weights.root(covariance)))
+    state = State(moments, covariance, point, reference.curve)
+    settled = _iterate(design, state, level, weights)
     if settled is None:
-        settled = _under_reference(design, state, level, omega, extra)
-    return describe(design, settled.moments.target, settled.covariance, settled.point,
-                    settled.moments.slope, basis=settled.basis, wv=wv, omega=omega,
-                    slope_is_free=moments.slope_is_free, discrepancy=level.value)  # fmt: skip
+        settled = _under_reference(design, state, level, weights, extra)
+    return describe(
+        design, settled.moments.target, settled.covariance, settled.point, settled.moments.slope,
+        basis=settled.basis, wv=wv, weights=weights, method=method,
+        slope_is_free=moments.slope_is_free, discrepancy=level.value,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +115,13 @@ class State:
     basis: FloatArray
 
 
-def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> State | None:
+def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights) -> State | None:
     """Iterate theta -> minimum under the weights that theta implies; ``None`` if it wanders.
 
     Where it swings about the fixed point, the weights are moved by part of the way only (Aitken's
     relaxation).
     """
-    moments, weights, point = start.moments, start.covariance, start.point
+    moments, relaxed, point = start.moments, start.covariance, start.point
     part = 1.0
     curve = _implied(design, point)
     step = np.zeros_like(curve)
@@ -102,8 +130,8 @@ def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> St
         moments = moments.under(noise, part)
         statistical = moments.covariance(noise)
         covariance = level.added_to(statistical, moments.target)
-        weights = covariance if rounds == 1 else (1.0 - part) * weights + part * covariance
-        profile = Profile(design, moments.target, omega_root(weights, omega))
+        relaxed = covariance if rounds == 1 else (1.0 - part) * relaxed + part * covariance
+        profile = Profile(design, moments.target, weights.root(relaxed))
         # Weights from a first fit may point elsewhere: search anew once, then follow.
         point = search(profile) if rounds == 1 else profile.refine(profile.at(point.shapes))
         previous, curve = curve, _implied(design, point)
@@ -120,7 +148,7 @@ def _iterate(design: Design, start: State, level: Discrepancy, omega: str) -> St
 
 
 def _under_reference(
-    design: Design, start: State, level: Discrepancy, omega: str, extra: tuple[Process, ...]
+    design: Design, start: State, level: Discrepancy, weights: Weights, extra: tuple[Process, ...]
 ) -> State:
     """The minimum under the weights of the reference mixture.
 
@@ -137,7 +165,7 @@ def _under_reference(
     level.restart()
     for _ in range(_REFERENCE_ROUNDS):
         covariance = level.added_to(statistical, moments.target)
-        point = search(Profile(design, moments.target, omega_root(covariance, omega)))
+        point = search(Profile(design, moments.target, weights.root(covariance)))
         residual = moments.target - _implied(design, point)
         if not level.update(residual, statistical, moments.target, reference.curve):
             break

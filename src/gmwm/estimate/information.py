@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.estimate.coordinates import Coordinates
-from gmwm.process import Model, Process
+from gmwm.process import Model, Process, SimulatedProcess
 from gmwm.process.spectral import evaluated, legendre
 
 _STEP = 1e-5
@@ -96,7 +96,7 @@ def slope_dof(
         Sampling interval, s.
     """
     coordinates, processes, names = _opened(model, keys)
-    if not names:
+    if not names or not _have_spectra(processes):
         return np.inf
     order = [list(keys).index(name) for name in names]
     f, weight = frequency_nodes(n, dt)
@@ -131,6 +131,8 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
         Key -> exponent k of the power law: relative standard error proportional to value^k.
     """
     coordinates, processes, names = _opened(model, keys)
+    if not _have_spectra(processes):
+        return {}
     positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
     information = spectral_information(coordinates, processes, n, dt)
     if not names or not _is_regular(information):
@@ -162,6 +164,10 @@ def _opened(model: Model, keys: Sequence[str]) -> tuple[Coordinates, list[Proces
     by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
     names = [by_term[coordinates.places[i], name] for i, name in coordinates.names]
     return coordinates, [model.terms[i] for i in coordinates.places], names
+
+
+def _have_spectra(processes: Sequence[Process]) -> bool:
+    return not any(isinstance(process, SimulatedProcess) for process in processes)
 
 
 def _relative_error(

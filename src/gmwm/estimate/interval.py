@@ -12,6 +12,7 @@ UNDETERMINED = 1.0
 """Relative standard error of a positive parameter above which its interval says nothing."""
 
 _NO_GROWTH = 1e-6
+_EXACT = 1e-12  # relative error
 _FEWEST = 3.0  # degrees of freedom
 
 
@@ -66,7 +67,7 @@ def _student(parameter: Parameter, relative: float, level: float) -> float:
     No fewer than three: below, the tails of t are heavier than those of a variance's logarithm.
     """
     power = parameter.power if parameter.linear else 1
-    dof = 2.0 / (power * relative) ** 2
+    dof = 2.0 / max(power * relative, _EXACT) ** 2
     return float(t.ppf(0.5 + 0.5 * level, max(dof, _FEWEST)))
 
 

@@ -112,16 +112,6 @@ def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, F
     return scaled / length, y - unit @ scaled
 
 
-def omega_root(covariance: FloatArray, omega: str) -> FloatArray:
-    """L with L'L the weight matrix named ``omega``: "model", "diagonal" or "identity"."""
-    if omega == "model":
-        return weight_root(covariance)
-    variances = np.diag(covariance)
-    if omega == "diagonal":
-        return np.diag(1.0 / np.sqrt(variances))
-    return np.eye(variances.size) / np.sqrt(np.max(variances))
-
-
 def weight_root(covariance: FloatArray) -> FloatArray:
     """L with L'L the inverse of a covariance matrix, computed on its correlations."""
     scale = np.sqrt(np.diag(covariance))

@@ -11,14 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
-from scipy.linalg import solve_toeplitz
+from scipy.linalg import solve, solve_toeplitz, toeplitz
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.process.spectral import PSD
-from gmwm.variance.covariance import block_density, dyadic_levels, mean_covariance
+from gmwm.variance.covariance import block_density
 from gmwm.variance.wavelet import WaveletVariance
 
+_FEWEST_BLOCKS = 8
 _LARGEST_SHARE = 0.95  # of a level's variance that detrending may take
 
 
@@ -40,24 +43,51 @@ class Slope:
 
 def ols_slope(wv: WaveletVariance) -> Slope:
     """Ordinary least-squares slope of the block means, its variance left at zero: a first value."""
-    t = np.arange(wv.blocks.size) * (wv.block * wv.dt)
-    return Slope(float(np.polynomial.polynomial.polyfit(t, wv.blocks, 1)[1]), 0.0)
+    index = _existing(wv)
+    t = index * (wv.block * wv.dt)
+    return Slope(float(np.polynomial.polynomial.polyfit(t, wv.blocks[index], 1)[1]), 0.0)
 
 
 def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     """Generalized least-squares slope for noise of spectrum ``psd``."""
-    difference = np.diff(wv.blocks)
+    index = _existing(wv)
+    difference, apart = np.diff(wv.blocks[index]), np.diff(index).astype(float)
     size = fft.next_fast_len(4 * wv.blocks.size, real=True)
     size += size % 2
     frequency = np.arange(size // 2 + 1) / size
     frequency[0] = 1e-2 / size
     density = block_density(psd, wv.dt, frequency, wv.block)
     density *= 4.0 * np.sin(np.pi * frequency) ** 2
-    column = fft.irfft(density, size)[: difference.size]
-    solved = solve_toeplitz(column, np.column_stack([np.ones_like(difference), difference]))
-    information = float(np.sum(solved[:, 0]))
+    column = fft.irfft(density, size)[: wv.blocks.size - 1]
+    solved = _solve(column, index, np.column_stack([apart, difference]))
+    information = float(apart @ solved[:, 0])
     step = wv.block * wv.dt
-    return Slope(float(np.sum(solved[:, 1])) / information / step, 1.0 / information / step**2)
+    return Slope(float(apart @ solved[:, 1]) / information / step, 1.0 / information / step**2)
+
+
+def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
+    """Places of the blocks that are not missing."""
+    index = np.flatnonzero(~np.isnan(wv.blocks))
+    if index.size < _FEWEST_BLOCKS:
+        raise InputError(
+            f"{wv.name or 'the series'} has samples missing all over, which leaves no drift to "
+            "estimate: take a model without RateRamp"
+        )
+    return index
+
+
+def _solve(column: FloatArray, index: NDArray[np.intp], right: FloatArray) -> FloatArray:
+    """Solve for the covariance of differences between blocks that exist.
+
+    ``column`` is the autocovariance of differences of neighbours; across a gap they add up.
+    """
+    if index.size == column.size + 1:
+        return np.asarray(solve_toeplitz(column, right))
+    first = index[0]
+    inner = toeplitz(column[: index[-1] - first])
+    sums = np.add.reduceat(np.add.reduceat(inner, index[:-1] - first, axis=0),
+                           index[:-1] - first, axis=1)  # fmt: skip
+    return np.asarray(solve(sums, right, assume_a="pos"))
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:
@@ -66,20 +96,28 @@ def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:
     The covariance of the best linear unbiased estimate with any other unbiased one, such as twice
     the mean coefficient over tau, is its own variance; hence tau^2/4 var(slope).
     """
-    return 0.25 * wv.tau**2 * slope.variance
+    return wv.drift_response**2 * slope.variance
 
 
 def detrended_covariance(
-    covariance: FloatArray, n: int, dt: float, psd: PSD, slope: Slope
+    covariance: FloatArray, means: FloatArray, response: FloatArray, slope: Slope
 ) -> FloatArray:
     """Covariance of the wavelet variances after the estimated slope was removed, u^4, (J, J).
 
-    The coefficients lose the covariance c = tau_j tau_k var(slope)/4 at every lag, which turns
-    the mean of 2 g^2 into that of 2 (g - c)^2.
+    The coefficients lose the covariance c = r_j r_k var(slope) at every lag, which turns the mean
+    of 2 g^2 into that of 2 (g - c)^2.
+
+    Parameters
+    ----------
+    covariance : (J, J) ndarray
+        Of the wavelet variances, u^4.
+    means : (J, J) ndarray
+        Covariance of the means of the coefficients, u^2.
+    response : (J,) ndarray
+        Mean r of the coefficients per unit of drift, s.
+    slope : Slope
     """
-    tau = dyadic_levels(n) * dt
-    common = 0.25 * np.outer(tau, tau) * slope.variance
-    means = mean_covariance(psd, n, dt)
+    common = np.outer(response, response) * slope.variance
     taken = 4.0 * common * means - 2.0 * common**2
     # c is a mean over the record; at the coarsest levels it can take more than there is.
     excess = np.maximum(np.diag(taken) / np.diag(covariance) / _LARGEST_SHARE, 1.0)

@@ -88,7 +88,7 @@ def idle_remarks(
         if amplitudes[i] == 0.0 or i not in design.linear or not others:
             continue
         model = Model(tuple(design.terms[k].process for k in others))
-        reduced = Profile(Design(model, design.tau, design.dt, design.n), target, root)
+        reduced = Profile(Design(model, design.scales), target, root)
         without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
         freed = 1 + int(np.sum(design.terms[i].free_shape))
         if without - point.objective < chi2.isf(_IDLE_P / target.size, freed):
@@ -114,7 +114,7 @@ def undetermined_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray
 
 def count_remarks(design: Design, sub: Design) -> list[str]:
     """More parameters than levels."""
-    levels = design.tau.size
+    levels = design.scales.tau.size
     if levels >= sub.n_free:
         return []
     return [

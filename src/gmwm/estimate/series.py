@@ -13,7 +13,8 @@ from gmwm.estimate.gmwm import fit_gmwm
 from gmwm.estimate.likelihood import Columns
 from gmwm.process import Model, Process, RateRamp, as_model
 from gmwm.recording import Channel
-from gmwm.variance.wavelet import MIN_SAMPLES, WaveletVariance, wavelet_variance
+from gmwm.variance.analysis import wavelet_variance
+from gmwm.variance.wavelet import WaveletVariance
 
 _SMALL = 0.1  # of its upper bound: where an amplitude that was found to be zero starts
 
@@ -27,7 +28,7 @@ class Series:
     columns : Columns
         The samples and regressors.
     wv : WaveletVariance
-        Of the samples; of their longest part without a gap, if some are missing.
+        Of the samples.
     coordinates : Coordinates
         Of the model's noise.
     start : tuple of Process
@@ -58,7 +59,12 @@ class Series:
                     f"{type(term).__name__} has no state-space form, which a likelihood needs: "
                     'take method = "gmwm"'
                 )
-        wv = wavelet_variance(_longest_part(channel) if gaps else channel)
+        wv = wavelet_variance(channel)
+        if wv.present is not None and not gaps:
+            raise InputError(
+                f"the series misses {wv.n - wv.present.present:,} samples, which a Fourier "
+                'transform needs: take method = "mle" or "gmwm"'
+            )
         ramp = next((term for term in model.terms if isinstance(term, RateRamp)), None)
         columns = Columns(
             np.asarray(channel.values, dtype=float),
@@ -67,41 +73,24 @@ class Series:
             ramp is not None,
         )
         if start is None:
-            first = _from_moments(model, _bridged_variance(channel, wv), coordinates)
+            first = _from_moments(model, _bridged(channel, wv), coordinates)
         else:
             first = _from_user(model, as_model(start), coordinates)
         return cls(columns, wv, coordinates, first)
 
 
-def _longest_part(channel: Channel) -> Channel:
-    """The longest run of samples without a missing one; an infinite one is an error later on."""
-    values = np.asarray(channel.values, dtype=float)
-    if values.ndim != 1 or not np.any(np.isnan(values)):
-        return channel
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], ~np.isnan(values), [0]]).astype(int)))
-    starts, ends = edges[::2], edges[1::2]
-    if starts.size == 0 or np.max(ends - starts) < MIN_SAMPLES:
-        raise InputError(
-            f"the series has no {MIN_SAMPLES} samples without a missing one between them: "
-            "nothing can be told of its noise"
-        )
-    longest = int(np.argmax(ends - starts))
-    return replace(channel, values=values[starts[longest] : ends[longest]])
-
-
-def _bridged_variance(channel: Channel, wv: WaveletVariance) -> WaveletVariance:
+def _bridged(channel: Channel, wv: WaveletVariance) -> WaveletVariance:
     """Wavelet variance with gaps bridged by straight lines, near enough to start from.
 
-    The longest part without a gap may be too short for the model.
+    Scattered gaps leave no coefficient of the coarse levels.
     """
-    values = np.asarray(channel.values, dtype=float)
-    missing = np.isnan(values)
-    if not np.any(missing):
+    if wv.present is None:
         return wv
+    values = np.asarray(channel.values, dtype=float)
     k = np.arange(values.size)
-    bridged = np.interp(k, k[~missing], values[~missing])
-    inside = slice(int(k[~missing][0]), int(k[~missing][-1]) + 1)
-    return wavelet_variance(replace(channel, values=bridged[inside]))
+    known = k[~np.isnan(values)]
+    bridged = np.interp(k, known, values[known])[known[0] : known[-1] + 1]
+    return wavelet_variance(replace(channel, values=bridged))
 
 
 def _from_moments(

@@ -13,17 +13,18 @@ from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import suffices
 from gmwm.estimate.profile import Point, Profile, solve_nonnegative, weight_root
+from gmwm.estimate.scales import Scales
 from gmwm.process import (
     GaussMarkov,
     Model,
     Process,
     QuantizationNoise,
     RandomWalk,
+    SimulatedProcess,
     Sinusoid,
     WhiteNoise,
 )
 from gmwm.process.base import Shape
-from gmwm.variance.covariance import haar_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _EXCHANGES = 2
@@ -76,7 +77,7 @@ def _columns(profile: Profile, shapes: Sequence[Shape | None]) -> tuple[FloatArr
     for i, (term, shape) in enumerate(zip(design.terms, shapes, strict=True)):
         if shape is None:
             continue
-        curve = term.curve(shape, design.tau, design.dt)
+        curve = term.curve(shape, design.scales)
         if i in design.linear:
             columns.append(profile.root @ curve)
         else:
@@ -116,7 +117,7 @@ def _refine_present(profile: Profile, point: Point) -> Point:
         return profile.refine(point)
     present = [i for i, shape in enumerate(point.shapes) if shape is not None]
     part = Model(tuple(design.terms[i].process for i in present))
-    reduced = Profile(Design(part, design.tau, design.dt, design.n), profile.target, profile.root)
+    reduced = Profile(Design(part, design.scales), profile.target, profile.root)
     found = reduced.refine(reduced.at([point.shapes[i] for i in present]))
     shapes = list(point.shapes)
     for i, shape in zip(present, found.shapes, strict=True):
@@ -159,7 +160,9 @@ def dictionary_fit(
     first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
     # Lines are left out: a comb of them follows anything, and has no spectrum to weight with.
-    kinds = {type(process): process for process in extra if not isinstance(process, Sinusoid)}
+    # Simulated processes are too: they take their time, and the mixture does without them.
+    left_out = (Sinusoid, SimulatedProcess)
+    kinds = {type(process): process for process in extra if not isinstance(process, left_out)}
     kinds.pop(GaussMarkov, None)
     processes: tuple[Process, ...] = (
         WhiteNoise(),
@@ -168,13 +171,13 @@ def dictionary_fit(
         GaussMarkov(),
     )
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
-    design = Design(Model(processes), wv.tau, wv.dt, wv.n)
+    design = Design(Model(processes), Scales.of(wv))
     atoms = [
         (i, shape)
         for i in design.linear
         for shape in _denser(design.grid(i), isinstance(design.terms[i].process, GaussMarkov))
     ]
-    columns = [design.terms[i].curve(shape, wv.tau, wv.dt) for i, shape in atoms]
+    columns = [design.terms[i].curve(shape, design.scales) for i, shape in atoms]
     matrix = np.stack(columns, axis=1)
     covariance, discrepancy = wv.covariance, 0.0
     for _ in range(_REWEIGHTINGS):
@@ -190,7 +193,7 @@ def dictionary_fit(
                 f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
                 "line or a pattern): check the data"
             )
-        covariance = haar_covariance(Model(tuple(mixture)).psd, wv.n, wv.dt)
+        covariance = wv.covariance_under(Model(tuple(mixture)).psd)
     return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
 
 

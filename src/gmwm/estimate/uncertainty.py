@@ -13,7 +13,7 @@ from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.information import error_growth, slope_dof
-from gmwm.estimate.profile import Point, omega_root, weight_root
+from gmwm.estimate.profile import Point, weight_root
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
     bound_remarks,
@@ -24,6 +24,7 @@ from gmwm.estimate.remarks import (
     shape_remarks,
     undetermined_remarks,
 )
+from gmwm.estimate.weights import Weights
 from gmwm.process import Model, Process
 from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
@@ -41,7 +42,8 @@ def describe(
     *,
     basis: FloatArray,
     wv: WaveletVariance,
-    omega: str,
+    weights: Weights,
+    method: str,
     slope_is_free: bool,
     discrepancy: float,
 ) -> Fit:
@@ -60,7 +62,8 @@ def describe(
     basis : (J,) ndarray
         The wavelet variances to which ``covariance`` belongs, u^2.
     wv : WaveletVariance
-    omega : str
+    weights : Weights
+    method : str
     slope_is_free : bool
     discrepancy : float
         Relative error granted to the model, part of ``covariance``.
@@ -69,15 +72,15 @@ def describe(
     shapes = [point.shapes[i] for i in order]
     amplitudes = design.amplitudes(point.x)[order]
     model, places = _fitted_model(design, point, order, slope)
-    sub = Design(_noise(design, order), design.tau, design.dt, design.n)
+    sub = Design(_noise(design, order), design.scales)
     x = amplitudes[list(sub.linear)]
-    keys, matrix, upper = _linearise(sub, shapes, x, target, covariance, omega, places, model)
+    keys, matrix, upper = _linearise(sub, shapes, x, target, covariance, weights, places, model)
     implied = sub.curves(shapes) @ sub.amplitudes(x)
     residual = target - implied
     whitened = weight_root(covariance) @ residual
     objective = float(whitened @ whitened)
     n_free = len(keys)
-    dof = design.tau.size - n_free
+    dof = design.scales.tau.size - n_free
     p_value = float("nan")
     if dof > 0 and np.all(basis > 0.0):
         p_value = float(chi2.sf(chi_square(target, implied, covariance, basis)[1], dof))
@@ -109,8 +112,8 @@ def describe(
         dof=dof,
         discrepancy=discrepancy,
         p_value=p_value,
-        method="gmwm",
-        omega=omega,
+        method=method,
+        omega=weights.omega,
         valid=not remarks and not poor,
         remarks=(*remarks, *misfits),
         slope_dof=dof_of_slope,
@@ -143,7 +146,7 @@ def _linearise(
     x: FloatArray,
     target: FloatArray,
     covariance: FloatArray,
-    omega: str,
+    weights: Weights,
     places: Sequence[int],
     model: Model,
 ) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
@@ -162,7 +165,7 @@ def _linearise(
     positive = [k for k, i in enumerate(design.linear) if amplitudes[i] > 0.0]
     alive = [k for k, i in enumerate(owners) if amplitudes[i] > 0.0]
     jacobian = np.column_stack([curves[:, [design.linear[k] for k in positive]], slopes[:, alive]])
-    natural = _sandwich(jacobian, covariance, omega)
+    natural = _sandwich(jacobian, covariance, weights)
     by_term = {(i.term, i.parameter.name): i.key for i in model.parameters}
     keys: list[str] = []
     upper: dict[str, float] = {}
@@ -208,11 +211,11 @@ def in_model_order(
     return tuple(ranked), matrix[np.ix_(index, index)]
 
 
-def _sandwich(jacobian: FloatArray, covariance: FloatArray, omega: str) -> FloatArray:
+def _sandwich(jacobian: FloatArray, covariance: FloatArray, weights: Weights) -> FloatArray:
     """B V B' on parameters scaled so that they are of like size."""
     if jacobian.shape[1] == 0:
         return np.zeros((0, 0))
-    root = omega_root(covariance, omega)
+    root = weights.root(covariance)
     weighted = root @ jacobian
     length = np.sqrt(np.sum(weighted**2, axis=0))
     length[length == 0.0] = 1.0

@@ -119,6 +119,16 @@ class Process(ABC):
         """The parameters that enter the wavelet variance non-linearly."""
         return tuple(parameter for parameter in self.parameters if parameter.role == "shape")
 
+    def at_unit(self, shape: Shape) -> Self:
+        """A copy at another shape and unit amplitude."""
+        values: dict[str, float | None] = {
+            parameter.name: value
+            for parameter, value in zip(self.shape_parameters, shape, strict=True)
+        }
+        if self.linear_parameter is not None:
+            values[self.linear_parameter.name] = 1.0
+        return self.with_values(**values)
+
     def with_values(self, **values: float | None) -> Self:
         """A copy with other parameter values.
 
@@ -192,15 +202,38 @@ class Process(ABC):
         """
         return spectral.haar_variance(self.psd, np.asarray(tau, dtype=float), dt)
 
+    def wavelet_variance(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
+        """Wavelet variance by any Daubechies filter.
+
+        Parameters
+        ----------
+        tau : array_like
+            Averaging times in seconds, multiples of ``dt``; dyadic ones but for "haar".
+        dt : float
+            Sampling interval in seconds.
+        wavelet : str, optional
+            Name as in PyWavelets, e.g. "db2".
+
+        Returns
+        -------
+        ndarray
+            Same shape as ``tau``, in u^2.
+        """
+        if wavelet == "haar":
+            return self.haar_variance(tau, dt)
+        return spectral.wavelet_variance(self.psd, self.lines(), tau, dt, wavelet)
+
+    def unit_wavelet_variance(
+        self, shape: Shape, tau: FloatArray, dt: float, wavelet: str = "haar"
+    ) -> FloatArray:
+        """`wavelet_variance` at another shape and unit amplitude."""
+        if wavelet == "haar":
+            return self.unit_haar_variance(shape, tau, dt)
+        return self.at_unit(shape).wavelet_variance(tau, dt, wavelet)
+
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
-        values: dict[str, float | None] = {
-            parameter.name: value
-            for parameter, value in zip(self.shape_parameters, shape, strict=True)
-        }
-        if self.linear_parameter is not None:
-            values[self.linear_parameter.name] = 1.0
-        return np.asarray(self.with_values(**values).haar_variance(tau, dt), dtype=float)
+        return np.asarray(self.at_unit(shape).haar_variance(tau, dt), dtype=float)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).

@@ -143,13 +143,18 @@ class Model:
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         """Haar wavelet variance (u^2) at times ``tau`` (s); see `Process.haar_variance`."""
-        return np.sum(self.component_variances(tau, dt), axis=0)
+        return self.wavelet_variance(tau, dt)
 
-    def component_variances(self, tau: FloatArray, dt: float) -> FloatArray:
-        """Haar wavelet variance of each term, shape (terms, *tau.shape), in u^2."""
+    def wavelet_variance(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
+        """Wavelet variance (u^2) at times ``tau`` (s); see `Process.wavelet_variance`."""
+        return np.sum(self.component_variances(tau, dt, wavelet), axis=0)
+
+    def component_variances(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
+        """Wavelet variance of each term, shape (terms, *tau.shape), in u^2."""
         self._require_given()
         tau = np.asarray(tau, dtype=float)
-        return np.stack([np.asarray(term.haar_variance(tau, dt)) for term in self.terms])
+        curves = [term.wavelet_variance(tau, dt, wavelet) for term in self.terms]
+        return np.stack([np.asarray(curve) for curve in curves])
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance (u^2) at lags in samples, of stationary models."""

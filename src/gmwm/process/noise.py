@@ -17,6 +17,7 @@ from gmwm.process import synthesis
 from gmwm.process.base import Process
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
+from gmwm.wavelets import wavelet as filters
 
 
 class WhiteNoise(Process):
@@ -162,6 +163,11 @@ class RateRamp(Process):
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         return 0.25 * (self.R * np.asarray(tau, dtype=float)) ** 2
+
+    def wavelet_variance(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
+        if wavelet == "haar" or filters(wavelet).vanishing_moments == 1:
+            return self.haar_variance(tau, dt)
+        return np.zeros(np.shape(tau))
 
     def state_space(self, dt: float) -> StateSpace:
         self._require_given()

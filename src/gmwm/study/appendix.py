@@ -18,7 +18,7 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.estimate.methods import fit
 from gmwm.process import RandomWalk, WhiteNoise
-from gmwm.variance.wavelet import wavelet_variance
+from gmwm.variance.analysis import wavelet_variance
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)

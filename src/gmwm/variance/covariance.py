@@ -45,6 +45,29 @@ def dyadic_levels(n: int) -> FloatArray:
     return np.exp2(np.arange(int(n).bit_length() - 1, dtype=float))
 
 
+def _tent_sum(distance: FloatArray, block: int) -> FloatArray:
+    """What a kink of unit slope in the counts adds to their sum under a tent of +- block lags.
+
+    sum_h (1 - |h - x|/b)_+ (h)_+ - b (x)_+ with integer h, x: even in x, (y^3 - y)/(6 b) with
+    y = b - |x|.
+    """
+    y = np.maximum(block - np.abs(distance), 0.0)
+    return np.asarray((y**3 - y) / (6.0 * block))
+
+
+def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> FloatArray:
+    """Number of pairs of coefficients whose centres are about ``x`` samples apart.
+
+    Of ``first`` and ``second`` coefficients the number is a trapezoid in the lag. The pairs at the
+    lags between multiples of ``block`` are divided between the neighbours as a straight line would.
+    """
+    outer, inner = 0.5 * (first + second), 0.5 * abs(first - second)
+    pairs = block * np.clip(outer - np.abs(x), 0.0, min(first, second))
+    pairs += _tent_sum(x - outer, block) + _tent_sum(x + outer, block)
+    pairs -= _tent_sum(x - inner, block) + _tent_sum(x + inner, block)
+    return np.asarray(pairs)
+
+
 @dataclass(frozen=True)
 class _LagSums:
     """Everything about the coarse levels that does not depend on the spectrum."""
@@ -71,19 +94,14 @@ def _lag_sums(n: int) -> _LagSums:
     frequency[0] = 1e-4 / size
     amplitude = np.sin(np.pi * coarse[:, None] * frequency) ** 2
     amplitude /= coarse[:, None] * np.sin(np.pi * frequency)
-    available = length - 2.0 * coarse + 1.0
+    available = haar_counts(n, m[first:])
     lag = np.arange(size, dtype=float)
     lag[size // 2 + 1 :] -= size
     counts = np.empty((coarse.size, coarse.size, size))
-    for j, m_j in enumerate(coarse):
-        for k, m_k in enumerate(coarse):
-            # s from 2 m_j - 1 and t from 2 m_k - 1 up to the end; h = s - t. The cross-covariance
-            # is even about h = m_j - m_k.
-            h = lag + (m_j - m_k)
-            low = np.maximum(2.0 * m_k - 1.0, 2.0 * m_j - 1.0 - h)
-            high = np.minimum(length - 1.0, length - 1.0 - h)
-            counts[j, k] = np.maximum(high - low + 1.0, 0.0)
-    counts /= np.minimum.outer(available, available)[:, :, None]
+    for j, own in enumerate(available):
+        for k, other in enumerate(available):
+            pairs = centred_pairs(own, other, block * lag, block)
+            counts[j, k] = pairs / (block * min(own, other))
     return _LagSums(first, block, frequency, amplitude, counts, size)
 
 
@@ -114,25 +132,25 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
     return total
 
 
-def _block_spectrum(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
+def block_spectrum(psd: PSD, dt: float, frequency: FloatArray, size: int, block: int) -> FloatArray:
     """`block_density` at the Fourier frequencies of the lag sums.
 
     The product of two gains and the spectrum is f^2 S(f) near zero frequency. What stands for
     its bin at zero is its mean over the bin less what a smooth function would have curved there:
     exact for short memory, where it vanishes, and for a random walk, where it is constant.
     """
-    result = block_density(psd, dt, sums.frequency, sums.block)
+    result = block_density(psd, dt, frequency, block)
     x, w = legendre(8)
-    f = 0.25 / sums.size * (x + 1.0)
-    mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, sums.block))
-    bin_value = (12.0 * mean - sums.frequency[1] ** 2 * result[1]) / 11.0
-    result[0] = max(bin_value, 0.0) / sums.frequency[0] ** 2
+    f = 0.25 / size * (x + 1.0)
+    mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, block))
+    bin_value = (12.0 * mean - frequency[1] ** 2 * result[1]) / 11.0
+    result[0] = max(bin_value, 0.0) / frequency[0] ** 2
     return result
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
-    spectrum = _block_spectrum(psd, dt, sums)
+    spectrum = block_spectrum(psd, dt, sums.frequency, sums.size, sums.block)
     levels = sums.amplitude.shape[0]
     result = np.empty((levels, levels))
     for j in range(levels):
@@ -164,7 +182,7 @@ def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, Float
     return np.array(rows, dtype=int), np.array(columns, dtype=int), np.array(weights)
 
 
-def _integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
+def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
     """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
     averaging = tuple(m.tolist())
     grid = quadrature(averaging)
@@ -187,7 +205,7 @@ def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     a drift that the record can show is far below the noise, it is left at zero.
     """
     sums = _lag_sums(n)
-    spectrum = _block_spectrum(psd, dt, sums)
+    spectrum = block_spectrum(psd, dt, sums.frequency, sums.size, sums.block)
     m = dyadic_levels(n)
     counts = haar_counts(n, m)[sums.first :] / sums.block
     result = np.zeros((m.size, m.size))
@@ -218,21 +236,23 @@ def haar_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     """
     m = dyadic_levels(n)
     counts = haar_counts(n, m)
-    covariance = _integrals(psd, dt, m) / np.maximum.outer(counts, counts)
+    covariance = integrals(psd, dt, m) / np.maximum.outer(counts, counts)
     sums = _lag_sums(n)
     covariance[sums.first :, sums.first :] *= _end_effects(psd, dt, sums)
     return covariance
 
 
 def line_covariance(
-    lines: tuple[tuple[float, float], ...], psd: PSD, n: int, dt: float
+    lines: tuple[tuple[float, float], ...],
+    psd: PSD,
+    dt: float,
+    m: FloatArray,
+    counts: FloatArray,
 ) -> FloatArray:
     """What spectral lines add to the covariance: their product with the noise around them.
 
     A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
     """
-    m = dyadic_levels(n)
-    counts = haar_counts(n, m)
     total = np.zeros((m.size, m.size))
     for frequency, amplitude in lines:
         f = np.array([abs(frequency * dt - np.rint(frequency * dt))])

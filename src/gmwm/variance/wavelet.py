@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
 
 from gmwm._typing import FloatArray
-from gmwm.errors import InputError
-from gmwm.recording import Channel
-from gmwm.variance.covariance import dyadic_levels, haar_counts, haar_covariance
-from gmwm.variance.kernels import cumulative, haar_moments
+from gmwm.process.spectral import PSD
+from gmwm.variance.covariance import haar_covariance, line_covariance, mean_covariance
+from gmwm.variance.gaps import gappy_covariance, gappy_mean_covariance
 from gmwm.variance.pilot import pilot_psd
+from gmwm.variance.runs import Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MAX_BLOCKS = 2048
 _LEAST_DOF, _LEAST_QUANTILE = 0.01, 1e-9  # keep intervals that say nothing in numbers
-_SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
-MIN_SAMPLES = 8
-"""Fewest samples of which a wavelet variance is made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,17 +36,28 @@ class WaveletVariance:
     mean : (J,) ndarray
         Mean of these coefficients, u; R tau/2 under a drift of R.
     blocks : (B,) ndarray
-        Means of blocks of samples about the mean of the series, u: what a drift is estimated from.
+        Means of blocks of samples about the mean of the series, u: what a drift is estimated from;
+        NaN where samples are missing.
     block : int
         Samples per block.
     n : int
-        Number of samples.
+        Number of samples, missing ones included.
     dt : float
         Sampling interval, s.
     confidence : float
         Level of ``lower`` and ``upper``.
     name, quantity, unit : str
         Of the channel, where there is one.
+    wavelet : str
+        Filter, as PyWavelets names it.
+    efficiency : float
+        1 for the mean square of the coefficients, less for the robust estimate, see
+        `gmwm.variance.robust`.
+    present : Runs or None
+        The samples that exist; ``None`` if all do.
+    data_covariance : (J, J) ndarray or None
+        Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
+        asked for.
     """
 
     tau: FloatArray
@@ -64,16 +71,50 @@ class WaveletVariance:
     name: str = ""
     quantity: str | None = None
     unit: str = "u"
+    wavelet: str = "haar"
+    efficiency: float = 1.0
+    present: Runs | None = None
+    data_covariance: FloatArray | None = None
+
+    @property
+    def runs(self) -> Runs:
+        """The samples that exist, between gaps."""
+        return self.present or Runs.complete(self.n)
+
+    @property
+    def n_all(self) -> int:
+        """Number of samples of all recordings."""
+        return self.n
 
     @property
     def averaging(self) -> FloatArray:
         """Averaging times in samples, (J,)."""
-        return dyadic_levels(self.n)
+        return np.rint(self.tau / self.dt)
 
     @property
     def counts(self) -> FloatArray:
         """Number of coefficients of each level, (J,)."""
-        return haar_counts(self.n, self.averaging)
+        return self.runs.counts(self.width)
+
+    @property
+    def width(self) -> FloatArray:
+        """Number of samples that a coefficient is made of, (J,)."""
+        if self.wavelet == "haar":
+            return 2.0 * self.averaging
+        from gmwm.wavelets import wavelet
+
+        kind = wavelet(self.wavelet)
+        return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
+
+    @property
+    def drift_response(self) -> FloatArray:
+        """Mean of the coefficients per unit of drift (u/s), s, (J,)."""
+        if self.wavelet == "haar":
+            return 0.5 * self.tau
+        from gmwm.wavelets import wavelet
+
+        moments = wavelet(self.wavelet).vanishing_moments
+        return 0.5 * self.tau if moments < 2 else np.zeros_like(self.tau)
 
     @property
     def allan_variance(self) -> FloatArray:
@@ -93,7 +134,56 @@ class WaveletVariance:
         imply; no model is assumed.
         """
         psd = pilot_psd(self._positive, self.averaging, self.dt)
-        return haar_covariance(psd, self.n, self.dt)
+        return self.covariance_under(psd)
+
+    def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
+        """Covariance of ``variance`` for Gaussian noise of a given spectrum, u^4, (J, J).
+
+        Parameters
+        ----------
+        psd : callable
+            ``psd(f, dt)``, two-sided, in u^2/Hz.
+        lines : sequence of (float, float), optional
+            Spectral lines beside it: frequency (Hz), amplitude (u).
+        """
+        if self.wavelet != "haar":
+            covariance = self._of_other_wavelet(psd, lines)
+        else:
+            covariance = self._of_haar(psd)
+            if lines:
+                covariance = covariance + line_covariance(
+                    tuple(lines), psd, self.dt, self.averaging, self.counts
+                )
+        if self.efficiency < 1.0:
+            from gmwm.variance.robust_covariance import robust_covariance
+
+            covariance = robust_covariance(
+                psd, self.n, self.dt, self.efficiency, covariance, self.counts
+            )
+        return covariance
+
+    def _of_haar(self, psd: PSD) -> FloatArray:
+        if self.present is None:
+            return haar_covariance(psd, self.n, self.dt)
+        return gappy_covariance(psd, self.present, self.dt, self.averaging)
+
+    def _of_other_wavelet(self, psd: PSD, lines: Sequence[tuple[float, float]]) -> FloatArray:
+        from gmwm.variance.wavelet_covariance import wavelet_covariance
+
+        covariance = wavelet_covariance(
+            psd, self.n, self.dt, self.wavelet, self.tau.size, tuple(lines)
+        )
+        if self.present is None:
+            return covariance
+        complete = Runs.complete(self.n).counts(self.width)
+        more = np.maximum.outer(complete, complete) / np.maximum.outer(self.counts, self.counts)
+        return covariance * more
+
+    def mean_covariance_under(self, psd: PSD) -> FloatArray:
+        """Covariance of ``mean`` at the coarse levels, zero at the others, u^2, (J, J)."""
+        if self.present is None:
+            return mean_covariance(psd, self.n, self.dt)
+        return gappy_mean_covariance(psd, self.present, self.dt, self.averaging)
 
     @property
     def _positive(self) -> FloatArray:
@@ -123,11 +213,11 @@ class WaveletVariance:
 
     def detrended(self, slope: float) -> FloatArray:
         """Wavelet variances of the series less a drift of ``slope`` (u/s), exactly, u^2, (J,)."""
-        step = 0.5 * slope * self.tau
+        step = slope * self.drift_response
         return self.variance - 2.0 * step * self.mean + step**2
 
     def __str__(self) -> str:
-        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
+        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz{self._how()}"
         unit = self.unit or "u"
         lines = [head, f"{'tau [s]':>12} {f'Allan dev. [{unit}]':>22} {'95 % interval':>27}  dof"]
         lines[1] = lines[1].replace("95 %", f"{100 * self.confidence:g} %")
@@ -136,6 +226,17 @@ class WaveletVariance:
             tau, dev, a, b, dof = row
             lines.append(f"{tau:12.6g} {dev:22.5g} {f'{a:.5g} .. {b:.5g}':>27} {dof:4.3g}")
         return "\n".join(lines)
+
+    def _how(self) -> str:
+        """What differs from the usual, for the head of a table."""
+        said = []
+        if self.present is not None:
+            said.append(f"{self.n - self.present.present:,} of them missing")
+        if self.wavelet != "haar":
+            said.append(self.wavelet)
+        if self.efficiency < 1.0:
+            said.append(f"robust, efficiency {self.efficiency:g}")
+        return "".join(f", {part}" for part in said)
 
     def to_dict(self) -> dict[str, Any]:
         """All that is needed to make the object again, in JSON types; see `from_dict`."""
@@ -150,7 +251,13 @@ class WaveletVariance:
             "variance": self.variance.tolist(),
             "mean": self.mean.tolist(),
             "block": self.block,
-            "blocks": self.blocks.tolist(),
+            "blocks": [None if np.isnan(mean) else mean for mean in self.blocks.tolist()],
+            "wavelet": self.wavelet,
+            "efficiency": self.efficiency,
+            "present": None if self.present is None else self.present.edges.tolist(),
+            "data_covariance": (
+                None if self.data_covariance is None else self.data_covariance.tolist()
+            ),
         }
 
     @classmethod
@@ -160,7 +267,13 @@ class WaveletVariance:
             k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")
         }
         numbers = {"n": int(content["n"]), "dt": float(content["dt"])}
-        return cls(**{**content, **arrays, **numbers})
+        found: dict[str, Any] = {**content, **arrays, **numbers}
+        if content.get("present") is not None:
+            starts, stops = zip(*content["present"], strict=True)
+            found["present"] = Runs(starts, stops, found["n"])
+        if content.get("data_covariance") is not None:
+            found["data_covariance"] = np.array(content["data_covariance"], dtype=float)
+        return cls(**found)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes."""
@@ -170,112 +283,3 @@ class WaveletVariance:
         return plot.deviation(
             self.tau, self.allan_deviation, low, high, unit=self.unit, title=self.name, ax=ax
         )
-
-
-def wavelet_variance(
-    data: Channel | FloatArray, dt: float | None = None, *, confidence: float = 0.95
-) -> WaveletVariance:
-    """Haar MODWT wavelet variance of a channel or an array.
-
-    All levels with at least one coefficient free of end effects are given; the mean of the series
-    does not matter.
-
-    Parameters
-    ----------
-    data : Channel or (n,) array_like
-        At least 8 samples.
-    dt : float, optional
-        Sampling interval, s; needed for an array.
-    confidence : float, optional
-        Level of the chi-square intervals.
-
-    Returns
-    -------
-    WaveletVariance
-
-    Raises
-    ------
-    InputError
-        For data that is not one series of finite numbers, too short or constant.
-
-    Notes
-    -----
-    Percival & Walden (2000), *Wavelet Methods for Time Series Analysis*, sec. 8.3; eq. (3) of
-    Stebler et al. (2012). The variance of averaging time tau is half the overlapping Allan
-    variance.
-    """
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
-    values = np.ascontiguousarray(channel.values, dtype=float)
-    where = f"channel {channel.name!r}" if channel.name else "the series"
-    if values.ndim != 1 or values.size < MIN_SAMPLES:
-        raise InputError(
-            f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
-        )
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise InputError(
-            f"{where} has {bad.size} NaN or infinite samples, the first at index {bad[0]}: "
-            "remove or repair them"
-        )
-    if not 0.0 < confidence < 1.0:
-        raise InputError(f"confidence = {confidence!r}: give a number between 0 and 1, e.g. 0.95")
-    if channel.is_constant:
-        raise InputError(f"{where} is constant ({values[0]:g}): a dead channel has no noise model")
-    size = float(np.max(np.abs(values - values[0])))
-    if not _SMALLEST < size < _LARGEST:
-        raise InputError(f"{where} varies by {size:.1g}: that is no sensor noise, check the unit")
-    mean = float(np.mean(values))
-    integral = cumulative(values, mean)
-    averaging = dyadic_levels(values.size)
-    moments = np.array([haar_moments(integral, int(m)) for m in averaging])
-    block = -(-values.size // _MAX_BLOCKS)
-    edges = integral[: (values.size // block) * block + 1 : block]
-    return WaveletVariance(
-        tau=averaging * channel.dt,
-        variance=moments[:, 1],
-        mean=moments[:, 0],
-        blocks=np.diff(edges) / block,
-        block=block,
-        n=values.size,
-        dt=channel.dt,
-        confidence=confidence,
-        name=channel.name,
-        quantity=channel.quantity,
-        unit=channel.unit or "u",
-    )
-
-
-def as_wavelet_variance(
-    data: WaveletVariance | Channel | FloatArray, dt: float | None
-) -> WaveletVariance:
-    """A wavelet variance as it is, or that of a series.
-
-    Raises
-    ------
-    InputError
-        If a sampling interval is given for a wavelet variance, which has its own.
-    """
-    if not isinstance(data, WaveletVariance):
-        return wavelet_variance(data, dt)
-    if dt is not None:
-        raise InputError("a wavelet variance has its own sampling interval: leave dt out")
-    return data
-
-
-def as_channel(data: FloatArray, dt: float | None) -> Channel:
-    """A channel without a name from an array and its sampling interval (s).
-
-    Raises
-    ------
-    InputError
-        If either is not usable.
-    """
-    if dt is None:
-        raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")
-    if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
-        raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
-    try:
-        values = np.asarray(data, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("the series holds something that is not a number") from None
-    return Channel("", values, float(dt))

@@ -12,8 +12,13 @@ from hypothesis import strategies as st
 import gmwm
 from gmwm.process import CATALOGUE, Process
 from gmwm.process.spectral import haar_gain, haar_variance
-from gmwm.variance.covariance import haar_covariance, line_covariance
-from gmwm.variance.wavelet import wavelet_variance
+from gmwm.variance.analysis import wavelet_variance
+from gmwm.variance.covariance import (
+    dyadic_levels,
+    haar_counts,
+    haar_covariance,
+    line_covariance,
+)
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "haar_wavelet_variance.json"
 CURVES = json.loads(GOLDEN.read_text())["curves"]
@@ -249,8 +254,9 @@ def test_line_covariance_against_simulation():
     n, runs = 1024, 400
     rng = np.random.default_rng(8)
     waves = [wavelet_variance(model.simulate(n, 1.0, rng), 1.0).variance for _ in range(runs)]
+    m = dyadic_levels(n)
     predicted = haar_covariance(model.psd, n, 1.0) + line_covariance(
-        model.lines(), model.psd, n, 1.0
+        model.lines(), model.psd, 1.0, m, haar_counts(n, m)
     )
     ratio = np.var(waves, axis=0, ddof=1)[:7] / np.diag(predicted)[:7]
     assert np.all(np.abs(ratio - 1.0) < 4.5 * np.sqrt(2.5 / runs)), ratio

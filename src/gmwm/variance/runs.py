@@ -1,0 +1,86 @@
+"""Which samples of a series exist: runs between gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from gmwm._typing import FloatArray
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs of samples without a missing one.
+
+    Attributes
+    ----------
+    starts, stops : tuple of int
+        First sample of each run, and the one after its last, ascending.
+    n : int
+        Length of the series, missing samples included.
+    """
+
+    starts: tuple[int, ...]
+    stops: tuple[int, ...]
+    n: int
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Runs:
+        """Those of a series (n,) in which NaN stands for missing samples."""
+        present = np.concatenate([[False], ~np.isnan(values), [False]])
+        edges = np.flatnonzero(present[1:] != present[:-1])
+        return cls(tuple(edges[::2].tolist()), tuple(edges[1::2].tolist()), int(values.size))
+
+    @classmethod
+    def complete(cls, n: int) -> Runs:
+        """One run of n samples."""
+        return cls((0,), (n,), n)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no sample is missing."""
+        return self.starts == (0,) and self.stops == (self.n,)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Starts and stops, (runs, 2)."""
+        return np.stack([self.starts, self.stops], axis=1).astype(np.int64)
+
+    @property
+    def present(self) -> int:
+        """Number of samples that exist."""
+        return int(np.sum(self.edges[:, 1] - self.edges[:, 0]))
+
+    @property
+    def longest(self) -> int:
+        """Length of the longest run."""
+        return int(np.max(self.edges[:, 1] - self.edges[:, 0], initial=0))
+
+    def counts(self, width: FloatArray) -> FloatArray:
+        """Number of windows of ``width`` samples that lie within a run, same shape."""
+        length = (self.edges[:, 1] - self.edges[:, 0]).astype(float)
+        width = np.asarray(width, dtype=float)
+        return np.sum(np.maximum(length - width[..., None] + 1.0, 0.0), axis=-1)
+
+    def occupancy(self, width: int, block: int) -> FloatArray:
+        """Share of the windows of ``width`` samples ending in each block that exist."""
+        size = -(-self.n // block)
+        inside = np.zeros(size * block + 1)
+        for start, stop in self.edges:
+            if stop - start >= width:
+                inside[start + width - 1] += 1.0
+                inside[stop] -= 1.0
+        return np.asarray(np.cumsum(inside[:-1]).reshape(size, block).mean(axis=1))
+
+
+def pair_counts(first: FloatArray, second: FloatArray, lags: NDArray[np.int64]) -> FloatArray:
+    """Number of pairs ``first[s] second[t]`` with s - t equal to each lag, in blocks."""
+    size = fft.next_fast_len(first.size + second.size, real=True)
+    product = fft.rfft(first, size) * np.conj(fft.rfft(second, size))
+    correlation = fft.irfft(product, size)
+    inside = np.abs(lags) < max(first.size, second.size)
+    return np.where(inside, np.maximum(correlation[lags % size], 0.0), 0.0)
