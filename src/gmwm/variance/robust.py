@@ -1,0 +1,196 @@
+"""The robust variance of wavelet coefficients: a bounded-influence M-estimator.
+
+A few outliers, jumps or glitches raise the wavelet variances of all levels they touch. The robust
+variance of the coefficients W_t of a level solves
+
+    mean_t chi(W_t / nu) = a(c),    chi(r) = r^2 w(r)^2,    w(r) = (1 - (r/c)^2)^2 for |r| < c,
+
+with Tukey's biweight w, which takes all weight from coefficients beyond c nu, and
+a(c) = E chi(Z), Z ~ N(0, 1), which makes it consistent for Gaussian data (Mondal & Percival 2012,
+*Ann. Inst. Stat. Math.* 64, 27-53; Huber & Ronchetti 2009, *Robust Statistics*, ch. 5-6). From the
+derivative of the equation by nu^2, with E[Z chi'(Z)] = E[(Z^2 - 1) chi(Z)] (Stein's identity), the
+influence of a coefficient nu r on nu^2 is
+
+    2 nu^2 (chi(r) - a) / E[(Z^2 - 1) chi(Z)],
+
+and the efficiency at independent Gaussian coefficients, 2 nu^4 over its variance,
+
+    E[(Z^2 - 1) chi(Z)]^2 / (2 var chi(Z)).
+
+What it can do has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient
+of averaging time m is made of 2 m samples, and where most of them hold an outlier, their mean is
+nearly Gaussian with the raised variance, which no estimate from the coefficients of that level can
+tell from noise.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import brentq
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process.spectral import legendre
+from gmwm.variance.robust_kernels import biweight_means, middle_bin
+
+EFFICIENCY = 0.6
+"""Efficiency at Gaussian data unless told otherwise."""
+
+_QUARTILE = 0.6744897501960817  # median of |Z|
+_TAIL = 13.0  # the normal density beyond is below double precision
+_NODES = 256
+_SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.53; 1 - 1e-7 is below 1e4
+_TOLERANCE = 1e-7  # of the last Newton step in log nu^2; the error left is its square
+_FEW = 2**14  # coefficients; below, counting costs more than it saves
+_ZERO = 1e-6  # times the root mean square: a median below counts as zero
+_NARROW = 1e-4  # in log nu^2: a maximum below zero, so close, is no solution
+_LARGEST_STEP = np.log(2.0)
+_MAX_STEPS = 200
+
+
+def biweight_square(r: FloatArray, c: float) -> FloatArray:
+    """chi(r) = r^2 (1 - (r/c)^2)^4 within c, 0 beyond."""
+    return np.asarray(r**2 * np.maximum(1.0 - (r / c) ** 2, 0.0) ** 4)
+
+
+def half_normal(c: float) -> tuple[FloatArray, FloatArray]:
+    """Nodes within [0, c] and weights for the mean of an even function that vanishes beyond c."""
+    x, w = legendre(_NODES)
+    half = 0.5 * min(c, _TAIL)
+    r = half * (x + 1.0)
+    return r, half * w * np.sqrt(2.0 / np.pi) * np.exp(-0.5 * r**2)
+
+
+def consistency(c: float) -> float:
+    """a(c) = E[Z^2 w(Z)^2] for Z ~ N(0, 1)."""
+    r, weight = half_normal(c)
+    return float(weight @ biweight_square(r, c))
+
+
+def _signed_efficiency(c: float) -> float:
+    """Efficiency, negative where the equation has its slope the wrong way round."""
+    r, weight = half_normal(c)
+    chi = biweight_square(r, c)
+    slope = weight @ ((r**2 - 1.0) * chi)
+    spread = weight @ chi**2 - (weight @ chi) ** 2
+    return float(slope * abs(slope) / (2.0 * spread))
+
+
+@lru_cache(maxsize=64)
+def tuning_constant(efficiency: float = EFFICIENCY) -> float:
+    """Distance c, in standard deviations, beyond which a coefficient has no weight.
+
+    Parameters
+    ----------
+    efficiency : float
+        Variance of the classical estimate over that of the robust one, for independent Gaussian
+        coefficients; between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        For an efficiency outside (0, 1).
+    """
+    if not 0.0 < efficiency < 1.0:
+        raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
+    if efficiency >= _signed_efficiency(_LARGEST_C):
+        return _LARGEST_C
+    return float(
+        brentq(lambda c: _signed_efficiency(c) - efficiency, _SMALLEST_C, _LARGEST_C, xtol=1e-13)
+    )
+
+
+def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) -> float:
+    """Robust variance, about zero, of the wavelet coefficients of one level.
+
+    The equation has a second, meaningless solution far below, and may have more in contaminated
+    data: taken is the one found first from the squared median of \\|W\\| over 0.6745, on the branch
+    on which the equation falls with nu^2, as it does for Gaussian data.
+
+    Parameters
+    ----------
+    coefficients : (M,) array_like
+        Coefficients free of end effects, in u; at least one.
+    efficiency : float, optional
+        At Gaussian data, between 0 and 1; see `tuning_constant`.
+
+    Returns
+    -------
+    float
+        In u^2. Where more than half of the coefficients are zero (coarsely rounded data; below a
+        millionth of their root mean square), the search starts from their mean square. Where the
+        equation has no solution, the start itself is returned: at an efficiency of 0.6 with more
+        than a quarter of far outliers, or of zeros beside noise.
+
+    Raises
+    ------
+    InputError
+        For coefficients that are not one series of finite numbers, or an efficiency outside (0, 1).
+
+    Notes
+    -----
+    With few independent coefficients (coarse levels) the estimate is biased, as any non-linear
+    function of them: at a single one it is W^2 over a constant. It stands for the variance of
+    Gaussian coefficients: independent uniform rounding errors give 15 % more than their variance,
+    and a level that holds nothing but a periodic line gives 40 % more.
+    """
+    c = tuning_constant(efficiency)
+    w = np.ascontiguousarray(coefficients, dtype=float)
+    if w.ndim != 1 or w.size == 0:
+        raise InputError(f"coefficients of shape {w.shape}: give one series of 1 or more")
+    largest = max(float(np.max(w)), -float(np.min(w)))
+    if not np.isfinite(largest):
+        raise InputError("the coefficients hold NaN or infinite values: remove or repair them")
+    if largest == 0.0:
+        return 0.0
+    scale = _start(w, largest)
+    return scale**2 * float(np.exp(_solve(w, scale, c)))
+
+
+def _start(w: FloatArray, largest: float) -> float:
+    """Median of the absolute coefficients over 0.6745, or their root mean square if it is zero.
+
+    Coefficients that are zero come out as rounding errors of the cumulative sum: with long slow
+    series up to about a millionth of the others.
+    """
+    size, rank = (np.abs(w), w.size // 2) if w.size < _FEW else middle_bin(w)
+    scale = float(np.partition(size, rank)[rank]) / _QUARTILE
+    if scale > _ZERO * largest:  # which is at least the root mean square
+        return scale
+    square = largest * float(np.sqrt(np.mean((w / largest) ** 2)))
+    return scale if scale > _ZERO * square else square
+
+
+def _solve(w: FloatArray, scale: float, c: float) -> float:
+    """log(nu^2 / scale^2) of the solution next to ``scale``, or 0 if there is none.
+
+    Newton's method on log(mean chi / a) against log nu^2, a straight line if nothing is cut off,
+    within a bracket. Its upper end is above the solution. Its lower end is below it, or, as long
+    as none is ``found``, beyond the maximum of mean chi, where that rises with nu^2.
+    """
+    a = consistency(c) / c**2
+    low, high, found = -np.inf, np.inf, False
+    x = 0.0
+    for _ in range(_MAX_STEPS):
+        mean, slope = biweight_means(w, float(np.exp(-0.5 * x)) / (c * scale))
+        excess = np.log(mean / a) if mean > 0.0 else -np.inf
+        if excess >= 0.0:
+            low, found = x, True
+        elif found or slope > 0.0:
+            high = x
+        elif high == np.inf:
+            return 0.0
+        else:
+            low = x
+        if not found and high - low < _NARROW:
+            return 0.0
+        step = excess * mean / slope if slope > 0.0 else np.copysign(_LARGEST_STEP, excess)
+        following = x + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
+        if abs(step) < _TOLERANCE:
+            return following
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        x = following
+    return x
