@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.allan import fit_allan
 from gmwm.estimate.em import fit_em
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.gmwm import fit_gmwm
+from gmwm.estimate.gmwm import fit_gmwm, fit_simulated
+from gmwm.estimate.joint import fit_joint
 from gmwm.estimate.mle import fit_mle, fit_whittle
 from gmwm.process import Model, Process, as_model
 from gmwm.recording import Channel
-from gmwm.variance.wavelet import WaveletVariance, as_channel, as_wavelet_variance
+from gmwm.variance.analysis import as_channel, as_wavelet_variance
+from gmwm.variance.wavelet import WaveletVariance
 
-_OF_VARIANCES: dict[str, Callable[..., Fit]] = {"gmwm": fit_gmwm, "allan": fit_allan}
+Data = WaveletVariance | Channel | FloatArray
+
+_OF_VARIANCES: dict[str, Callable[..., Fit]] = {
+    "gmwm": fit_gmwm,
+    "simulated": fit_simulated,
+    "allan": fit_allan,
+}
+_SERIES = (WaveletVariance, Channel, np.ndarray)
+_OF_SEVERAL = ("gmwm", "simulated")
 _OF_SAMPLES: dict[str, Callable[..., Fit]] = {
     "mle": fit_mle,
     "whittle": fit_whittle,
@@ -24,6 +36,7 @@ _OF_SAMPLES: dict[str, Callable[..., Fit]] = {
 }
 _OPTIONS = {
     "gmwm": ("omega", "discrepancy"),
+    "simulated": ("omega", "discrepancy", "replications", "seed"),
     "allan": ("regions",),
     "mle": ("start",),
     "whittle": ("start",),
@@ -34,12 +47,14 @@ METHODS = tuple(_OPTIONS)
 
 def fit(
     model: Process | Model,
-    data: WaveletVariance | Channel | FloatArray,
+    data: Data | Sequence[Data],
     dt: float | None = None,
     *,
     method: str = "gmwm",
     omega: str | None = None,
     discrepancy: float | None = None,
+    replications: int | None = None,
+    seed: int | None = None,
     start: Process | Model | None = None,
     tolerance: float | None = None,
     max_iterations: int | None = None,
@@ -54,22 +69,29 @@ def fit(
     model : Process or Model
         Parameters that are given stay as they are, open ones are estimated. No starting values
         are needed.
-    data : WaveletVariance, Channel or (n,) array_like
-        The methods "mle", "whittle" and "em" need the samples; "mle" and "em" take NaN for missing
-        ones.
+    data : WaveletVariance, Channel or (n,) array_like, or a list of them
+        Missing samples are NaN. The methods "mle", "whittle" and "em" need the samples, "whittle"
+        all of them. Several recordings are fitted jointly by "gmwm" and "simulated", see
+        `gmwm.estimate.joint.JointFit`.
     dt : float, optional
         Sampling interval, s; needed for an array.
-    method : {"gmwm", "mle", "whittle", "em", "allan"}
-        Generalized method of wavelet moments; exact maximum likelihood by the Kalman filter; the
-        debiased Whittle likelihood, for long series; expectation-maximization; straight lines in
-        the Allan plot.
-    omega : {"model", "diagonal", "identity"}, optional
-        Weights of "gmwm": inverse covariance of the wavelet variances implied by the fitted model
-        (efficient, the default), its diagonal, or none.
+    method : {"gmwm", "simulated", "mle", "whittle", "em", "allan"}
+        Generalized method of wavelet moments; the same with the model's wavelet variances found by
+        simulation (indirect inference), for processes that can only be simulated; exact maximum
+        likelihood by the Kalman filter; the debiased Whittle likelihood, for long series;
+        expectation-maximization; straight lines in the Allan plot.
+    omega : {"model", "data", "diagonal", "identity"}, optional
+        Weights of "gmwm": inverse covariance of the wavelet variances, as the fitted model implies
+        it (efficient, the default) or estimated from the coefficients; its diagonal, or none.
     discrepancy : float, optional
         For "gmwm": relative error that the model is granted at each level beyond the statistical
         one. By default it is estimated where the model fails the chi-square test, and zero
         elsewhere; see `gmwm.estimate.discrepancy`.
+    replications : int, optional
+        For "simulated": number of simulated series as long as the data (10). The covariance of the
+        estimates grows by one part in so many.
+    seed : int, optional
+        For "simulated": seed of these series (0).
     start : Process or Model, optional
         Starting values of "mle", "whittle" and "em"; by default those of "gmwm".
     tolerance : float, optional
@@ -106,7 +128,8 @@ def fit(
     if method not in METHODS:
         raise InputError(f"method = {method!r}: known are {', '.join(METHODS)}")
     options = {
-        "omega": omega, "discrepancy": discrepancy, "start": start, "tolerance": tolerance,
+        "omega": omega, "discrepancy": discrepancy, "replications": replications, "seed": seed,
+        "start": start, "tolerance": tolerance,
         "max_iterations": max_iterations, "accelerate": accelerate, "drift": drift,
         "regions": regions,
     }  # fmt: skip
@@ -114,14 +137,32 @@ def fit(
     model = as_model(model)
     if not model.is_open:
         raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
+    if _are_several(data):
+        if method not in _OF_SEVERAL:
+            known = ", ".join(_OF_SEVERAL)
+            raise InputError(f"method = {method!r} takes one recording at a time: take {known}")
+        parts = [_variance(part, dt, omega) for part in cast("Sequence[Data]", data)]
+        return fit_joint(model, parts, _OF_VARIANCES[method], **given)
+    data = cast("Data", data)
     if method in _OF_VARIANCES:
-        return _OF_VARIANCES[method](model, as_wavelet_variance(data, dt), **given)
+        return _OF_VARIANCES[method](model, _variance(data, dt, omega), **given)
     if isinstance(data, WaveletVariance):
         raise InputError(
             f"method = {method!r} needs the samples: give the series, not its variance"
         )
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
     return _OF_SAMPLES[method](model, channel, **given)
+
+
+def _are_several(data: Data | Sequence[Data]) -> bool:
+    """Whether it is a list of recordings; one of numbers is a series."""
+    if not isinstance(data, list | tuple):
+        return False
+    return bool(data) and all(isinstance(part, _SERIES) for part in data)
+
+
+def _variance(data: Data, dt: float | None, omega: str | None) -> WaveletVariance:
+    return as_wavelet_variance(data, dt, data_covariance="octave" if omega == "data" else None)
 
 
 def _belonging(method: str, options: Mapping[str, Any]) -> dict[str, Any]:

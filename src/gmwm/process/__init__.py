@@ -16,6 +16,7 @@ from gmwm.process.noise import (
     WhiteNoise,
 )
 from gmwm.process.parameter import Parameter
+from gmwm.process.simulated import SimulatedProcess
 from gmwm.process.sinusoid import Sinusoid
 from gmwm.process.state_space import StateSpace
 
@@ -82,6 +83,7 @@ __all__ = [
     "RandomWalk",
     "RateRamp",
     "Resonance",
+    "SimulatedProcess",
     "Sinusoid",
     "StateSpace",
     "WhiteNoise",

@@ -1,0 +1,151 @@
+"""One model for several recordings, and whether they are the same noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.fit import Fit
+from gmwm.process import Model
+from gmwm.variance.pooled import PooledVariance
+from gmwm.variance.wavelet import WaveletVariance
+
+_SIGNIFICANT = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit(Fit):
+    """A model fitted to several recordings at once.
+
+    Attributes
+    ----------
+    parts : tuple of Fit
+        The same model fitted to each recording.
+    equality_p : float
+        p-value of the test that the parameters are equal in all recordings; NaN where fewer than
+        two of them determine the parameters.
+    spread : dict
+        Standard deviation of each parameter between recordings beyond their standard errors, by
+        key: relative for positive parameters, in its SI unit for others.
+    """
+
+    parts: tuple[Fit, ...] = ()
+    equality_p: float = float("nan")
+    spread: dict[str, float] | None = None
+
+    def __str__(self) -> str:
+        lines = [super().__str__(), "", f"{len(self.parts)} recordings"]
+        if np.isfinite(self.equality_p):
+            lines[-1] += f", equality of the parameters: p = {self.equality_p:.2g}"
+        spread = self.spread or {}
+        lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
+        for key in self.keys:
+            values = " ".join(f"{part.params.get(key, np.nan):>10.4g}" for part in self.parts)
+            lines.append(f"{key:<20} {self._spread_text(key, spread.get(key)):>8} {values}")
+        return "\n".join(lines)
+
+    def _spread_text(self, key: str, value: float | None) -> str:
+        if value is None:
+            return "-"
+        return f"{100.0 * value:.1f} %" if key in self._positive else f"{value:.2g}"
+
+    @property
+    def _positive(self) -> set[str]:
+        return {i.key for i in self.model.parameters if i.parameter.lower == 0.0}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, in JSON types."""
+        return {
+            **super().to_dict(),
+            "parts": [part.to_dict() for part in self.parts],
+            "equality_p": None if np.isnan(self.equality_p) else self.equality_p,
+            "spread": self.spread,
+        }
+
+
+def fit_joint(
+    model: Model,
+    parts: Sequence[WaveletVariance],
+    method: Callable[..., Fit],
+    **options: Any,
+) -> JointFit:
+    """Fit one model to several recordings, and to each.
+
+    Parameters
+    ----------
+    model : Model
+        With open parameters.
+    parts : sequence of WaveletVariance
+    method : callable
+        ``method(model, wv, **options) -> Fit``.
+    options
+        Of the method.
+    """
+    pooled = PooledVariance.of(parts)
+    if any(p.parameter.role == "slope" for p in model.parameters) and len(parts) > 1:
+        raise InputError(
+            "a rate ramp is an accident of one recording: take it out of the model, or fit the "
+            "recordings one by one"
+        )
+    whole = method(model, pooled, **options)
+    each = tuple(method(model, part, **options) for part in parts)
+    p_value, spread = _heterogeneity(whole, each)
+    remarks = whole.remarks
+    if p_value < _SIGNIFICANT:
+        remarks = (
+            *remarks,
+            f"the recordings do not have the same parameters (p = {p_value:.2g}): the joint values "
+            "are their mean, see the spread",
+        )
+    values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
+    values |= {"remarks": remarks, "valid": whole.valid and not p_value < _SIGNIFICANT}
+    return JointFit(**values, parts=each, equality_p=p_value, spread=spread)
+
+
+def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:
+    """Test of equality, and the spread of each parameter (DerSimonian & Laird 1986).
+
+    Positive parameters are compared by their logarithm. Only recordings that determine all
+    parameters of the joint fit take part.
+    """
+    keys = [key for key in whole.keys if key not in whole.upper_bounds]
+    positive = {i.key for i in whole.model.parameters if i.parameter.lower == 0.0}
+    points, matrices = [], []
+    for fit in each:
+        if not set(keys) <= set(fit.keys) - set(fit.upper_bounds):
+            continue
+        values = np.array([fit.params[key] for key in keys])
+        logged = np.array([key in positive for key in keys])
+        scale = np.where(logged, values, 1.0)
+        order = [fit.keys.index(key) for key in keys]
+        matrices.append(fit.covariance[np.ix_(order, order)] / np.outer(scale, scale))
+        points.append(np.where(logged, np.log(np.where(logged, values, 1.0)), values))
+    if len(points) < 2 or not keys:
+        return float("nan"), {}
+    spread = {
+        key: _between(np.array([p[k] for p in points]), np.array([m[k, k] for m in matrices]))
+        for k, key in enumerate(keys)
+    }
+    information = [np.linalg.inv(matrix) for matrix in matrices]
+    centre = np.linalg.solve(
+        np.sum(information, axis=0),
+        np.sum([i @ p for i, p in zip(information, points, strict=True)], axis=0),
+    )
+    away = [point - centre for point in points]
+    statistic = sum(a @ i @ a for a, i in zip(away, information, strict=True))
+    return float(chi2.sf(statistic, (len(points) - 1) * len(keys))), spread
+
+
+def _between(values: FloatArray, variances: FloatArray) -> float:
+    """Standard deviation between recordings beyond their standard errors."""
+    weight = 1.0 / variances
+    centre = np.sum(weight * values) / np.sum(weight)
+    excess = np.sum(weight * (values - centre) ** 2) - (values.size - 1)
+    scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
+    return float(np.sqrt(max(excess / scale, 0.0)))

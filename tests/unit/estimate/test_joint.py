@@ -1,0 +1,104 @@
+"""One model for several recordings."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+import gmwm
+from gmwm import GaussMarkov, RateRamp, WhiteNoise
+from gmwm.variance.pooled import PooledVariance
+
+TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)
+
+
+def recordings(lengths, seed, truth=TRUTH):
+    rng = np.random.default_rng(seed)
+    return [gmwm.wavelet_variance(truth.simulate(n, 1.0, rng), dt=1.0) for n in lengths]
+
+
+def test_one_recording_is_no_different():
+    (wv,) = recordings([5000], 1)
+    alone, joint = gmwm.fit(TRUTH.opened(), wv), gmwm.fit(TRUTH.opened(), [wv])
+    assert joint.params == pytest.approx(alone.params, rel=1e-9)
+    assert joint.stderr == pytest.approx(alone.stderr, rel=1e-9)
+    assert np.isnan(joint.equality_p)
+    assert joint.valid
+
+
+def test_errors_fall_as_in_one_long_recording():
+    parts = recordings([4000] * 9, 2)
+    joint = gmwm.fit(TRUTH.opened(), parts)
+    assert joint.valid, joint.message
+    each = np.mean([list(part.stderr.values()) for part in joint.parts], axis=0)
+    np.testing.assert_allclose(list(joint.stderr.values()), each / 3.0, rtol=0.15)
+
+
+def test_standard_errors_and_the_test_of_equality_are_right():
+    """Standardised errors and p-values of 60 joint fits of unequal recordings."""
+    errors, p_values = [], []
+    for seed in range(60):
+        joint = gmwm.fit(TRUTH.opened(), recordings([3000, 9000, 5000], seed))
+        errors.append([(joint.params[k] - v) / joint.stderr[k] for k, v in TRUTH.params.items()])
+        p_values.append(joint.equality_p)
+    # The fourth moment of a normal variable is 3: the mean square of 60 has a deviation of 0.18.
+    np.testing.assert_allclose(np.mean(np.square(errors), axis=0), 1.0, atol=3 * 0.18 + 0.1)
+    assert kstest(p_values, "uniform").pvalue > 0.001
+
+
+def test_recordings_that_differ_are_said_to():
+    parts = recordings([20_000] * 2, 4) + recordings([20_000], 5, WhiteNoise(1.2) + TRUTH.terms[1])
+    joint = gmwm.fit(TRUTH.opened(), parts)
+    assert joint.equality_p < 1e-6
+    assert not joint.valid
+    assert "do not have the same parameters" in joint.message
+    assert joint.spread["N"] == pytest.approx(np.std(np.log([1.0, 1.0, 1.2]), ddof=1), rel=0.2)
+    assert "3 recordings" in str(joint)
+    assert max(map(len, str(joint).splitlines()[:8])) <= 80
+
+
+def test_the_pooled_covariance_is_that_of_the_pooled_mean():
+    parts = recordings([3000, 12_000], 6)
+    pooled = PooledVariance.of(parts)
+    draws = []
+    for seed in range(300):
+        values = [part.variance for part in recordings([3000, 12_000], 1000 + seed)]
+        total = np.zeros(pooled.tau.size)
+        for value, share in zip(values, pooled.shares, strict=True):
+            total[: value.size] += share[: value.size] * value
+        draws.append(total)
+    expected = np.diag(pooled.covariance_under(TRUTH.psd))
+    # A sample variance of 300 has a relative deviation of 0.08; coarse levels are far from normal.
+    np.testing.assert_allclose(np.var(draws, axis=0)[:-3], expected[:-3], rtol=0.35)
+
+
+def test_arrays_and_channels_are_recordings_too():
+    rng = np.random.default_rng(8)
+    arrays = [TRUTH.simulate(4000, 0.5, rng) for _ in range(2)]
+    channels = [gmwm.Channel("gyro_x", x, 0.5, "gyro", "rad/s") for x in arrays]
+    by_array = gmwm.fit(TRUTH.opened(), arrays, dt=0.5)
+    assert by_array.params == gmwm.fit(TRUTH.opened(), channels).params
+    # A list of numbers is one series.
+    single = gmwm.fit(WhiteNoise(), [float(v) for v in arrays[0]], dt=0.5)
+    assert not hasattr(single, "parts")
+
+
+def test_a_joint_fit_turns_into_json():
+    joint = gmwm.fit(TRUTH.opened(), recordings([3000, 3000], 9))
+    content = json.loads(json.dumps(joint.to_dict()))
+    assert len(content["parts"]) == 2
+    assert content["spread"].keys() == set(joint.keys)
+
+
+def test_what_does_not_belong_together_is_refused():
+    one = gmwm.wavelet_variance(TRUTH.simulate(1000, 1.0, 1), dt=1.0)
+    other = gmwm.wavelet_variance(TRUTH.simulate(1000, 0.5, 1), dt=0.5)
+    with pytest.raises(gmwm.InputError, match="do not belong together: dt is"):
+        gmwm.fit(TRUTH.opened(), [one, other])
+    with pytest.raises(gmwm.InputError, match="one recording at a time"):
+        gmwm.fit(TRUTH.opened(), [one, one], method="allan")
+    with pytest.raises(gmwm.InputError, match="accident of one recording"):
+        gmwm.fit(WhiteNoise() + RateRamp(), [one, one])
+    with pytest.raises(gmwm.InputError, match="no recording"):
+        PooledVariance.of([])
