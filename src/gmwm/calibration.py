@@ -18,7 +18,7 @@ from gmwm.files import written
 from gmwm.process import Model, Process
 from gmwm.recording import Channel, Recording
 from gmwm.selection import select
-from gmwm.variance.wavelet import MIN_SAMPLES, wavelet_variance
+from gmwm.variance.analysis import MIN_SAMPLES, wavelet_variance
 
 SCHEMA = "gmwm.calibration"
 SCHEMA_VERSION = 1
@@ -178,6 +178,8 @@ def calibrate(
 ) -> Calibration:
     """Error model of every channel of a static recording.
 
+    A channel that is constant, or of which more than half of the samples are missing, is skipped.
+
     Parameters
     ----------
     recording : Recording
@@ -199,16 +201,18 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
-    if isinstance(model, Mapping):
-        for channel in recording:
-            if not channel.is_constant:
-                _model_of(channel, model)
-    dead = {c.name: f"constant at {c.values[0]:.6g} {c.unit}" for c in recording if c.is_constant}
+    dead = {c.name: why for c in recording if (why := _reason_to_skip(c))}
     alive = [c for c in recording if c.name not in dead]
+    if isinstance(model, Mapping):
+        for channel in alive:
+            _model_of(channel, model)
     if not alive:
+        which = "; ".join(f"{name}: {why}" for name, why in dead.items())
+        if all(channel.is_constant and channel.is_complete for channel in recording):
+            which = "every channel is constant"
         raise InputError(
-            f"{recording.source or 'the recording'}: every channel is constant, nothing to "
-            "calibrate: check the sensor and the columns"
+            f"{recording.source or 'the recording'}: {which}, nothing to calibrate: check the "
+            "sensor and the columns"
         )
     if recording.n < MIN_SAMPLES:
         raise InputError(f"{recording.n} samples are too few: record at least {MIN_SAMPLES}")
@@ -237,6 +241,16 @@ def calibrate(
         n=recording.n,
         notes=recording.notes,
     )
+
+
+def _reason_to_skip(channel: Channel) -> str:
+    """Why a channel is skipped; empty if it is not."""
+    missing = channel.missing
+    if missing == channel.n:
+        return "all samples missing"
+    if missing > channel.n / 2:
+        return f"{missing:,} of {channel.n:,} samples missing, more than half"
+    return f"constant at {channel.mean:.6g} {channel.unit}" if channel.is_constant else ""
 
 
 def _model_of(

@@ -67,6 +67,7 @@ def calibrate(
     """Calibrate every channel of a static recording.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
+    Empty fields, NaN and rows that the time column jumps over are missing samples.
     For each channel an error model is selected and estimated; the table shows it in the units of
     the field, the files hold everything in SI units.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +23,7 @@ class Channel:
     name : str
         E.g. ``"gyro_x"``.
     values : (n,) ndarray
-        Samples in the SI unit of the quantity, mean not removed.
+        Samples in the SI unit of the quantity, mean not removed; NaN where one is missing.
     dt : float
         Sampling interval, s.
     quantity : {"gyro", "accel", None}
@@ -41,19 +41,40 @@ class Channel:
 
     @property
     def n(self) -> int:
-        """Number of samples."""
+        """Number of samples, those that are missing included."""
         return int(self.values.size)
 
     @property
+    def missing(self) -> int:
+        """Number of samples that are missing."""
+        return int(np.count_nonzero(np.isnan(self.values)))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no sample is missing."""
+        return self.missing == 0
+
+    @property
+    def mean(self) -> float:
+        """Mean of the samples that are there; NaN if none is."""
+        present = self.n - self.missing
+        return float(np.nansum(self.values)) / present if present else np.nan
+
+    @property
     def is_constant(self) -> bool:
-        """Whether every sample has the same value: a dead channel."""
-        return bool(np.all(self.values == self.values[0]))
+        """Whether every sample that is there has the same value: a dead channel."""
+        values = np.asarray(self.values, dtype=float)
+        # fmin and fmax pass over NaN.
+        lowest = np.fmin.reduce(values, initial=np.inf)
+        return not lowest < np.fmax.reduce(values, initial=-np.inf)
 
     def __str__(self) -> str:
-        return (
-            f"{self.name}: {self.n:,} samples, {self.n * self.dt:.6g} s, "
-            f"mean {np.mean(self.values):.6g} {self.unit}"
-        )
+        missing = self.missing
+        size = f"{self.name}: {self.n:,} samples, {self.n * self.dt:.6g} s"
+        if missing == self.n:
+            return f"{size}, all missing"
+        gone = f", {missing:,} missing" if missing else ""
+        return f"{size}, mean {self.mean:.6g} {self.unit}{gone}"
 
 
 @dataclass(frozen=True)
@@ -87,19 +108,20 @@ class Recording:
         Parameters
         ----------
         arrays : mapping of str to (n,) array_like
-            Channel name -> samples.
+            Channel name -> samples, NaN where one is missing.
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
             Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
         source : str, optional
         notes : tuple of str, optional
+            What else is to be known; one sentence on missing samples is added.
 
         Raises
         ------
         InputError
             If the rate is not positive, a unit is missing or unknown, or the channels are not
-            series of numbers of one length.
+            series of numbers of one length, none infinite.
         """
         if not _SLOWEST <= rate <= _FASTEST:
             limits = f"{_SLOWEST:g} to {_FASTEST:g}"
@@ -117,7 +139,7 @@ class Recording:
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
             raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
-        return cls(tuple(channels), source, notes)
+        return cls(tuple(channels), source, (*notes, *_notes_of_gaps(channels)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -168,4 +190,35 @@ def _series(name: str, values: FloatArray) -> FloatArray:
         raise InputError(f"channel {name!r} holds something that is not a number") from None
     if series.ndim != 1:
         raise InputError(f"channel {name!r} has shape {series.shape}: give one series of samples")
+    infinite = np.flatnonzero(np.isinf(series))
+    if infinite.size:
+        raise InputError(
+            f"channel {name!r} is infinite at index {infinite[0]}: give a number, or NaN if the "
+            "sample is missing"
+        )
     return series
+
+
+def _notes_of_gaps(channels: Iterable[Channel]) -> list[str]:
+    """One sentence for all channels that miss equally many samples in equally many gaps."""
+    names: dict[str, list[str]] = {}
+    for channel in channels:
+        gone = np.isnan(channel.values)
+        if not np.any(gone):
+            continue
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+        lengths = edges[1::2] - edges[::2]
+        text = f"{channel.missing:,} of {channel.n:,} samples missing"
+        if channel.missing == channel.n:
+            text = f"all {channel.n:,} samples missing"
+        elif lengths.size == 1:
+            text += ", in one gap"
+        else:
+            longest = int(np.max(lengths))
+            plural = "s" if longest > 1 else ""
+            text += f", in {lengths.size:,} gaps, the longest {longest:,} sample{plural}"
+        names.setdefault(text, []).append(channel.name)
+    return [
+        f"{', '.join(alike)}: {'each ' if len(alike) > 1 else ''}{text}."
+        for text, alike in names.items()
+    ]

@@ -251,6 +251,31 @@ def test_the_shortest_recordings_are_calibrated(run, tmp_path):
         assert (tmp_path / f"out{seed}" / "report.html").exists()
 
 
+def test_gaps_are_told_and_do_no_harm(run, tmp_path):
+    rng = np.random.default_rng(7)
+    n = 3000
+    rows = [
+        f"{t:.2f},{x:.5f},{y:.5f},"
+        for t, x, y in zip(np.arange(n) / 100, *rng.normal(size=(2, n)), strict=True)
+    ]
+    rows[70] = "0.70,,NA,"
+    del rows[1201:1451]
+    (tmp_path / "f.csv").write_text("\n".join(["time_s,gyro_x,accel_x,accel_y", *rows, ""]))
+    code, printed, told = run("calibrate", "f.csv", *SI, "-o", "out")
+    assert code == 0, told
+    said = " ".join(printed.split())
+    assert "The clock jumps by 2.5 s, 12 s after the start: 250 samples missing." in said
+    assert "gyro_x, accel_x: each 251 of 3,000 samples missing, in 2 gaps, the longest 250" in said
+    assert "accel_y skipped: all samples missing" in said
+    assert "3,000 samples a channel" in said
+    calibration = gmwm.load(tmp_path / "out" / "calibration.json")
+    for fit in calibration.fits.values():
+        low, high = fit.interval(0.999)["N"]
+        assert low < 0.1 < high
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "The clock jumps by 2.5 s, 12 s after the start" in html
+
+
 # -- bad input ------------------------------------------------------------------------------------
 
 
@@ -288,8 +313,12 @@ BAD = {
         ALL,
         ("f.csv, line 50, column 'accel_x'", "'broken' is not a number", "mend the line"),
     ),
-    "NaN": (with_line(60, "nan,0.1"), ALL, ("f.csv, line 60, column 'gyro_x'", "'nan'", "cut")),
-    "empty field": (with_line(61, "0.1,"), ALL, ("f.csv, line 61, column 'accel_x'", "empty")),
+    "infinity": (with_line(60, "inf,0.1"), ALL, ("f.csv, line 60, column 'gyro_x'", "'inf'")),
+    "mostly missing": (
+        [*good_lines()[:90], *[","] * ROWS],
+        ALL,
+        ("gyro_x: 200 of 289 samples missing, more than half", "check the sensor"),
+    ),
     "ragged row": (with_line(70, "1,2,3"), ALL, ("f.csv, line 70", "3 fields where 2 were")),
     "too few samples": (good_lines()[:64], ALL, ("63 samples", "at least 64", "record longer")),
     "unknown unit": (
@@ -310,10 +339,15 @@ BAD = {
         ("--rate", "200", *SI),
         ("stamps give 100 Hz, not the 200 Hz stated", "leave out the rate"),
     ),
-    "gap in the time stamps": (
-        with_time(1.0),
+    "gap longer than the recording": (
+        with_time(3.0),
         SI,
-        ("f.csv, column 'time_s', line 122", "a step of 1.01 where 0.01 is usual"),
+        ("f.csv, column 'time_s', line 122", "300 samples are missing", "more than half"),
+    ),
+    "short step in the time stamps": (
+        with_time(-0.006),
+        SI,
+        ("f.csv, column 'time_s', line 122", "a step of 0.004 where 0.01 is usual"),
     ),
     "time that goes back": (with_time(-0.5), SI, ("column 'time_s', line 122", "goes back")),
     "all channels constant": (
@@ -375,7 +409,7 @@ def test_bad_input_is_one_sentence_and_exit_code_2(run, tmp_path, what):
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
-@pytest.mark.parametrize("what", ["NaN", "all channels constant"])
+@pytest.mark.parametrize("what", ["infinity", "all channels constant"])
 def test_bad_input_leaves_earlier_results_alone(run, tmp_path, what):
     (tmp_path / "f.csv").write_text("\n".join(BAD[what][0]))
     (tmp_path / "calibration.json").write_text("old")

@@ -122,14 +122,41 @@ def test_too_short_a_recording():
         gmwm.calibrate(rec)
 
 
-def test_a_sample_that_is_no_number_is_located_and_stops_no_other_channel(recording):
+def test_an_infinite_sample_stops_no_other_channel(recording):
     values = recording["accel_y"].values.copy()
-    values[17] = np.nan
+    values[17] = np.inf
     rec = Recording((recording["gyro_x"], channel("accel_y", values)))
     result = gmwm.calibrate(rec, WhiteNoise())
     assert list(result) == ["gyro_x"]
-    assert "'accel_y' has 1 NaN or infinite samples" in result.skipped["accel_y"]
+    assert "'accel_y' has 1 " in result.skipped["accel_y"]
     assert "index 17" in result.skipped["accel_y"]
+
+
+def test_missing_samples_are_passed_over(recording):
+    values = recording["accel_y"].values.copy()
+    values[2000:3000] = values[17] = np.nan
+    result = gmwm.calibrate(Recording((channel("accel_y", values),)), WhiteNoise())
+    low, high = result["accel_y"].interval(0.999)["N"]
+    assert low < gmwm.process.as_model(ACCEL).params["N"] < high
+
+
+def test_channels_of_which_too_much_is_missing_are_skipped(recording):
+    n = recording.n
+    values = recording["accel_y"].values.copy()
+    values[: n // 2] = np.nan
+    half = channel("accel_y", values)
+    less = channel("accel_z", np.where(np.arange(n) == n - 1, np.nan, values))
+    none = channel("gyro_y", np.full(n, np.nan))
+    dead = channel("gyro_z", np.where(np.arange(n) < 10, np.nan, 2.5))
+    result = gmwm.calibrate(Recording((half, less, none, dead)), {"accel_y": WhiteNoise()})
+    assert list(result) == ["accel_y"]
+    assert result.skipped == {
+        "accel_z": f"{n // 2 + 1:,} of {n:,} samples missing, more than half",
+        "gyro_y": "all samples missing",
+        "gyro_z": "constant at 2.5 rad/s",
+    }
+    with pytest.raises(InputError, match=r"gyro_y: all samples missing; gyro_z: constant.*check"):
+        gmwm.calibrate(Recording((none, dead)))
 
 
 STEPS = np.arange(10_000)

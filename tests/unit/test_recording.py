@@ -97,3 +97,66 @@ def test_no_channel_at_all_is_refused():
 def test_what_is_no_series_is_refused_by_name(values):
     with pytest.raises(InputError, match="gyro_x"):
         Recording.from_arrays({"gyro_x": values}, 1.0, {"gyro_x": "deg/s"})
+
+
+# -- missing samples ------------------------------------------------------------------------------
+
+
+def gapped(*missing, n=100, value=None):
+    values = np.random.default_rng(4).normal(size=n) if value is None else np.full(n, value)
+    values[list(missing)] = np.nan
+    return Channel("gyro_x", values, 0.01, "gyro", "rad/s")
+
+
+def test_missing_samples_are_counted():
+    assert (gapped().missing, gapped().is_complete) == (0, True)
+    assert (gapped(0, 7, 99).missing, gapped(0, 7, 99).is_complete) == (3, False)
+    assert gapped(0, 7, 99).n == 100
+    assert Channel("empty", np.empty(0), 1.0).is_complete
+
+
+@pytest.mark.parametrize("missing", [(), (0,), (99,), (0, 50, 99), range(99)])
+def test_constant_but_for_what_is_missing(missing):
+    assert gapped(*missing, value=2.5).is_constant
+    assert gapped(*missing).is_constant == (len(missing) == 99)
+
+
+def test_the_mean_is_that_of_what_is_there():
+    channel = gapped(*range(0, 100, 3))
+    present = channel.values[np.arange(100) % 3 > 0]
+    assert channel.mean == pytest.approx(np.mean(present), rel=1e-14)
+    assert str(channel) == (
+        f"gyro_x: 100 samples, 1 s, mean {np.mean(present):.6g} rad/s, 34 missing"
+    )
+
+
+def test_nothing_is_there():
+    channel = gapped(*range(100))
+    assert channel.is_constant
+    assert np.isnan(channel.mean)
+    assert str(channel) == "gyro_x: 100 samples, 1 s, all missing"
+
+
+def test_integers_and_nothing_at_all_have_the_same_properties():
+    assert Channel("", np.array([3, 3, 3]), 1.0).is_constant
+    assert not Channel("", np.array([3, 3, 4]), 1.0).is_constant
+    assert Channel("", np.array([3, 3, 4]), 1.0).is_complete
+    assert Channel("", np.empty(0), 1.0).is_constant
+
+
+def test_channels_with_the_same_gaps_share_a_note():
+    arrays = {name: gapped(3, 4, 5, 60).values for name in ("gyro_x", "gyro_y")}
+    arrays |= {"gyro_z": gapped(8, 9, n=100).values, "accel_x": np.ones(100)}
+    units = {"gyro": "deg/s", "accel": "g"}
+    assert Recording.from_arrays(arrays, 100.0, units, notes=("Before.",)).notes == (
+        "Before.",
+        "gyro_x, gyro_y: each 4 of 100 samples missing, in 2 gaps, the longest 3 samples.",
+        "gyro_z: 2 of 100 samples missing, in one gap.",
+    )
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf])
+def test_infinite_samples_are_refused(value):
+    values = np.array([1.0, np.nan, value, 2.0])
+    with pytest.raises(InputError, match="'gyro_x' is infinite at index 2: give a number, or NaN"):
+        Recording.from_arrays({"gyro_x": values}, 1.0, {"gyro_x": "deg/s"})

@@ -87,11 +87,12 @@ class ArrayTable:
         Returns
         -------
         dict of int to (n,) ndarray
+            NaN where a sample is missing.
 
         Raises
         ------
         InputError
-            If a column is not made of real numbers, all finite, or if lengths differ.
+            If a column is not made of real numbers, one is infinite, or lengths differ.
         """
         found = {column: self._column(column) for column in columns}
         longest = max(columns, key=lambda column: found[column].size)
@@ -118,11 +119,12 @@ class ArrayTable:
         with np.errstate(all="ignore"):  # what leaves the range of float64 is refused below
             values = np.array(array, dtype=np.float64)
         if not usable(values):
-            rows = np.flatnonzero(~(np.abs(values) < LARGEST))
+            rows = np.flatnonzero(np.abs(values) >= LARGEST)
             others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
             raise InputError(
                 f"{place}, {self.where(int(rows[0]))}: {array[rows[0]]} is not a usable "
-                f"number{others}: cut the array before that row, or interpolate"
+                f"number{others}: cut the array before that row, or save NaN if the sample is "
+                "missing"
             )
         return values
 

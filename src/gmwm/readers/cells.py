@@ -22,7 +22,8 @@ _NUMBERS = {
     for mark, point in ((".", r"\."), (",", ","))
 }
 
-_MISSING = frozenset({"", "nan", "inf", "infinity", "na", "n/a", "#n/a", "null", "none"})
+_MISSING = re.compile(r"[+-]?nan|n/?a|#n/a|null|none|", re.IGNORECASE)
+_INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -64,14 +65,12 @@ def number(cell: str, decimal: str) -> float | None:
     Returns
     -------
     float or None
-        NaN where the field says that there is no number, ``None`` where it is text.
+        NaN where the field is empty or one of the usual words for a missing sample, infinity where
+        the number is infinite or too large for use, ``None`` where the field is text.
     """
     if _NUMBERS[decimal].fullmatch(cell):
         value = float(cell.replace(",", "."))
-        return value if abs(value) < LARGEST else math.nan
-    return math.nan if is_missing(cell) else None
-
-
-def is_missing(cell: str) -> bool:
-    """Whether a field is empty or one of the usual words for no number."""
-    return cell.lstrip("+-").lower() in _MISSING
+        return value if abs(value) < LARGEST else math.inf
+    if _MISSING.fullmatch(cell):
+        return math.nan
+    return math.inf if _INFINITE.fullmatch(cell) else None

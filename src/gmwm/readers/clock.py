@@ -1,4 +1,4 @@
-"""A column of time stamps: is it a uniform clock, and how fast."""
+"""A column of time stamps: is it a uniform clock, how fast, and which rows are missing."""
 
 from __future__ import annotations
 
@@ -10,16 +10,37 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers.jumps import Jumps, find_jumps
 
 _UNITS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _AGREEMENT = 0.01
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
+_SHORTEST_USUAL = 0.499  # of the median; rounded stamps come to one half, give or take a hair
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
 
 def agree(rate: float, other: float) -> bool:
     """Whether two rates are the same within 1 %."""
     return abs(rate / other - 1.0) <= _AGREEMENT
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What time stamps say.
+
+    Attributes
+    ----------
+    rate : float
+        In Hz; not rounded to what was expected.
+    jumps : Jumps
+        Where rows are missing.
+    notes : tuple of str
+        On the clock: its rate, its unit, its jitter, its jumps; one sentence each.
+    """
+
+    rate: float
+    jumps: Jumps
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -49,8 +70,8 @@ class Clock:
         """File and column, at the beginning of messages."""
         return f"{self.source}, column {self.column}"
 
-    def rate(self, expected: float | None = None) -> tuple[float, str]:
-        """Sampling rate from the first and the last stamp.
+    def timing(self, expected: float | None = None) -> Timing:
+        """Sampling rate over the whole recording, and the jumps.
 
         Without a unit, the step decides: below 0.5 it is seconds, 2 to 500 milliseconds, 500 to
         5e5 microseconds, above nanoseconds; 0.5 to 2 may be 1 Hz in seconds or 1 kHz in
@@ -63,24 +84,25 @@ class Clock:
 
         Returns
         -------
-        rate : float
-            In Hz; not rounded to what was expected.
-        note : str
-            One sentence on the clock: its rate, its unit, its jitter.
+        Timing
 
         Raises
         ------
         InputError
-            If the stamps are not increasing or not uniform, or contradict what is expected.
+            If a stamp is missing, if they are not increasing or not uniform, if more than half of
+            the rows are missing, or if the stamps contradict what is expected.
         """
+        self._check_complete()
         with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
             steps = np.diff(self.stamps)
             self._check_increasing(steps)
-            self._check_uniform(steps)
-            step = float(self.stamps[-1] - self.stamps[0]) / steps.size
-            jitter = float(np.std(steps))
+            self._check_not_short(steps)
+            jumps = find_jumps(self.stamps)
+            jitter = float(np.std(np.delete(steps, jumps.rows - 1)))
+        step = jumps.interval
         if not _SHORTEST_STEP < step < 1.0 / _SHORTEST_STEP:
             raise InputError(f"{self.place}: steps of {step:g} are no clock's: {_WAY_OUT}")
+        self._check_jumps(jumps)
         seconds, guessed = self._unit(step, expected)
         rate = 1.0 / (step * seconds)
         if expected is not None and not agree(rate, expected):
@@ -88,11 +110,21 @@ class Clock:
                 f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated: "
                 "leave out the rate to take that of the stamps, or give time=False to ignore them"
             )
-        return rate, (
+        note = (
             f"Time stamps (column {self.column}, {_UNITS[seconds]}"
             f"{' as far as the steps tell' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)."
         )
+        return Timing(rate, jumps, (note, *self._notes_of_jumps(jumps, seconds)))
+
+    def _check_complete(self) -> None:
+        bad = np.flatnonzero(np.isnan(self.stamps))
+        if bad.size:
+            others = f", and {bad.size - 1:,} more such" if bad.size > 1 else ""
+            raise InputError(
+                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: take such lines "
+                f"out, or, {_WAY_OUT}"
+            )
 
     def _check_increasing(self, steps: FloatArray) -> None:
         bad = np.flatnonzero(~(steps > 0.0))
@@ -104,15 +136,56 @@ class Clock:
                 f"take such lines out, or, {_WAY_OUT}"
             )
 
-    def _check_uniform(self, steps: FloatArray) -> None:
+    def _check_not_short(self, steps: FloatArray) -> None:
         median = float(np.median(steps))
-        bad = np.flatnonzero(~(np.abs(steps - median) <= 0.5 * median))
+        bad = np.flatnonzero(~(steps >= _SHORTEST_USUAL * median))
         if bad.size:
             row = int(bad[0]) + 1
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of {steps[row - 1]:.6g} where "
-                f"{median:.6g} is usual: use a part of the file without gaps, or, {_WAY_OUT}"
+                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}"
             )
+
+    def _check_jumps(self, jumps: Jumps) -> None:
+        if jumps.are_rounding:
+            row = int(jumps.rows[0])
+            raise InputError(
+                f"{self.place}, {self.where(row)}: a step of two intervals, and "
+                f"{jumps.rows.size - 1:,} more such at even distances, as if the stamps were "
+                f"rounded too coarsely: {_WAY_OUT}"
+            )
+        n = self.stamps.size
+        if jumps.total > n:
+            row = int(jumps.rows[jumps.longest])
+            raise InputError(
+                f"{self.place}, {self.where(row)}: the clock jumps by "
+                f"{jumps.missing[jumps.longest]:,.6g} sampling intervals, and in all "
+                f"{jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
+                f"the recording: use the part before or after, or, {_WAY_OUT}"
+            )
+
+    def _notes_of_jumps(self, jumps: Jumps, seconds: float) -> list[str]:
+        """When the clock jumps, how far, and how many samples that costs."""
+        if not jumps.rows.size:
+            return []
+        count, i = jumps.rows.size, jumps.longest
+        interval = jumps.interval * seconds
+        digits = 1 - math.floor(math.log10(interval))
+        length = round(float(jumps.steps[i] - 1.0) * interval, digits)
+        when = round(float(self.stamps[jumps.rows[i] - 1] - self.stamps[0]) * seconds, digits)
+        total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
+        place = f"by {length:.12g} s, {when:.12g} s after the start"
+        if count == 1:
+            notes, which = [f"The clock jumps {place}: {total}."], "The jump is"
+        else:
+            notes = [f"The clock jumps {count:,} times, farthest {place}: in all {total}."]
+            which = f"{jumps.off_grid:,} of these jumps {'are' if jumps.off_grid > 1 else 'is'}"
+        if jumps.off_grid:
+            notes.append(
+                f"{which} not near a whole number of sampling intervals: the samples after it "
+                "were placed at the nearest."
+            )
+        return notes
 
     def _unit(self, step: float, expected: float | None) -> tuple[float, bool]:
         """The unit in seconds, and whether it is a guess."""

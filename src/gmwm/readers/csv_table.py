@@ -1,8 +1,9 @@
 """Delimited text (CSV and its relatives), plain or gzip.
 
-Arrow parses block after block. A block that it cannot, or that holds a value which is not finite,
-is read again by plain Python, field by field: that either finds the line and column to complain
-about, or reads what Arrow is too strict for (``+1.5``, quotes). Both give the same numbers.
+Arrow parses block after block. A block that it cannot, or that holds an infinite value, is read
+again by plain Python, field by field: that either finds the line and column to complain about, or
+reads what Arrow is too strict for (``+1.5``, quotes). Both give the same numbers, NaN where a
+field says that there is none.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from gmwm.readers.table import label, usable
 from gmwm.readers.text_file import blocks
 
 _HEAD = 1 << 18
+
+# What `number` takes for missing, as it is commonly written; Arrow knows NaN by itself.
+_NULLS = ["", "NA", "na", "N/A", "n/a", "#N/A", "null", "NULL", "Null", "None", "none"]
 
 
 @dataclass(frozen=True)
@@ -80,22 +84,23 @@ class CsvTable:
         Returns
         -------
         dict of int to (n,) ndarray
+            NaN where a field is empty or says that the sample is missing.
 
         Raises
         ------
         InputError
             At the first line with a wrong number of fields or with text for a number; if there
-            is none, for the first number that is missing or not finite.
+            is none, for the first number that is infinite.
         """
-        gaps = _Gaps()
+        infinite = _Infinite()
         parts: list[list[FloatArray]] = [[] for _ in columns]
         for line, block in blocks(self.path, self.layout.offset, self.layout.line):
             found = _parse_with_arrow(block, self.layout, columns)
             if found is None:
-                found = _parse_by_field(line, block, self, columns, gaps)
+                found = _parse_by_field(line, block, self, columns, infinite)
             for part, values in zip(parts, found, strict=True):
                 part.append(values)
-        gaps.complain(self.source)
+        infinite.complain(self.source)
         # One column at a time lets the blocks go before the next one is joined.
         return {column: np.concatenate(parts.pop(0)) for column in columns}
 
@@ -111,8 +116,8 @@ class CsvTable:
 
 
 @dataclass
-class _Gaps:
-    """Fields without a finite number: the first, and how many."""
+class _Infinite:
+    """Fields with an infinite number, or one too large for use: the first, and how many."""
 
     first: str = ""
     count: int = 0
@@ -120,15 +125,15 @@ class _Gaps:
     def add(self, place: str, cell: str) -> None:
         """Take note of one."""
         self.count += 1
-        self.first = self.first or f"{place}: {_excerpt(cell) if cell else 'an empty field'}"
+        self.first = self.first or f"{place}: {_excerpt(cell)}"
 
     def complain(self, source: str) -> None:
         """Refuse the file if there are any."""
         if self.count:
             others = f", and {self.count - 1:,} more such" if self.count > 1 else ""
             raise InputError(
-                f"{source}, {self.first} is not a usable number{others}: cut the file "
-                "before that line, or interpolate"
+                f"{source}, {self.first} is not a usable number{others}: cut the file before "
+                "that line, or empty the field if the sample is missing"
             )
 
 
@@ -139,7 +144,7 @@ def _parse_with_arrow(
     import pyarrow
     from pyarrow import csv
 
-    if b'"' in block:
+    if b'"' in block or b"(" in block:  # the latter for nan(1), which Arrow takes for NaN
         return None
     if layout.delimiter == BLANKS:
         block = _single_blanks(block)
@@ -158,7 +163,7 @@ def _parse_with_arrow(
             convert_options=csv.ConvertOptions(
                 include_columns=wanted,
                 column_types=dict.fromkeys(wanted, pyarrow.float64()),
-                null_values=[],
+                null_values=_NULLS,
                 decimal_point=layout.decimal,
             ),
         )
@@ -179,7 +184,7 @@ def _single_blanks(block: bytes) -> bytes:
 
 
 def _parse_by_field(
-    first_line: int, block: bytes, table: CsvTable, columns: Sequence[int], gaps: _Gaps
+    first_line: int, block: bytes, table: CsvTable, columns: Sequence[int], infinite: _Infinite
 ) -> list[FloatArray]:
     """Read a block the careful way."""
     layout = table.layout
@@ -198,8 +203,8 @@ def _parse_by_field(
                     f"{_excerpt(cells[column])} is not a number: mend the line, or choose other "
                     "columns with channels= and time="
                 )
-            if math.isnan(value):
-                gaps.add(f"{place}, column {label(table.names, column)}", cells[column])
+            if math.isinf(value):
+                infinite.add(f"{place}, column {label(table.names, column)}", cells[column])
             values.append(value)
     return [np.array(values) for values in found]
 

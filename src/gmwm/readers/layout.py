@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import mode
 
 from gmwm.errors import InputError
-from gmwm.readers.cells import BLANKS, is_missing, number, split_header, split_line
+from gmwm.readers.cells import BLANKS, number, split_header, split_line
 from gmwm.readers.names import meaning
 from gmwm.readers.table import FORMATS
 
@@ -205,13 +205,13 @@ def _loose_split(text: str, delimiter: str) -> list[str]:
 
 def _is_number(cell: str, decimal: str) -> bool:
     value = number(cell, decimal)
-    return value is not None and not math.isnan(value)
+    return value is not None and math.isfinite(value)
 
 
 def _are_names(cells: Sequence[str], decimal: str) -> bool:
     """Names have no number among them, and say something else than that there is none."""
-    return not any(_is_number(cell, decimal) for cell in cells) and not all(
-        is_missing(cell) for cell in cells
+    return not any(_is_number(cell, decimal) for cell in cells) and any(
+        number(cell, decimal) is None for cell in cells
     )
 
 

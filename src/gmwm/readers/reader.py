@@ -9,14 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, agree
 from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.jumps import Jumps
 from gmwm.readers.names import meaning
-from gmwm.readers.roles import Columns, Reference, assign_roles
+from gmwm.readers.roles import Columns, Reference, Roles, assign_roles
 from gmwm.readers.table import FEWEST, Table, label
 from gmwm.recording import Recording
 
@@ -54,7 +57,9 @@ def read(
     Returns
     -------
     Recording
-        In rad/s and m/s^2. Its ``notes`` tell what was assumed and which columns were not used.
+        In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
+        the time stamps jump forward, as many as fit on the grid of the sampling interval. Its
+        ``notes`` tell what was assumed, which columns were not used and what is missing.
 
     Raises
     ------
@@ -75,12 +80,11 @@ def read(
     unit_of, unit_notes = channel_units(table, roles, units)
 
     arrays = table.load(roles.columns)
-    n = arrays[roles.columns[0]].size
-    if n < FEWEST:
-        raise InputError(
-            f"{table.source} has {n} samples where at least {FEWEST} are needed: record longer"
-        )
-    used_rate, clock_notes = _sampling_rate(table, roles.time, arrays, stated)
+    _check_size(table, roles, arrays)
+    used_rate, jumps, clock_notes = _timing(table, roles.time, arrays, stated)
+    if jumps is not None:
+        # One column at a time: its short form goes before the next one is made longer.
+        arrays = {column: jumps.spread(arrays.pop(column)) for column in list(arrays)}
     return Recording.from_arrays(
         {name: arrays[index] for name, index in roles.channels.items()},
         rate=used_rate,
@@ -126,12 +130,23 @@ def _required_rate(table: Table, stated: float | None) -> float:
     return stated
 
 
-def _sampling_rate(
+def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
+    n = arrays[roles.columns[0]].size
+    most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
+    if most < FEWEST:
+        of_any = "" if most == n else " of any channel"
+        raise InputError(
+            f"{table.source} has {most} samples{of_any} where at least {FEWEST} are needed: "
+            "record longer"
+        )
+
+
+def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
-) -> tuple[float, tuple[str, ...]]:
+) -> tuple[float, Jumps | None, tuple[str, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
-        return _required_rate(table, stated), ()
+        return _required_rate(table, stated), None, ()
     clock = Clock(
         source=table.source,
         column=label(table.names, time),
@@ -139,7 +154,8 @@ def _sampling_rate(
         seconds=meaning(table.names[time]).seconds,
         where=table.where,
     )
-    measured, note = clock.rate(stated)
+    timing = clock.timing(stated)
     if stated is None:
-        return measured, (note,)
-    return stated, (note, f"The rate stated, {stated:g} Hz, is used.")
+        return timing.rate, timing.jumps, timing.notes
+    used = f"The rate stated, {stated:g} Hz, is used."
+    return stated, timing.jumps, (*timing.notes, used)

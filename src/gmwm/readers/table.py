@@ -48,7 +48,7 @@ class Table(Protocol):
     def notes(self) -> tuple[str, ...]: ...
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns, every value finite."""
+        """Read some columns: finite values, NaN where a sample is missing."""
 
     def where(self, row: int) -> str:
         """Say where a row of data is, e.g. ``"line 12"``."""
@@ -62,5 +62,5 @@ def label(names: Sequence[str], index: int) -> str:
 
 
 def usable(values: FloatArray) -> bool:
-    """Whether every value is finite and of sane magnitude."""
-    return bool(np.all(np.abs(values) < LARGEST))
+    """Whether every value is missing (NaN) or finite and of sane magnitude."""
+    return not np.any(np.abs(values) >= LARGEST)

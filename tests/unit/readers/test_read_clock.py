@@ -88,14 +88,11 @@ def test_rounded_stamps_are_fine(timed):
     assert read(timed(stamps), units=UNITS).rate == pytest.approx(400, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("shift", "what"), [(0.0051, "0.0151"), (1.0, "1.01"), (-0.0051, "0.0049")]
-)
-def test_gap(timed, shift, what):
+def test_a_short_step(timed):
     stamps = 0.01 * np.arange(80)
-    stamps[50:] += shift
+    stamps[50:] -= 0.0051
     message = problem(timed(stamps))
-    assert f"line 52: a step of {what} where 0.01 is usual" in message
+    assert "line 52: a step of 0.0049 where 0.01 is usual" in message
     assert "give rate= and time=False" in message
 
 
