@@ -5,7 +5,7 @@ Every function draws into given axes or new ones and returns them; none knows wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +22,10 @@ COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56
 DATA_COLOUR = "#444444"
 SUM_COLOUR = "#000000"
 
-_SPREAD_SHOWN = 8.0  # boxes up to this many times the narrowest are kept in view
+_SPREAD_SHOWN = 8.0  # boxes up to this many times as wide as usual are kept in view
+_MARKERS = ("o", "^", "D", "s")
+_BESIDE = 1.07  # ratio of the averaging times at which bars of different kinds are drawn
+_MARGIN = 2.5  # above and below the deviations of several kinds
 _DECADES_SHOWN_BELOW = 0.7  # of a component, below the lowest data point
 
 
@@ -70,6 +73,67 @@ def deviation(
     ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
     ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
     ax.set_axisbelow(True)
+    return ax
+
+
+def deviations(
+    kinds: Mapping[str, tuple[FloatArray, FloatArray, FloatArray, FloatArray]],
+    *,
+    unit: str,
+    places: Sequence[int] | None = None,
+    interval: str = "95 %",
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """Several deviations with error bars against averaging time, log-log; returns the axes.
+
+    Parameters
+    ----------
+    kinds : mapping of str to (tau, value, lower, upper)
+        Label -> averaging times (s), deviations and the ends of their intervals, (J,) each.
+    unit : str
+    places : sequence of int, optional
+        Place of each in the palette, so that a kind keeps its colour; in turn by default.
+    interval : str, optional
+        What the bars are, for the legend.
+    title : str, optional
+    ax : matplotlib.axes.Axes, optional
+        That of `deviation` will do.
+    """
+    import matplotlib.pyplot as plt
+
+    if ax is None:
+        _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+    shown = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
+    places = range(len(kinds)) if places is None else places
+    palette = _cycle(max(places) + 1)
+    for i, (place, label) in enumerate(zip(places, kinds, strict=True)):
+        tau, value, lower, upper = kinds[label]
+        colour, marker = palette[place], _MARKERS[place % len(_MARKERS)]
+        # Kinds may coincide: open markers and lines, the later the smaller, leave all in view, and
+        # bars stand side by side.
+        behind = len(kinds) - 1 - i
+        ax.plot(
+            tau, value, color=colour, linewidth=1.2 + 0.6 * behind, marker=marker,
+            markersize=4.0 + 1.8 * behind, markerfacecolor="none", markeredgewidth=1.2,
+            label=label, zorder=3 + 0.1 * i,
+        )  # fmt: skip
+        beside = tau * _BESIDE ** (i - 0.5 * (len(kinds) - 1))
+        ax.vlines(beside, lower, upper, color=colour, linewidth=1.0, zorder=2)
+        shown.append(value)
+    every = np.concatenate(shown)
+    every = every[every > 0.0]
+    ax.set_ylim(np.min(every) / _MARGIN, np.max(every) * _MARGIN)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel("averaging time [s]")
+    ax.set_ylabel(f"deviation [{unit}]")
+    if title:
+        ax.set_title(title)
+    ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
+    ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
+    ax.set_axisbelow(True)
+    ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
     return ax
 
 
@@ -210,8 +274,8 @@ def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
     )
     ax.axhline(truth, color=COMPONENT_COLOURS[1], linewidth=1.2, linestyle="--", zorder=0)
     spans = [np.quantile(v, [0.001, 0.25, 0.75, 0.999]) for v in values if v.size]
-    narrow = min(span[2] - span[1] for span in spans)
-    shown = [s for s in spans if s[2] - s[1] <= _SPREAD_SHOWN * narrow]
+    usual = float(np.median([span[2] - span[1] for span in spans]))
+    shown = [s for s in spans if s[2] - s[1] <= _SPREAD_SHOWN * usual]
     low, high = min(s[0] for s in shown), max(s[3] for s in shown)
     low, high = min(low, truth), max(high, truth)
     margin = 0.08 * (high - low)

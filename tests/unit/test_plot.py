@@ -128,3 +128,12 @@ def test_data_stay_in_view_where_the_model_misses_them():
     bottom, top = fitted.plot().get_ylim()
     assert bottom < deviation.min()
     assert deviation.max() < top
+
+
+def test_a_box_much_narrower_than_the_others_does_not_cut_them_off():
+    rng = np.random.default_rng(1)
+    wide = {name: rng.normal(10.0, 1.0, 200) for name in ("a", "b", "c")}
+    figure = plot.boxes({"x": {**wide, "narrow": rng.normal(1.0, 0.01, 200)}}, {"x": 10.0})
+    low, high = figure.axes[0].get_ylim()
+    assert low < 1.0 < 12.0 < high
+    plt.close(figure)

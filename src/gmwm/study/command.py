@@ -77,7 +77,7 @@ def reproduce(
     except KeyboardInterrupt:
         click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
         raise
-    written = [_raw(scenario, table, folder)]
+    written = [_raw(experiment, table, folder)]
     if experiment in FIGURES:
         from gmwm.study.figures import boxplots
 
@@ -87,12 +87,12 @@ def reproduce(
     click.echo("\n".join(f"wrote {path}" for path in written))
 
 
-def _raw(scenario: Scenario, table: pa.Table, folder: Path) -> Path:
+def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:
     import pyarrow.parquet as pq
 
     from gmwm.files import moved_into_place
 
-    target = folder / f"{scenario.name}.parquet"
+    target = folder / f"{experiment}.parquet"
     with moved_into_place(target) as temporary:
         pq.write_table(table, temporary)
     return target

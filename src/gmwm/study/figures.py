@@ -35,7 +35,7 @@ def boxplots(scenario: Scenario, table: pa.Table, stem: Path) -> list[Path]:
         for quantity in scenario.quantities
     }
     truths = {quantity.name: scenario.true_value(quantity) for quantity in scenario.quantities}
-    figure = plot.boxes(panels, truths, title=scenario.title)
+    figure = plot.boxes(panels, truths, title=f"{scenario.title} (dashed: truth)")
     written = []
     for suffix in (".png", ".svg"):
         target = stem.with_suffix(suffix)
