@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         RandomWalk,
         RateRamp,
         Resonance,
+        SimulatedProcess,
         Sinusoid,
         StateSpace,
         WhiteNoise,
@@ -41,8 +42,10 @@ if TYPE_CHECKING:
     from gmwm.readers import read
     from gmwm.recording import Channel, Recording
     from gmwm.selection import Selection, select
+    from gmwm.variance.allan_family import Deviations, deviations
+    from gmwm.variance.analysis import wavelet_variance
     from gmwm.variance.covariance import haar_covariance
-    from gmwm.variance.wavelet import WaveletVariance, wavelet_variance
+    from gmwm.variance.wavelet import WaveletVariance
 
 __version__ = "0.1.0"
 
@@ -67,6 +70,7 @@ _HOME = {
             "RandomWalk",
             "RateRamp",
             "Resonance",
+            "SimulatedProcess",
             "Sinusoid",
             "StateSpace",
             "WhiteNoise",
@@ -78,7 +82,9 @@ _HOME = {
     **dict.fromkeys(("Channel", "Recording"), "recording"),
     **dict.fromkeys(("Selection", "select"), "selection"),
     "haar_covariance": "variance.covariance",
-    **dict.fromkeys(("WaveletVariance", "wavelet_variance"), "variance.wavelet"),
+    "WaveletVariance": "variance.wavelet",
+    "wavelet_variance": "variance.analysis",
+    **dict.fromkeys(("Deviations", "deviations"), "variance.allan_family"),
 }
 
 __all__ = [
@@ -90,6 +96,7 @@ __all__ = [
     "Calibration",
     "Channel",
     "CramerRao",
+    "Deviations",
     "Fit",
     "GaussMarkov",
     "InputError",
@@ -102,12 +109,14 @@ __all__ = [
     "Recording",
     "Resonance",
     "Selection",
+    "SimulatedProcess",
     "Sinusoid",
     "StateSpace",
     "WaveletVariance",
     "WhiteNoise",
     "calibrate",
     "cramer_rao",
+    "deviations",
     "fit",
     "haar_covariance",
     "load",

@@ -1,0 +1,292 @@
+"""Deviations of the Allan family: against their definitions, and their intervals in simulation."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import gmwm
+from gmwm import BiasInstability, Channel, InputError, RandomWalk, RateRamp, WhiteNoise
+
+KINDS = ("overlapping", "modified", "hadamard", "total")
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
+
+
+def noise(n, seed=0):
+    return 5.0 + np.random.default_rng(seed).normal(size=n)
+
+
+# -- definitions ----------------------------------------------------------------------------------
+
+
+def means(x, first, m):
+    return np.mean(x[first : first + m])
+
+
+def overlapping(x, m):
+    """Half the mean square of the difference of adjacent means."""
+    starts = range(x.size - 2 * m + 1)
+    return np.sqrt(np.mean([(means(x, i + m, m) - means(x, i, m)) ** 2 for i in starts]) / 2)
+
+
+def hadamard(x, m):
+    """A sixth of the mean square of the second difference of adjacent means."""
+    squares = [
+        (means(x, i + 2 * m, m) - 2 * means(x, i + m, m) + means(x, i, m)) ** 2
+        for i in range(x.size - 3 * m + 1)
+    ]
+    return np.sqrt(np.mean(squares) / 6)
+
+
+def modified(x, m):
+    """As `overlapping`, of differences averaged over m adjacent places."""
+    differences = [means(x, i + m, m) - means(x, i, m) for i in range(x.size - 2 * m + 1)]
+    averaged = [np.mean(differences[i : i + m]) for i in range(len(differences) - m + 1)]
+    return np.sqrt(np.mean(np.square(averaged)) / 2)
+
+
+def total(x, m):
+    """As `overlapping`, of the series continued by its own reflection at both ends."""
+    y = np.concatenate([x[::-1], x, x[::-1]])
+    n = x.size
+    # Pairs of means about each inner point of the integrated series.
+    squares = [(means(y, n + i, m) - means(y, n + i - m, m)) ** 2 for i in range(1, n)]
+    return np.sqrt(np.mean(squares) / 2)
+
+
+@pytest.mark.parametrize("kind", [overlapping, hadamard, modified, total])
+@pytest.mark.parametrize("n", [8, 9, 33, 64, 101])
+def test_definition(kind, n):
+    x = noise(n, n)
+    name = kind.__name__
+    found = gmwm.deviations(x, 0.5, [name], tau=0.5 * np.arange(1, n))
+    m = np.rint(found.tau[name] / 0.5).astype(int)
+    reach = 3 if name in ("hadamard", "modified") else 2
+    assert m.tolist() == list(range(1, (n - 1) // reach + 1))
+    np.testing.assert_allclose(found.deviation[name], [kind(x, k) for k in m], rtol=1e-10)
+
+
+@pytest.mark.parametrize("n", [100, 1000, 4097])
+def test_overlapping_is_twice_the_wavelet_variance(n):
+    x = Channel("gyro_x", noise(n), 0.01, "gyro", "rad/s")
+    found = gmwm.deviations(x, kinds=["overlapping"])
+    wv = gmwm.wavelet_variance(x)
+    size = found.tau["overlapping"].size
+    np.testing.assert_allclose(found.tau["overlapping"], wv.tau[:size], rtol=1e-12)
+    expected = np.sqrt(2.0 * wv.variance[:size])
+    np.testing.assert_allclose(found.deviation["overlapping"], expected, rtol=1e-9)
+
+
+def test_hadamard_does_not_see_a_drift():
+    x = noise(500)
+    drift = 0.3 * np.arange(500)
+    plain = gmwm.deviations(x, 1.0, ["hadamard"]).deviation["hadamard"]
+    drifting = gmwm.deviations(x + drift, 1.0, ["hadamard"]).deviation["hadamard"]
+    np.testing.assert_allclose(drifting, plain, rtol=1e-7)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("dt", [1e-4, 1 / 3, 100.0])
+def test_units_of_value_and_time(scale, dt):
+    plain, other = gmwm.deviations(noise(200), 1.0), gmwm.deviations(scale * noise(200), dt)
+    for kind in KINDS:
+        np.testing.assert_allclose(other.tau[kind], dt * plain.tau[kind], rtol=1e-12)
+        for part in ("deviation", "lower", "upper"):
+            found, expected = getattr(other, part)[kind], scale * getattr(plain, part)[kind]
+            np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
+# -- averaging times ------------------------------------------------------------------------------
+
+
+def test_octave_and_decade():
+    found = gmwm.deviations(noise(1000), 0.1, ["overlapping"], "octave")
+    np.testing.assert_allclose(found.tau["overlapping"], 0.1 * 2.0 ** np.arange(9))
+    found = gmwm.deviations(noise(1000), 0.1, ["overlapping"], "decade")
+    expected = 0.1 * np.array([1, 2, 4, 10, 20, 40, 100, 200, 400])
+    np.testing.assert_allclose(found.tau["overlapping"], expected)
+
+
+def test_times_are_rounded_sorted_and_cut_for_each_kind():
+    found = gmwm.deviations(noise(100), 0.1, KINDS, [4.0, 0.04, 0.11, 0.1, 1.04, 99.0])
+    np.testing.assert_allclose(found.tau["overlapping"], [0.1, 1.0, 4.0])
+    np.testing.assert_allclose(found.tau["hadamard"], [0.1, 1.0])
+    only = gmwm.deviations(noise(100), 0.1, "total", 2.0)
+    assert only.kinds == ("total",)
+    np.testing.assert_allclose(only.tau["total"], [2.0])
+
+
+# -- intervals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "process",
+    [WhiteNoise(1.0), BiasInstability(1.0), RandomWalk(1.0)],
+    ids=lambda process: type(process).__name__,
+)
+def test_intervals_hold_the_truth(process):
+    runs, n = 120, 512
+    rng = np.random.default_rng(11)
+    found = [gmwm.deviations(process.simulate(n, 1.0, rng), 1.0) for _ in range(runs)]
+    least = binom.ppf(1e-4, runs, 0.93)  # of a few per cent less than stated nobody takes harm
+    for kind in KINDS:
+        truth = np.sqrt(np.mean([f.deviation[kind] ** 2 for f in found], axis=0))
+        if kind in ("overlapping", "total"):  # what the total deviation estimates too
+            truth = np.sqrt(2.0 * process.haar_variance(found[0].tau[kind], 1.0))
+        held = [(f.lower[kind] <= truth) & (truth <= f.upper[kind]) for f in found]
+        assert np.min(np.sum(held, axis=0)) >= least, kind
+
+
+@pytest.mark.parametrize("n", [8, 9, 31, 100, 1000])
+@pytest.mark.parametrize(
+    "series",
+    [
+        lambda n: noise(n),
+        lambda n: np.cumsum(noise(n) - 5.0),
+        lambda n: np.cumsum(np.cumsum(noise(n) - 5.0)),
+        lambda n: np.diff(noise(n + 2), 2),
+        lambda n: np.arange(n) % 2.0,
+        lambda n: RateRamp(1.0).simulate(n, 1.0, 0) + 1e-9 * noise(n),
+        lambda n: np.where(np.arange(n) == n // 2, 1.0, 0.0),
+    ],
+    ids=["white", "walk", "double walk", "differences", "toggling", "ramp", "one spike"],
+)
+def test_intervals_are_numbers_for_any_series(series, n):
+    found = gmwm.deviations(series(n), 1.0)
+    for kind in KINDS:
+        low, value, high = found.lower[kind], found.deviation[kind], found.upper[kind]
+        assert np.all(np.isfinite(low) & np.isfinite(value) & np.isfinite(high))
+        assert np.all((low >= 0.0) & (low <= high))
+        assert low.shape == value.shape == high.shape == found.tau[kind].shape
+
+
+def test_a_higher_confidence_makes_wider_intervals():
+    narrow, wide = (gmwm.deviations(noise(300), 1.0, confidence=c) for c in (0.68, 0.99))
+    for kind in KINDS:
+        assert np.all(wide.lower[kind] < narrow.lower[kind])
+        assert np.all(wide.upper[kind] > narrow.upper[kind])
+
+
+# -- looks ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def gyro():
+    return Channel("gyro_x", 1e-3 * noise(5000), 0.01, "gyro", "rad/s")
+
+
+def test_printed(gyro):
+    lines = str(gmwm.deviations(gyro)).splitlines()
+    assert lines[0] == "gyro_x: 5,000 samples at 100 Hz, deviations in rad/s"
+    assert lines[1].split() == ["tau", "[s]", *KINDS]
+    assert max(map(len, lines)) <= 80
+    assert len({len(line) for line in lines[1:]}) == 1
+    found = gmwm.deviations(gyro)
+    for line in lines[2:]:
+        time, *cells = line.split()
+        for kind, cell in zip(KINDS, cells, strict=True):
+            place = np.flatnonzero(np.isclose(found.tau[kind], float(time)))
+            if cell == "-":
+                assert not place.size
+            else:
+                assert float(cell) == pytest.approx(found.deviation[kind][place[0]], rel=1e-4)
+
+
+def test_to_dict_is_json(gyro):
+    found = gmwm.deviations(gyro)
+    content = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert (content["n"], content["dt"], content["unit"]) == (5000, 0.01, "rad/s")
+    assert list(content["kinds"]) == list(KINDS)
+    for kind in KINDS:
+        for part in ("tau", "deviation", "lower", "upper"):
+            assert content["kinds"][kind][part] == getattr(found, part)[kind].tolist()
+
+
+def test_plot_has_every_kind_under_its_name(gyro):
+    found = gmwm.deviations(gyro)
+    axes = found.plot()
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert axes.get_ylabel() == "deviation [rad/s]"
+    assert axes.get_title() == "gyro_x"
+    assert axes.get_legend().get_title().get_text() == "bars: 95 % intervals"
+    drawn = {line.get_label(): line for line in axes.get_lines()}
+    assert list(drawn) == ["overlapping Allan", "modified Allan", "overlapping Hadamard", "total"]
+    low, high = axes.get_ylim()
+    for kind, line in zip(KINDS, drawn.values(), strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), found.tau[kind])
+        np.testing.assert_array_equal(line.get_ydata(), found.deviation[kind])
+        assert np.all((low < found.deviation[kind]) & (found.deviation[kind] < high))
+    axes.figure.canvas.draw()
+
+
+def test_plot_joins_that_of_the_wavelet_variance_and_keeps_its_colours(gyro):
+    axes = gmwm.wavelet_variance(gyro).plot()
+    assert gmwm.deviations(gyro, kinds=["hadamard"]).plot(axes) is axes
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert sorted(labels) == ["data, 95 % interval", "overlapping Hadamard"]
+    alone = axes.get_lines()[-1]
+    together = gmwm.deviations(gyro).plot().get_lines()
+    (same,) = [line for line in together if line.get_label() == alone.get_label()]
+    assert (same.get_color(), same.get_marker()) == (alone.get_color(), alone.get_marker())
+    axes.figure.canvas.draw()
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+GAPS = np.where(np.arange(100) % 40 == 7, np.nan, noise(100))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((noise(100),), "give the sampling interval of the array: deviations(x, dt=0.01)"),
+        ((noise(100), 0.0), "dt = 0.0: give a positive sampling interval"),
+        ((noise(7), 1.0), "shape (7,): give one series of 8 samples or more"),
+        ((np.ones((100, 2)), 1.0), "shape (100, 2): give one series"),
+        ((["a"] * 100, 1.0), "something that is not a number"),
+        ((np.ones(100), 1.0), "is constant (1)"),
+        ((np.where(np.arange(100) == 3, np.inf, 1.0), 1.0), "infinite samples: remove or repair"),
+        ((GAPS, 1.0), "the series has 3 missing samples: cut it to a part without any, or take"),
+        ((Channel("gyro_x", GAPS, 1.0),), "channel 'gyro_x' has 3 missing samples"),
+        ((noise(100), 1.0, ["allan"]), "kind 'allan' is not known: take some of overlapping,"),
+        ((noise(100), 1.0, []), "no kind of deviation is given: take some of overlapping,"),
+        ((noise(100), 1.0, KINDS, "all"), "tau = 'all': give octave, decade or averaging times"),
+        ((noise(100), 1.0, KINDS, [0.0]), "give positive averaging times in seconds"),
+        ((noise(100), 1.0, KINDS, []), "give positive averaging times in seconds"),
+        ((noise(100), 1.0, KINDS, [np.nan]), "give positive averaging times in seconds"),
+        ((noise(100), 1.0, KINDS, ["x"]), "give averaging times in seconds"),
+        ((noise(100), 0.1, KINDS, [4.0]), "4 s is too long for the modified Allan deviation of "
+         "100 samples: give at most 3.3 s"),
+    ],
+)  # fmt: skip
+def test_bad_input(arguments, words):
+    with pytest.raises(InputError) as caught:
+        gmwm.deviations(*arguments)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
+def test_confidence_that_is_none(confidence):
+    with pytest.raises(InputError, match="give a number between 0 and 1"):
+        gmwm.deviations(noise(100), 1.0, confidence=confidence)
+
+
+def test_without_allantools(monkeypatch):
+    monkeypatch.setitem(sys.modules, "allantools", None)
+    with pytest.raises(InputError, match=r"install it with pip install 'gmwm\[allan\]'"):
+        gmwm.deviations(noise(100), 1.0)
