@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from gmwm.variance.allan_family import Deviations, deviations
     from gmwm.variance.analysis import wavelet_variance
     from gmwm.variance.covariance import haar_covariance
+    from gmwm.variance.modwt import Modwt, imodwt, modwt
     from gmwm.variance.wavelet import WaveletVariance
 
 __version__ = "0.1.0"
@@ -83,6 +84,7 @@ _HOME = {
     **dict.fromkeys(("Selection", "select"), "selection"),
     "haar_covariance": "variance.covariance",
     "WaveletVariance": "variance.wavelet",
+    **dict.fromkeys(("Modwt", "imodwt", "modwt"), "variance.modwt"),
     "wavelet_variance": "variance.analysis",
     **dict.fromkeys(("Deviations", "deviations"), "variance.allan_family"),
 }
@@ -101,6 +103,7 @@ __all__ = [
     "GaussMarkov",
     "InputError",
     "Model",
+    "Modwt",
     "Parameter",
     "Process",
     "QuantizationNoise",
@@ -119,7 +122,9 @@ __all__ = [
     "deviations",
     "fit",
     "haar_covariance",
+    "imodwt",
     "load",
+    "modwt",
     "read",
     "select",
     "simulate",

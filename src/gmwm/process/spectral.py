@@ -1,4 +1,4 @@
-"""Spectral integrals against the Haar wavelet filter, for any power spectral density.
+"""Spectral integrals against wavelet filters, for any power spectral density.
 
 The Haar MODWT filter of averaging time ``tau = m dt`` has the squared gain
 
@@ -11,20 +11,24 @@ towards zero frequency, shared by all levels: lobes are resolved over the octave
 first ``_RESOLVED_LOBES`` of a level, and replaced by their mean 3/8 above, with a smooth transition
 over one octave (an infinitely smooth cut-off makes the error of the replacement fall faster
 than any power of the number of lobes). With that, a spectrum is evaluated once, and the variances
-of all levels are one matrix product.
+of all levels are one matrix product. Other wavelets have weights of their own
+(`gmwm.process.wavelet_gain`), for dyadic averaging times.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import expit
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.process.wavelet_gain import GainWeights, gain_weights
+from gmwm.wavelets import Wavelet, wavelet
 
 PSD = Callable[[FloatArray, float], FloatArray]
 """``psd(f, dt)``: two-sided density in u^2/Hz at frequencies f in Hz."""
@@ -36,6 +40,9 @@ _RESOLVED_LOBES = 256
 _OCTAVES_BELOW = 26  # below the lowest lobe: a 1/f^2 spectrum leaves 2^-26 of its variance there
 
 MEAN_SIN4 = 3.0 / 8.0
+
+_MAX_LEVEL = 62
+_MARGIN = 0.25  # a spectrum f^-a needs a < 2 r + 1 - _MARGIN: the lowest octaves then add up
 
 
 @dataclass(frozen=True)
@@ -168,3 +175,78 @@ def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     rounded = np.where(np.abs(m - np.rint(m)) < 1e-9 * m, np.rint(m), m)
     result = quadrature(tuple(rounded.tolist())).haar_variance(psd, dt)
     return np.asarray(result.reshape(tau.shape))
+
+
+def wavelet_variance(
+    psd: PSD, lines: Sequence[tuple[float, float]], tau: FloatArray, dt: float, name: str
+) -> FloatArray:
+    """Wavelet variance by any Daubechies filter, from the spectrum.
+
+    Parameters
+    ----------
+    psd : callable
+        ``psd(f, dt)``, two-sided, u^2/Hz.
+    lines : sequence of (float, float)
+        Spectral lines beside it: frequency (Hz), amplitude (u).
+    tau : array_like
+        Averaging times 2^(j-1) dt in seconds.
+    dt : float
+        Sampling interval in seconds.
+    name : str
+        Wavelet, see `gmwm.wavelets.wavelet`.
+
+    Returns
+    -------
+    ndarray
+        Same shape as ``tau``, in u^2.
+
+    Raises
+    ------
+    InputError
+        For averaging times that are not dyadic, an unknown wavelet, or a spectrum that rises so
+        fast towards zero frequency that the coefficients of this wavelet are not stationary.
+    """
+    filters = wavelet(name)
+    tau = np.asarray(tau, dtype=float)
+    level = _levels(tau.ravel() / dt)
+    if level.size == 0:
+        return np.zeros(tau.shape)
+    weights = gain_weights(filters.name, int(np.max(level)))
+    density = evaluated(psd, weights.frequency / dt, dt) / dt
+    _check_stationary(filters, weights, density)
+    result = 2.0 * (weights.weight @ density)[level - 1]
+    for row, j in enumerate(level):
+        for frequency, amplitude in lines:
+            alias = frequency * dt - np.rint(frequency * dt)
+            result[row] += 0.5 * amplitude**2 * float(filters.gain(int(j), alias))
+    return np.asarray(result.reshape(tau.shape))
+
+
+def _levels(m: FloatArray) -> npt.NDArray[np.intp]:
+    """Levels j of averaging times of m = 2^(j-1) samples."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        exponent = np.log2(m)
+        level = np.where(np.isfinite(exponent), np.rint(exponent) + 1.0, 0.0)
+    wrong = ~((level >= 1.0) & (level <= _MAX_LEVEL) & (np.abs(exponent - level + 1.0) < 1e-9))
+    if np.any(wrong):
+        raise InputError(
+            f"an averaging time is {m[wrong][0]:g} samples: wavelets other than Haar need powers "
+            f"of two from 1 to 2^{_MAX_LEVEL - 1}"
+        )
+    return level.astype(int)
+
+
+def _check_stationary(filters: Wavelet, weights: GainWeights, density: FloatArray) -> None:
+    """Refuse a spectrum under which the lowest octaves do not add up to a finite variance."""
+    octaves = (weights.lowest, weights.second)
+    low, above = (float(weights.weight[0, part] @ density[part]) for part in octaves)
+    if low <= 0.0 or low < 0.5**_MARGIN * above:
+        return
+    moments = filters.vanishing_moments
+    slope = 2.0 * moments + 1.0 + np.log2(low / above)
+    enough = int(np.floor(0.5 * (slope - 1.0 + _MARGIN))) + 1
+    mend = f"use 'db{enough}'" if enough <= 10 else "it is too steep for any wavelet"
+    raise InputError(
+        f"the spectrum rises like f^-{slope:.3g} towards zero frequency, too fast for the "
+        f"{moments} vanishing moment{'s'[: moments != 1]} of wavelet {filters.name!r}: {mend}"
+    )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 EXPERIMENTS = (
     "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
+    "weights2", "weights3", "weights4",
 )  # fmt: skip
 
 
@@ -49,7 +50,8 @@ def reproduce(
     table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
     the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
-    shows the bias of lines in the Allan plot. Times are in seconds, rates in 1/s. Raw estimates
+    shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
+    wavelets of the method of moments. Times are in seconds, rates in 1/s. Raw estimates
     are kept in Parquet.
 
     \b
@@ -64,8 +66,9 @@ def reproduce(
     if experiment == "appendix-a":
         _appendix(folder, runs or 200, seed, processes)
         return
+    from gmwm.study.catalogue import SCENARIOS
     from gmwm.study.runs import run_scenario
-    from gmwm.study.scenario import FIGURES, SCENARIOS
+    from gmwm.study.scenario import FIGURES
 
     scenario = FIGURES.get(experiment) or SCENARIOS[experiment]
     try:

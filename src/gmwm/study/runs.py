@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -15,11 +15,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import fit
 from gmwm.files import moved_into_place, output_folder
-from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
+from gmwm.study.catalogue import SCENARIOS
+from gmwm.study.scenario import Quantity, Scenario
+from gmwm.variance.analysis import wavelet_variance
 
 Row = dict[str, Any]
 Rows = Generator[list[Row], None, None]
@@ -28,6 +31,7 @@ Progress = Callable[[int, int], None]
 
 _SECONDS_PER_PART = 10.0
 _KEY = b"gmwm"
+_OF_VARIANCE = ("wavelet", "robust")
 
 
 def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> list[Row]:
@@ -51,7 +55,7 @@ def _row(scenario: Scenario, method: str, series: Any, run: int) -> Row:
     result: Fit | None = None
     message, valid = "", False
     try:
-        result = fit(scenario.truth.opened(), series, scenario.dt, **scenario.methods[method])
+        result = _estimate(scenario, series, scenario.methods[method])
         message, valid = result.message, result.valid
     except InputError as error:
         message = str(error)
@@ -65,6 +69,17 @@ def _row(scenario: Scenario, method: str, series: Any, run: int) -> Row:
     for quantity in scenario.quantities:
         row |= _values(quantity, result)
     return row
+
+
+def _estimate(scenario: Scenario, series: FloatArray, options: Mapping[str, Any]) -> Fit:
+    model = scenario.truth.opened()
+    of_variance = {name: options[name] for name in _OF_VARIANCE if name in options}
+    if not of_variance:
+        return fit(model, series, scenario.dt, **options)
+    if options.get("omega") == "data":
+        of_variance["data_covariance"] = "octave"
+    wv = wavelet_variance(series, scenario.dt, **of_variance)
+    return fit(model, wv, **{k: v for k, v in options.items() if k not in of_variance})
 
 
 def _values(quantity: Quantity, result: Fit | None) -> Row:

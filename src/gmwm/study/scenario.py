@@ -49,7 +49,7 @@ class Scenario:
         Customary number of runs.
     quantities : tuple of Quantity
     methods : mapping of str to mapping
-        Method -> options of `gmwm.fit`.
+        Method -> options of `gmwm.fit` and `gmwm.wavelet_variance`.
     notes : tuple of str
         What a reader of the table has to know.
     """
@@ -173,5 +173,4 @@ FIVE = Scenario(
     methods={"GMWM": {}, "Whittle": {"method": "whittle"}},
 )
 
-SCENARIOS = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE)}
 FIGURES = {"fig2": TABLE_2, "fig3": TABLE_3, "fig4": TABLE_4}

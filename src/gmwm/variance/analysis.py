@@ -77,6 +77,7 @@ def wavelet_variance(
         raise InputError(f"confidence = {confidence!r}: give a number between 0 and 1, e.g. 0.95")
     if not 0.0 < efficiency < 1.0:
         raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
+    wavelet = "haar" if wavelet == "db1" else wavelet
     averaging = _averaging(channel, runs, wavelet)
     mean = float(np.nanmean(values))
     integral = cumulative(values, mean)
@@ -85,6 +86,11 @@ def wavelet_variance(
     else:
         parts = _coefficients(values - mean, integral, runs, wavelet, averaging)
         moments = _moments(parts, efficiency if robust else 1.0)
+    driftless = None
+    if robust:
+        level = _without_line(values)
+        parts = _coefficients(level, cumulative(level, 0.0), runs, wavelet, averaging)
+        driftless = _moments(parts, efficiency)[:, 1]
     blocks, block = _block_means(values, integral, runs)
     found = None
     if data_covariance is not None:
@@ -104,6 +110,7 @@ def wavelet_variance(
         unit=channel.unit or "u",
         wavelet=wavelet,
         efficiency=efficiency if robust else 1.0,
+        driftless=driftless,
         present=None if runs.is_complete else runs,
         data_covariance=found,
     )
@@ -182,6 +189,14 @@ def _coefficients(
     series = [coefficients(values[a:b], wavelet, averaging.size) for a, b in runs.edges]
     for _ in averaging:
         yield np.concatenate([next(part, np.zeros(0)) for part in series])
+
+
+def _without_line(values: FloatArray) -> FloatArray:
+    """The series less its least-squares line."""
+    k = np.arange(values.size) - 0.5 * (values.size - 1)
+    there = ~np.isnan(values)
+    line = np.polynomial.polynomial.polyfit(k[there], values[there], 1)
+    return np.asarray(values - np.polynomial.polynomial.polyval(k, line))
 
 
 def _block_means(values: FloatArray, integral: FloatArray, runs: Runs) -> tuple[FloatArray, int]:

@@ -51,6 +51,7 @@ def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") ->
     width = np.diff(np.append(edges, transforms[0].size)).astype(float)
     # A mean of b cross-periodograms has the expected square S^2 (1 + 1/b).
     weight = 2.0 * width / (1.0 + 1.0 / width) / (0.5 * size)
+    weight[0] *= 0.5  # frequency zero has no negative counterpart
     if window == "none":
         gram = _products(transforms, weight)
     else:
@@ -61,15 +62,16 @@ def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") ->
 def _transforms(
     coefficients: Iterable[FloatArray],
 ) -> tuple[list[FloatArray], FloatArray, int]:
-    """Normalised transforms at the positive frequencies, numbers of coefficients, and size.
+    """Normalised transforms, numbers of coefficients, and size.
 
-    The mean of the coefficients, which a drift would give them, is removed.
+    Their mean is not removed, frequency zero not left out: at coarse levels that would take most of
+    what there is, and a level of no variance would have all the weight.
     """
     found, counts = [], []
     size = 0
     for level in coefficients:
         size = size or fft.next_fast_len(level.size, real=True)
-        found.append(fft.rfft(level - np.mean(level), size)[1 : size // 2] / np.sqrt(level.size))
+        found.append(fft.rfft(level, size)[: size // 2] / np.sqrt(level.size))
         counts.append(level.size)
     return found, np.array(counts, dtype=float), size
 

@@ -47,6 +47,9 @@ class PooledVariance(WaveletVariance):
                         f"and {getattr(longest, name)!r}"
                     )
         shares = _shares(parts, longest.tau.size)
+        driftless = None
+        if all(part.driftless is not None for part in parts):
+            driftless = _mean([np.asarray(part.driftless) for part in parts], shares)
         covariance = None
         if all(part.data_covariance is not None for part in parts):
             given = [np.asarray(part.data_covariance) for part in parts]
@@ -65,6 +68,7 @@ class PooledVariance(WaveletVariance):
             unit=longest.unit,
             wavelet=longest.wavelet,
             efficiency=longest.efficiency,
+            driftless=driftless,
             data_covariance=covariance,
             parts=tuple(parts),
         )

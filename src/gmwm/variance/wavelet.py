@@ -53,6 +53,9 @@ class WaveletVariance:
     efficiency : float
         1 for the mean square of the coefficients, less for the robust estimate, see
         `gmwm.variance.robust`.
+    driftless : (J,) ndarray or None
+        For robust estimates, those of the series less its least-squares line, u^2: they are no
+        quadratic function of a drift.
     present : Runs or None
         The samples that exist; ``None`` if all do.
     data_covariance : (J, J) ndarray or None
@@ -73,6 +76,7 @@ class WaveletVariance:
     unit: str = "u"
     wavelet: str = "haar"
     efficiency: float = 1.0
+    driftless: FloatArray | None = None
     present: Runs | None = None
     data_covariance: FloatArray | None = None
 
@@ -181,6 +185,8 @@ class WaveletVariance:
 
     def mean_covariance_under(self, psd: PSD) -> FloatArray:
         """Covariance of ``mean`` at the coarse levels, zero at the others, u^2, (J, J)."""
+        if not np.any(self.drift_response):
+            return np.zeros((self.tau.size, self.tau.size))  # a drift adds nothing to scale
         if self.present is None:
             return mean_covariance(psd, self.n, self.dt)
         return gappy_mean_covariance(psd, self.present, self.dt, self.averaging)
@@ -212,7 +218,12 @@ class WaveletVariance:
         return np.asarray(self.dof * self.variance / quantile)
 
     def detrended(self, slope: float) -> FloatArray:
-        """Wavelet variances of the series less a drift of ``slope`` (u/s), exactly, u^2, (J,)."""
+        """Wavelet variances of the series less a drift of ``slope`` (u/s), u^2, (J,).
+
+        Exactly; of robust estimates, those less the least-squares line.
+        """
+        if self.driftless is not None:
+            return self.driftless
         step = slope * self.drift_response
         return self.variance - 2.0 * step * self.mean + step**2
 
@@ -254,6 +265,7 @@ class WaveletVariance:
             "blocks": [None if np.isnan(mean) else mean for mean in self.blocks.tolist()],
             "wavelet": self.wavelet,
             "efficiency": self.efficiency,
+            "driftless": None if self.driftless is None else self.driftless.tolist(),
             "present": None if self.present is None else self.present.edges.tolist(),
             "data_covariance": (
                 None if self.data_covariance is None else self.data_covariance.tolist()
@@ -271,8 +283,9 @@ class WaveletVariance:
         if content.get("present") is not None:
             starts, stops = zip(*content["present"], strict=True)
             found["present"] = Runs(starts, stops, found["n"])
-        if content.get("data_covariance") is not None:
-            found["data_covariance"] = np.array(content["data_covariance"], dtype=float)
+        for name in ("data_covariance", "driftless"):
+            if content.get(name) is not None:
+                found[name] = np.array(content[name], dtype=float)
         return cls(**found)
 
     def plot(self, ax: Axes | None = None) -> Axes:

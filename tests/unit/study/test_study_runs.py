@@ -6,8 +6,9 @@ import pytest
 
 from gmwm import InputError, RandomWalk, WhiteNoise
 from gmwm.study import runs as engine
+from gmwm.study.catalogue import SCENARIOS
 from gmwm.study.runs import one_run, run_scenario
-from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
+from gmwm.study.scenario import Quantity, Scenario
 
 SMALL = Scenario(
     name="small",

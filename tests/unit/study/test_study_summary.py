@@ -5,8 +5,9 @@ import pyarrow as pa
 import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
+from gmwm.study.catalogue import SCENARIOS
 from gmwm.study.figures import boxplots
-from gmwm.study.scenario import FIGURES, SCENARIOS, Quantity, Scenario
+from gmwm.study.scenario import FIGURES, Quantity, Scenario
 from gmwm.study.summary import summarise
 
 WHITE = Scenario(
@@ -67,16 +68,18 @@ def test_printed_table(table):
         "4 runs of 1,000 samples at 1 Hz, seed 3\n"
         "\n"
         "quantity   method         RMSE  relative  / bound     bias   covers     paper\n"
-        "sigma2_WN  A             0.004       0.1     2.23    -0.0%   100.0%          \n"
+        "sigma2_WN  A             0.004       0.1     2.23     0.0%   100.0%          \n"
         "sigma2_WN  B             0.008       0.2     4.47    20.0%     0.0%      0.05"
         "  (1 without)\n"
-        "           bound       0.00179    0.0447\n"
+        "           bound       0.00179    0.0447     1.00\n"
+        "           moments     0.00179    0.0448     1.00\n"
         "\n"
         "           method    not valid   median time\n"
         "           A                 0         0.5 s\n"
         "           B                 1         0.5 s\n"
         "\n"
-        "relative, bias: over the true value; bound: Cramer-Rao; covers: 95 % intervals\n"
+        "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for\n"
+        "estimates by Haar wavelet variances only; covers: 95 % intervals\n"
         "- A note that is long enough to be wrapped at the eightieth column of the\n"
         "  terminal."
     )

@@ -1,0 +1,270 @@
+"""Integrals of wavelet gains against smooth spectra, exact at every level.
+
+A level's squared gain |H_j|^2 has up to 2^(j-1) lobes, which no fixed quadrature resolves at coarse
+levels. But a spectrum S is smooth on the panels of a grid graded by octaves, so that there
+
+    int |H_j|^2 S df = sum_i W_ji S(f_i),    W_ji = int |H_j|^2 l_i df,
+
+with the Lagrange polynomials l_i of a panel's Gauss-Legendre nodes f_i: the lobes go into weights
+that are found once. A panel is [a, a + 2^-s] with a a multiple of 2^-s; as f runs through it,
+u = 2^s f - 2^s a runs through one period, and
+
+    |H_j(f)|^2 = P_s(f) |H_{j-s}(u)|^2,    P_s(f) = prod_{l<s} |G(2^l f)|^2.
+
+P_s is smooth there, and integrals of smooth functions against |H_j(u)|^2 over a period obey
+
+    int |H_j|^2 phi du = int |H_{j-1}|^2 T phi du,
+    T phi(u) = [|G(u/2)|^2 phi(u/2) + |G((u+1)/2)|^2 phi((u+1)/2)] / 2,
+
+where T, the transfer operator of the scaling filter, leads from smooth functions to smooth
+functions (Daubechies, *Ten Lectures on Wavelets*, 1992, ch. 7; Villemoes 1992, *SIAM J. Math.
+Anal.* 23, 1519-1543). On ``_ORDER`` nodes it is a matrix, and each level costs one product with it.
+To keep all digits where the gain is minute, the zeros are taken out in closed form: with r
+vanishing moments and Q = |G|^2 / cos^2r,
+
+    P_s(f) = [sin(pi u) / (2^s sin(pi f))]^2r prod_{l<s} Q(2^l f),
+
+the factor sin^2r(pi u) goes to the measure, and T has 2^-2r Q in the place of |G|^2: all terms are
+positive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from gmwm._typing import FloatArray
+from gmwm.wavelets import Wavelet, wavelet
+
+_NODES_PER_PANEL = 8
+_PANELS_LOG2 = 5  # panels an octave: 32 hold a resonance of damping 0.01 to 1e-5
+_PANELS_BELOW_LOG2 = 2
+_OCTAVES_BELOW = 26  # below the coarsest pass band
+_ORDER = 64
+
+
+@dataclass(frozen=True, eq=False)
+class GainWeights:
+    """Nodes and weights for the levels 1 to J of a wavelet.
+
+    Attributes
+    ----------
+    frequency : (K,) ndarray
+        Nodes in cycles per sample, rising, within (0, 1/2).
+    weight : (J, K) ndarray
+        int_0^{1/2} |H_j|^2 S df = weight[j - 1] @ S(frequency), in cycles per sample.
+    lowest, second : slice
+        Nodes of the two lowest octaves.
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    lowest: slice
+    second: slice
+
+
+@dataclass(frozen=True, eq=False)
+class _Panels:
+    """The panels of one octave, all of width 2^-doublings."""
+
+    doublings: int
+    fine: FloatArray  # (P, _ORDER) frequencies
+    nodes: FloatArray  # (P, _NODES_PER_PANEL) frequencies
+
+
+@lru_cache(maxsize=8)
+def unit_legendre(order: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes and weights on [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    return 0.5 * (x + 1.0), 0.5 * w
+
+
+def lagrange(nodes: FloatArray, at: FloatArray) -> FloatArray:
+    """Lagrange polynomials of ``nodes`` (m,) at points (k,), shape (k, m)."""
+    # The scale 4 is the inverse capacity of [0, 1]: products of many differences stay in range.
+    apart = 4.0 * (nodes[:, None] - nodes[None, :])
+    np.fill_diagonal(apart, 1.0)
+    barycentric = 1.0 / np.prod(apart, axis=1)
+    difference = at[:, None] - nodes[None, :]
+    hit = difference == 0.0
+    difference[hit] = 1.0
+    terms = barycentric / difference
+    result = terms / np.sum(terms, axis=1, keepdims=True)
+    rows = np.any(hit, axis=1)
+    result[rows] = hit[rows]
+    return np.asarray(result)
+
+
+def transfer_matrix(factor: FloatArray, other: FloatArray) -> FloatArray:
+    """T phi at the nodes from phi at the nodes, for factors at u/2 and (u + 1)/2."""
+    u, _ = unit_legendre(_ORDER)
+    low, high = lagrange(u, 0.5 * u), lagrange(u, 0.5 * (u + 1.0))
+    return 0.5 * (factor[:, None] * low + other[:, None] * high)
+
+
+@lru_cache(maxsize=8)
+def gain_measures(name: str, count: int) -> FloatArray:
+    """int_0^1 sin^2r(pi u) |H_j(u)|^2 l_n(u) du, j = 1 .. count, shape (count, _ORDER)."""
+    filters = wavelet(name)
+    power = 2 * filters.vanishing_moments
+    u, _ = unit_legendre(_ORDER)
+    step = transfer_matrix(filters.remainder(0.5 * u), filters.remainder(0.5 * (u + 1.0)))
+    step *= 0.5**power
+    fine, weight = _composite()
+    first = weight * np.sin(np.pi * fine) ** power * filters.detail_gain(fine)
+    result = np.empty((count, u.size))
+    result[0] = first @ lagrange(u, fine)
+    for row in range(1, count):
+        result[row] = result[row - 1] @ step
+    result.flags.writeable = False
+    return result
+
+
+def _composite() -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights on [0, 1] that integrate products of gains and Lagrange polynomials."""
+    u, w = unit_legendre(_ORDER)
+    pieces = 8
+    nodes = (np.arange(pieces)[:, None] + u) / pieces
+    return nodes.ravel(), np.tile(w / pieces, pieces)
+
+
+def panels(levels: int) -> list[_Panels]:
+    """The panels of every octave, from the lowest to the top one."""
+    x, _ = unit_legendre(_NODES_PER_PANEL)
+    u, _ = unit_legendre(_ORDER)
+    result = []
+    for octave in range(levels + _OCTAVES_BELOW, -1, -1):
+        split = _PANELS_LOG2 if octave <= levels + 1 else _PANELS_BELOW_LOG2
+        doublings = octave + 2 + split
+        start = 2.0**split + np.arange(2**split)[:, None]
+        scale = 0.5**doublings
+        result.append(_Panels(doublings, scale * (start + u), scale * (start + x)))
+    return result
+
+
+def rest(levels: int) -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights from zero to the lowest octave."""
+    x, w = unit_legendre(_NODES_PER_PANEL)
+    low = 0.5 ** (levels + _OCTAVES_BELOW + 2)
+    return low * x, low * w
+
+
+def unresolved_factor(filters: Wavelet, octave: _Panels) -> FloatArray:
+    """P_s(f) / sin^2r(pi u) at the fine points of an octave, (P, _ORDER)."""
+    power = 2 * filters.vanishing_moments
+    result = (2.0**octave.doublings * np.sin(np.pi * octave.fine)) ** -power
+    for doubling in range(octave.doublings):
+        scaled = np.ldexp(octave.fine, doubling)
+        result *= filters.remainder(scaled - np.rint(scaled))
+    return np.asarray(result)
+
+
+@lru_cache(maxsize=8)
+def gain_weights(name: str, levels: int) -> GainWeights:
+    """Nodes and weights of the levels 1 to ``levels`` of a wavelet, found once."""
+    filters = wavelet(name)
+    u, w = unit_legendre(_ORDER)
+    x, _ = unit_legendre(_NODES_PER_PANEL)
+    polynomials = lagrange(x, u)
+    octaves = panels(levels)
+    measures = gain_measures(name, levels)
+    low_nodes, low_weights = rest(levels)
+    # A spectrum may rise to infinity on [0, lowest], but its product with the gain is smooth.
+    pieces = [low_weights * filters.gains(levels, low_nodes)]
+    for octave in octaves:
+        width = 0.5**octave.doublings
+        weight = np.empty((levels, *octave.nodes.shape))
+        direct = min(levels, octave.doublings)
+        weight[:direct] = width * (filters.gains(direct, octave.fine) * w) @ polynomials
+        if levels > direct:
+            factor = unresolved_factor(filters, octave)
+            for row in range(direct, levels):
+                weight[row] = width * (factor * measures[row - direct]) @ polynomials
+        pieces.append(weight.reshape(levels, -1))
+    frequency = np.concatenate([low_nodes, *(octave.nodes.ravel() for octave in octaves)])
+    weight = np.concatenate(pieces, axis=1)
+    for array in (frequency, weight):
+        array.flags.writeable = False
+    first, size = low_nodes.size, octaves[0].nodes.size
+    return GainWeights(
+        frequency, weight, slice(first, first + size), slice(first + size, first + 2 * size)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PairWeights:
+    """Weights for products of the gains of two levels.
+
+    Attributes
+    ----------
+    frequency : (K,) ndarray
+        As in `GainWeights`.
+    weight : (P, K) ndarray
+        int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of levels
+        j = first[p] + 1 <= k = second[p] + 1.
+    first, second : (P,) ndarray
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    first: npt.NDArray[np.intp]
+    second: npt.NDArray[np.intp]
+
+
+def _pair_measures(name: str, count: int) -> FloatArray:
+    """int_0^1 sin^4r(pi u) |H_j|^2 |H_k|^2 l_n du for j <= k <= count, (count, count, _ORDER).
+
+    As the levels drop together, the transfer operator has |G|^4; once the finer level is 1, the
+    rest is that of one level.
+    """
+    filters = wavelet(name)
+    power = 2 * filters.vanishing_moments
+    u, _ = unit_legendre(_ORDER)
+    single = gain_measures(name, count)
+    halves = np.stack([0.5 * u, 0.5 * (u + 1.0)])
+    scaling = filters.remainder(halves)
+    detail = filters.detail_gain(halves) * np.sin(np.pi * halves) ** power
+    both = 0.25**power * transfer_matrix(*scaling**2)
+    finer_ends = 0.5**power * transfer_matrix(*(scaling * detail))
+    fine, weight = _composite()
+    result = np.zeros((count, count, u.size))
+    square = (np.sin(np.pi * fine) ** power * filters.detail_gain(fine)) ** 2
+    result[0, 0] = (weight * square) @ lagrange(u, fine)
+    result[0, 1:] = single[: count - 1] @ finer_ends
+    for j in range(1, count):
+        result[j, j:] = result[j - 1, j - 1 : -1] @ both
+    return result
+
+
+@lru_cache(maxsize=4)
+def pair_weights(name: str, levels: int) -> PairWeights:
+    """Nodes and weights of all pairs of the levels 1 to ``levels``, found once."""
+    filters = wavelet(name)
+    u, w = unit_legendre(_ORDER)
+    polynomials = lagrange(unit_legendre(_NODES_PER_PANEL)[0], u)
+    first, second = np.triu_indices(levels)
+    low_nodes, low_weights = rest(levels)
+    low_gains = filters.gains(levels, low_nodes)
+    pieces = [low_weights * low_gains[first] * low_gains[second]]
+    single, double = gain_measures(name, levels), _pair_measures(name, levels)
+    for octave in panels(levels):
+        # The gain of a level is resolved down to the width of a panel, beyond it a measure.
+        direct = min(levels, octave.doublings)
+        gains = filters.gains(direct, octave.fine)
+        factor = unresolved_factor(filters, octave)
+        weight = np.empty((first.size, *octave.nodes.shape))
+        for row, (j, k) in enumerate(zip(first, second, strict=True)):
+            if k < direct:
+                density = gains[j] * gains[k] * w
+            elif j < direct:
+                density = gains[j] * factor * single[k - direct]
+            else:
+                density = factor**2 * double[j - direct, k - direct]
+            weight[row] = 0.5**octave.doublings * density @ polynomials
+        pieces.append(weight.reshape(first.size, -1))
+    weight = np.concatenate(pieces, axis=1)
+    weight.flags.writeable = False
+    return PairWeights(gain_weights(name, levels).frequency, weight, first, second)

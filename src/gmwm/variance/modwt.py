@@ -1,0 +1,232 @@
+"""The maximal overlap discrete wavelet transform (MODWT), by the pyramid algorithm.
+
+Percival & Walden, *Wavelet Methods for Time Series Analysis*, 2000, ch. 5: level j filters the
+smooth of level j - 1 with the filters of level 1, their taps 2^(j-1) samples apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.wavelets import wavelet as wavelet_of
+
+_CHUNK = 4096  # samples that stay in the cache while all taps pass over them
+
+
+@dataclass(frozen=True, eq=False)
+class Modwt:
+    """The transform of a series.
+
+    Attributes
+    ----------
+    wavelet : str
+        Filter, as PyWavelets names it.
+    detail : (J, n) ndarray
+        Wavelet coefficients of the levels 1 to J, averaging times 2^(j-1) samples. The series is
+        taken as periodic: the first ``width(j) - 1`` of level j mix its end with its beginning.
+    smooth : (n,) ndarray
+        Scaling coefficients of level J.
+    """
+
+    wavelet: str
+    detail: FloatArray
+    smooth: FloatArray
+
+    def inverse(self) -> FloatArray:
+        """The series, (n,)."""
+        return imodwt(self.detail, self.smooth, self.wavelet)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add(out: FloatArray, values: FloatArray, factor: float) -> None:
+    # On slices of equal length the loop has no index arithmetic and runs on vector registers.
+    for t in range(out.size):
+        out[t] += factor * values[t]
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_circular(
+    out: FloatArray, values: FloatArray, taps: FloatArray, offsets: npt.NDArray[np.int64]
+) -> None:
+    """out[t] += sum_l taps[l] values[t - offsets[l]], indices taken modulo the length."""
+    n = values.size
+    for begin in range(0, n, _CHUNK):
+        end = min(begin + _CHUNK, n)
+        for i in range(taps.size):
+            offset = offsets[i]
+            turn = min(max(offset, begin), end)
+            _add(out[begin:turn], values[begin - offset + n : turn - offset + n], taps[i])
+            _add(out[turn:end], values[turn - offset : end - offset], taps[i])
+
+
+@numba.njit(cache=True, nogil=True)
+def _filtered(values: FloatArray, taps: FloatArray, step: int) -> FloatArray:
+    """sum_l taps[l] values[t - step l] where all of these exist."""
+    reach = step * (taps.size - 1)
+    out = np.zeros(values.size - reach)
+    for begin in range(0, out.size, _CHUNK):
+        end = min(begin + _CHUNK, out.size)
+        for i in range(taps.size):
+            offset = reach - step * i
+            _add(out[begin:end], values[begin + offset : end + offset], taps[i])
+    return out
+
+
+def modwt(x: FloatArray, wavelet: str = "haar", levels: int | None = None) -> Modwt:
+    """Maximal overlap discrete wavelet transform of a series taken as periodic.
+
+    Parameters
+    ----------
+    x : (n,) array_like
+        Finite numbers; any length.
+    wavelet : str, optional
+        "haar", "db2" to "db10", "sym2" to "sym10", "coif1" to "coif5".
+    levels : int, optional
+        Number of levels J; by default all that have a coefficient free of end effects, at least 1.
+
+    Returns
+    -------
+    Modwt
+
+    Raises
+    ------
+    InputError
+        For a series that is empty, not one-dimensional or not finite, an unknown wavelet, or
+        levels whose averaging time exceeds the series.
+    """
+    filters = wavelet_of(wavelet)
+    smooth = _series(x)
+    n = smooth.size
+    count = max(filters.levels(n), 1) if levels is None else _checked_levels(levels, n)
+    detail = np.zeros((count, n))
+    for row in range(count):
+        offsets = _offsets(filters.scaling.size, row, n)
+        _add_circular(detail[row], smooth, filters.detail, offsets)
+        coarser = np.zeros(n)
+        _add_circular(coarser, smooth, filters.scaling, offsets)
+        smooth = coarser
+    return Modwt(filters.name, detail, smooth)
+
+
+def imodwt(detail: FloatArray, smooth: FloatArray, wavelet: str = "haar") -> FloatArray:
+    """Inverse of `modwt`.
+
+    Parameters
+    ----------
+    detail : (J, n) array_like
+    smooth : (n,) array_like
+    wavelet : str, optional
+
+    Returns
+    -------
+    (n,) ndarray
+
+    Raises
+    ------
+    InputError
+        If the shapes do not belong together, or for an unknown wavelet.
+    """
+    filters = wavelet_of(wavelet)
+    result = _series(smooth)
+    rows = np.asarray(detail, dtype=float)
+    n = result.size
+    if rows.ndim != 2 or rows.shape[1] != n:
+        raise InputError(
+            f"detail has shape {rows.shape} beside a smooth of {n} samples: give one row of {n} "
+            "coefficients a level"
+        )
+    for row in range(rows.shape[0] - 1, -1, -1):
+        back = (n - _offsets(filters.scaling.size, row, n)) % n
+        finer = np.zeros(n)
+        _add_circular(finer, np.ascontiguousarray(rows[row]), filters.detail, back)
+        _add_circular(finer, result, filters.scaling, back)
+        result = finer
+    return result
+
+
+def coefficients(
+    values: FloatArray, wavelet: str, levels: int | None = None
+) -> Iterator[FloatArray]:
+    """Wavelet coefficients free of end effects, level by level.
+
+    Only one level is in memory at a time.
+
+    Parameters
+    ----------
+    values : (n,) array_like
+        Finite numbers.
+    wavelet : str
+    levels : int, optional
+        At most so many; by default all that have such a coefficient. A short series has fewer.
+
+    Yields
+    ------
+    (n - width(j) + 1,) ndarray
+        Of level j = 1, 2, ..., in the order of time; element i stems from samples i to
+        i + width(j) - 1.
+
+    Raises
+    ------
+    InputError
+        For a series that cannot be used, an unknown wavelet, or no number of levels.
+    """
+    filters = wavelet_of(wavelet)
+    smooth = _series(values)
+    count = filters.levels(smooth.size)
+    if levels is not None:
+        if not _is_count(levels):
+            raise InputError(f"levels = {levels!r}: give a whole number from 1")
+        count = min(count, int(levels))
+    return _levels(smooth, filters.detail, filters.scaling, count)
+
+
+def _levels(
+    smooth: FloatArray, detail: FloatArray, scaling: FloatArray, count: int
+) -> Iterator[FloatArray]:
+    for row in range(count):
+        yield _filtered(smooth, detail, 2**row)
+        if row + 1 < count:
+            smooth = _filtered(smooth, scaling, 2**row)
+
+
+def _series(x: FloatArray) -> FloatArray:
+    try:
+        values = np.ascontiguousarray(x, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("the series holds something that is not a number") from None
+    if np.ndim(x) != 1 or values.size == 0:
+        raise InputError(f"the series has shape {np.shape(x)}: give one series of samples")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InputError(
+            f"the series has {bad.size} NaN or infinite samples, the first at index {bad[0]}: "
+            "remove or repair them"
+        )
+    return values
+
+
+def _is_count(levels: Any) -> bool:
+    whole = isinstance(levels, int | np.integer) and not isinstance(levels, bool)
+    return whole and int(levels) >= 1
+
+
+def _checked_levels(levels: Any, n: int) -> int:
+    most = n.bit_length()
+    if not (_is_count(levels) and levels <= most):
+        raise InputError(
+            f"levels = {levels!r}: give a whole number from 1 to {most} for {n} samples"
+        )
+    return int(levels)
+
+
+def _offsets(taps: int, row: int, n: int) -> npt.NDArray[np.int64]:
+    """Delays of the taps of level ``row + 1``, modulo the length."""
+    return np.array([(tap << row) % n for tap in range(taps)], dtype=np.int64)
