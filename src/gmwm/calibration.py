@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from joblib import Parallel, delayed
 
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.joint import JointFit
 from gmwm.estimate.methods import fit
 from gmwm.files import written
 from gmwm.process import Model, Process
@@ -22,6 +23,8 @@ from gmwm.variance.analysis import MIN_SAMPLES, wavelet_variance
 
 SCHEMA = "gmwm.calibration"
 SCHEMA_VERSION = 1
+
+_SAME_RATE = 1e-3
 
 Progress = Callable[[str], None]
 """Called with the name of each channel when it is done."""
@@ -42,7 +45,7 @@ class Calibration:
     rate : float
         Sampling rate, Hz.
     n : int
-        Samples per channel.
+        Samples per channel, of all recordings.
     notes : tuple of str
         What the reader noticed.
     """
@@ -115,7 +118,7 @@ class Calibration:
             )
         try:
             return cls(
-                fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
+                fits={name: _fit_from_dict(item) for name, item in content["channels"].items()},
                 skipped=dict(content["skipped"]),
                 source=content["source"],
                 rate=float(content["rate_hz"]),
@@ -149,6 +152,10 @@ class Calibration:
         return write_report(self, path)
 
 
+def _fit_from_dict(content: dict[str, Any]) -> Fit:
+    return JointFit.from_dict(content) if "parts" in content else Fit.from_dict(content)
+
+
 def load(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration written by `Calibration.save`.
 
@@ -170,19 +177,20 @@ def load(path: str | os.PathLike[str]) -> Calibration:
 
 
 def calibrate(
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Error model of every channel of a static recording.
+    """Error model of every channel of a static recording, or of several of one sensor.
 
     A channel that is constant, or of which more than half of the samples are missing, is skipped.
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or sequence of Recording
+        Several of one sensor have one model, fitted jointly; see `gmwm.estimate.joint.JointFit`.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
@@ -201,45 +209,85 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
-    dead = {c.name: why for c in recording if (why := _reason_to_skip(c))}
-    alive = [c for c in recording if c.name not in dead]
+    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    _check_together(recordings)
+    alive, dead = _usable(recordings)
     if isinstance(model, Mapping):
-        for channel in alive:
-            _model_of(channel, model)
+        for name in alive:
+            _model_of(name, model)
     if not alive:
-        which = "; ".join(f"{name}: {why}" for name, why in dead.items())
-        if all(channel.is_constant and channel.is_complete for channel in recording):
-            which = "every channel is constant"
-        raise InputError(
-            f"{recording.source or 'the recording'}: {which}, nothing to calibrate: check the "
-            "sensor and the columns"
-        )
-    if recording.n < MIN_SAMPLES:
-        raise InputError(f"{recording.n} samples are too few: record at least {MIN_SAMPLES}")
+        raise InputError(_nothing_alive(recordings, dead))
+    for each in recordings:
+        if each.n < MIN_SAMPLES:
+            raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
 
-    def one(channel: Channel) -> Fit | InputError:
+    def one(name: str) -> Fit | InputError:
         try:
-            return _channel_fit(channel, _model_of(channel, model))
+            return _channel_fit(alive[name], _model_of(name, model))
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
             if progress is not None:
-                progress(channel.name)
+                progress(name)
 
     workers = Parallel(n_jobs=jobs, prefer="threads")
-    found = dict(zip(alive, workers(delayed(one)(channel) for channel in alive), strict=True))
+    found = dict(zip(alive, workers(delayed(one)(name) for name in alive), strict=True))
     skipped = dead | {
-        c.name: str(error) for c, error in found.items() if isinstance(error, InputError)
+        name: str(error) for name, error in found.items() if isinstance(error, InputError)
     }
-    if len(skipped) == len(recording):
-        raise InputError(f"{recording.source or 'the recording'}: {next(iter(skipped.values()))}")
+    source = ", ".join(each.source for each in recordings)
+    fits = {name: fitted for name, fitted in found.items() if isinstance(fitted, Fit)}
+    if not fits:
+        raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values()))}")
+    several = len(recordings) > 1
     return Calibration(
-        fits={c.name: fitted for c, fitted in found.items() if isinstance(fitted, Fit)},
+        fits=fits,
         skipped=skipped,
-        source=recording.source,
-        rate=recording.rate,
-        n=recording.n,
-        notes=recording.notes,
+        source=source,
+        rate=recordings[0].rate,
+        n=sum(each.n for each in recordings),
+        notes=tuple(
+            f"{each.source}: {note}" if several else note
+            for each in recordings
+            for note in each.notes
+        ),
+    )
+
+
+def _check_together(recordings: Sequence[Recording]) -> None:
+    if not recordings:
+        raise InputError("there is no recording: give one at least")
+    first = recordings[0]
+    for other in recordings[1:]:
+        if abs(other.rate / first.rate - 1.0) > _SAME_RATE:
+            raise InputError(
+                f"{other.source} has {other.rate:g} Hz and {first.source} {first.rate:g} Hz: "
+                "calibrate recordings of different rates one by one"
+            )
+
+
+def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], dict[str, str]]:
+    """Each channel in the recordings where it can be used, and why others are skipped."""
+    rate = recordings[0].rate
+    alive: dict[str, list[Channel]] = {}
+    dead: dict[str, str] = {}
+    for recording in recordings:
+        for channel in recording:
+            why = _reason_to_skip(channel)
+            if why:
+                dead.setdefault(channel.name, why)
+            else:
+                alive.setdefault(channel.name, []).append(replace(channel, dt=1.0 / rate))
+    return alive, {name: why for name, why in dead.items() if name not in alive}
+
+
+def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, str]) -> str:
+    which = "; ".join(f"{name}: {why}" for name, why in dead.items())
+    if all(c.is_constant and c.is_complete for recording in recordings for c in recording):
+        which = "every channel is constant"
+    return (
+        f"{recordings[0].source or 'the recording'}: {which}, nothing to calibrate: check the "
+        "sensor and the columns"
     )
 
 
@@ -254,15 +302,16 @@ def _reason_to_skip(channel: Channel) -> str:
 
 
 def _model_of(
-    channel: Channel, model: Process | Model | Mapping[str, Process | Model] | None
+    name: str, model: Process | Model | Mapping[str, Process | Model] | None
 ) -> Process | Model | None:
     if not isinstance(model, Mapping):
         return model
-    if channel.name not in model:
-        raise InputError(f"no model is given for channel {channel.name!r}: add one to the mapping")
-    return model[channel.name]
+    if name not in model:
+        raise InputError(f"no model is given for channel {name!r}: add one to the mapping")
+    return model[name]
 
 
-def _channel_fit(channel: Channel, model: Process | Model | None) -> Fit:
-    wv = wavelet_variance(channel)
-    return select(wv).fit if model is None else fit(model, wv)
+def _channel_fit(channels: Sequence[Channel], model: Process | Model | None) -> Fit:
+    parts = [wavelet_variance(channel) for channel in channels]
+    data = parts[0] if len(parts) == 1 else parts
+    return select(data).fit if model is None else fit(model, data)

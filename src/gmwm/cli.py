@@ -43,7 +43,8 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("files", metavar="FILE...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
 @_output_option("gmwm-out")
 @click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column.")
 @click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ...")
@@ -55,7 +56,7 @@ def cli() -> None:
               help="Time column by name or number; 'none' to ignore it.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
-    file: Path,
+    files: tuple[Path, ...],
     output: Path,
     rate: float | None,
     gyro_unit: str | None,
@@ -64,16 +65,18 @@ def calibrate(
     time_column: str | None,
     jobs: int,
 ) -> None:
-    """Calibrate every channel of a static recording.
+    """Calibrate every channel of a static recording, or of several of one sensor.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
     Empty fields, NaN and rows that the time column jumps over are missing samples.
     For each channel an error model is selected and estimated; the table shows it in the units of
-    the field, the files hold everything in SI units.
+    the field, the files hold everything in SI units. Several recordings of one sensor have one
+    model, with a test whether they agree.
 
     \b
-    Example:
+    Examples:
       gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
+      gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm.calibration import calibrate as run
     from gmwm.files import output_folder
@@ -81,11 +84,12 @@ def calibrate(
 
     folder = output_folder(output)
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    recording = read(
-        file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column)
-    )
-    with _progress(recording, "calibrating") as progress:
-        result = run(recording, jobs=jobs, progress=progress)
+    recordings = [
+        read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
+        for file in files
+    ]
+    with _progress(recordings[0], "calibrating") as progress:
+        result = run(recordings, jobs=jobs, progress=progress)
     # The files first: who pipes the table into head must not lose them.
     written = _write(result, folder)
     _show(result)
@@ -203,6 +207,7 @@ def _progress(recording: Recording, what: str) -> Iterator[Progress]:
 
 
 def _show(result: Calibration) -> None:
+    from gmwm.estimate.joint import JointFit
     from gmwm.report.page import duration_text
 
     console = _console()
@@ -217,6 +222,8 @@ def _show(result: Calibration) -> None:
     for name, why in result.skipped.items():
         console.print(f"- {name} skipped: {why}", highlight=False)
     for name, fit in result.fits.items():
+        if isinstance(fit, JointFit):
+            console.print(f"- {name}: {fit.agreement}", highlight=False)
         for remark in fit.remarks:
             console.print(f"- {name}: {remark}", highlight=False)
 

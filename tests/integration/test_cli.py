@@ -113,12 +113,17 @@ def test_example_of_calibrate_works(run, tmp_path):
     # The very line that the help shows, on a file of that name.
     rng = np.random.default_rng(0)
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xy"]
-    write_csv(tmp_path / "static.csv", {name: rng.normal(size=500) for name in names})
+    for name in ("static", "a", "b"):
+        columns = {name: rng.normal(size=500) for name in names}
+        write_csv(tmp_path / f"{name}.csv", columns)
     shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
-    (line,) = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
-    code, _, told = run(*line.split())
-    assert code == 0, told
-    assert (tmp_path / "out" / "calibration.json").exists()
+    lines = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
+    assert len(lines) == 2
+    for line in lines:
+        code, printed, told = run(*line.split())
+        assert code == 0, told
+        assert ("2 recordings" in printed) == ("b.csv" in line)
+        assert "calibration.json" in printed
 
 
 def test_version(run):

@@ -396,3 +396,55 @@ def test_damaged_files(calibration, tmp_path, place, value):
     path = tmp_path / "cal.json"
     path.write_text(json.dumps(content))
     refused(path)
+
+
+def repeated(seeds, model=None, n=20_000):
+    truth = gmwm.WhiteNoise(1e-3) + gmwm.GaussMarkov(1e-3, 0.5)
+    return [
+        gmwm.Recording.from_arrays(
+            {"gyro_x": (model or truth).simulate(n, 0.01, seed)},
+            rate=100.0,
+            units={"gyro": "rad/s"},
+            source=f"rec{seed}",
+        )
+        for seed in seeds
+    ]
+
+
+def test_several_recordings_have_one_model_with_a_test_of_equality(tmp_path):
+    calibration = gmwm.calibrate(repeated([1, 2, 3]))
+    fit = calibration["gyro_x"]
+    assert len(fit.parts) == 3
+    assert fit.equality_p > 0.001
+    assert calibration.n == 60_000
+    assert calibration.source == "rec1, rec2, rec3"
+    again = gmwm.load(calibration.save(tmp_path / "cal.json"))["gyro_x"]
+    assert again.params == fit.params
+    assert again.equality_p == fit.equality_p
+    np.testing.assert_allclose(again.wv.covariance, fit.wv.covariance)
+    assert str(again) == str(fit)
+    assert "Gauss-Markov" in calibration.report(tmp_path / "r.html").read_text()
+
+
+def test_a_channel_dead_in_one_recording_is_taken_from_the_others():
+    first, second = repeated([1, 2])
+    dead = gmwm.Recording.from_arrays(
+        {"gyro_x": np.ones(20_000)}, rate=100.0, units={"gyro": "rad/s"}, source="dead"
+    )
+    calibration = gmwm.calibrate([dead, first, second])
+    assert len(calibration["gyro_x"].parts) == 2
+    assert calibration.skipped == {}
+
+
+def test_recordings_of_other_rates_are_refused():
+    first = repeated([1])[0]
+    other = gmwm.Recording.from_arrays(
+        {"gyro_x": np.random.default_rng(1).standard_normal(5000)},
+        rate=50.0,
+        units={"gyro": "rad/s"},
+        source="slow",
+    )
+    with pytest.raises(gmwm.InputError, match="slow has 50 Hz and rec1 100 Hz"):
+        gmwm.calibrate([first, other])
+    with pytest.raises(gmwm.InputError, match="no recording"):
+        gmwm.calibrate([])

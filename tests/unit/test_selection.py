@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Sinusoid, WhiteNoise
 from gmwm.selection import describe
 
 
@@ -54,8 +54,9 @@ def test_ranking_is_sorted_and_printed():
     criteria = [item.criterion for item in selection if "ramp" not in describe(item.model)]
     assert criteria == sorted(criteria)
     lines = str(selection).splitlines()
-    assert lines[0].split() == ["difference", "objective", "parameters", "model"]
+    assert lines[0].split() == ["difference", "objective", "p-value", "parameters", "model"]
     assert sum(line.startswith(">") for line in lines) == 1
+    assert max(map(len, lines)) <= 100
     assert selection[0].model in [item.model for item in selection]
 
 
@@ -72,3 +73,51 @@ def test_limit_on_gauss_markov_terms():
     assert all(describe(item.model).count("2 Gauss-Markov") == 0 for item in selection)
     with pytest.raises(gmwm.InputError, match="from 0 to 5"):
         gmwm.select(x, dt=1.0, max_gauss_markov=6)
+
+
+def test_a_line_is_taken_where_there_is_one():
+    noise = WhiteNoise(1.0) + GaussMarkov(0.5, 100.0)
+    line = Sinusoid(frequency=0.013)
+    with_line = (noise + Sinusoid(0.3, 0.013)).simulate(50_000, 1.0, 1)
+    assert describe(gmwm.select(with_line, dt=1.0, extra=[line]).model) == (
+        "white noise + sinusoid + Gauss-Markov"
+    )
+    without = noise.simulate(50_000, 1.0, 1)
+    selection = gmwm.select(without, dt=1.0, extra=[line])
+    assert describe(selection.model) == "white noise + Gauss-Markov"
+
+
+def test_an_extra_term_must_have_a_shape():
+    x = gmwm.simulate(WhiteNoise(1.0), 100, 1.0, 1)
+    for extra in (Sinusoid(), Sinusoid(1.0, 0.1), RateRamp()):
+        with pytest.raises(gmwm.InputError, match="leave its amplitude open"):
+            gmwm.select(x, dt=1.0, extra=[extra])
+
+
+def test_criteria_and_ties():
+    selection = gmwm.select(gmwm.simulate(WhiteNoise(1.0), 5000, 1.0, 1), dt=1.0)
+    assert selection.chosen.wic == selection.chosen.objective + 2 * selection.chosen.n_parameters
+    assert 0.0 < selection.chosen.p_value < 1.0
+    assert selection.chosen in selection.ties
+    smallest = min(selection.ties, key=lambda item: item.n_parameters)
+    assert selection.chosen.n_parameters == smallest.n_parameters
+
+
+def test_several_recordings_have_one_model():
+    truth = WhiteNoise(1.0) + GaussMarkov(0.3, 60.0) + GaussMarkov(0.3, 1500.0)
+    rng = np.random.default_rng(3)
+    parts = [truth.simulate(n, 1.0, rng) for n in (60_000, 50_000, 80_000)]
+    selection = gmwm.select(parts, dt=1.0)
+    assert describe(selection.model) == "white noise + 2 Gauss-Markov"
+    assert len(selection.fit.parts) == 3
+
+
+def test_no_random_walk_is_invented():
+    """White noise of 3 h at 100 Hz: K is none, or its interval goes down to zero."""
+    truth = WhiteNoise(0.005)
+    held = 0
+    for seed in range(20):
+        fit = gmwm.fit(WhiteNoise() + RandomWalk(), truth.simulate(1_080_000, 0.01, seed), dt=0.01)
+        held += fit.interval()["K"][0] == 0.0
+    # 5 % of the bounds may fail: at least 16 of 20 hold in all but 0.3 % of cases.
+    assert held >= 16

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -37,18 +37,23 @@ class JointFit(Fit):
 
     parts: tuple[Fit, ...] = ()
     equality_p: float = float("nan")
-    spread: dict[str, float] | None = None
+    spread: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        lines = [super().__str__(), "", f"{len(self.parts)} recordings"]
-        if np.isfinite(self.equality_p):
-            lines[-1] += f", equality of the parameters: p = {self.equality_p:.2g}"
-        spread = self.spread or {}
+        lines = [super().__str__(), "", self.agreement]
         lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
         for key in self.keys:
             values = " ".join(f"{part.params.get(key, np.nan):>10.4g}" for part in self.parts)
-            lines.append(f"{key:<20} {self._spread_text(key, spread.get(key)):>8} {values}")
+            lines.append(f"{key:<20} {self._spread_text(key, self.spread.get(key)):>8} {values}")
         return "\n".join(lines)
+
+    @property
+    def agreement(self) -> str:
+        """How many recordings there are, and whether they agree."""
+        said = f"{len(self.parts)} recordings"
+        if np.isfinite(self.equality_p):
+            said += f", equality of the parameters: p = {self.equality_p:.2g}"
+        return said
 
     def _spread_text(self, key: str, value: float | None) -> str:
         if value is None:
@@ -67,6 +72,21 @@ class JointFit(Fit):
             "equality_p": None if np.isnan(self.equality_p) else self.equality_p,
             "spread": self.spread,
         }
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> JointFit:
+        """Inverse of `to_dict`."""
+        whole = Fit.from_dict(content)
+        parts = tuple(Fit.from_dict(part) for part in content["parts"])
+        p_value = content["equality_p"]
+        values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
+        values["wv"] = PooledVariance.of([part.wv for part in parts])
+        return cls(
+            **values,
+            parts=parts,
+            equality_p=float("nan") if p_value is None else p_value,
+            spread=dict(content["spread"]),
+        )
 
 
 def fit_joint(

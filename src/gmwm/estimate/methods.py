@@ -137,7 +137,7 @@ def fit(
     model = as_model(model)
     if not model.is_open:
         raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
-    if _are_several(data):
+    if are_several(data):
         if method not in _OF_SEVERAL:
             known = ", ".join(_OF_SEVERAL)
             raise InputError(f"method = {method!r} takes one recording at a time: take {known}")
@@ -154,7 +154,7 @@ def fit(
     return _OF_SAMPLES[method](model, channel, **given)
 
 
-def _are_several(data: Data | Sequence[Data]) -> bool:
+def are_several(data: Data | Sequence[Data]) -> bool:
     """Whether it is a list of recordings; one of numbers is a series."""
     if not isinstance(data, list | tuple):
         return False

@@ -1,0 +1,252 @@
+"""Candidate models under common weights, ranked by an information criterion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.design import Design
+from gmwm.estimate.profile import Point, Profile, weight_root
+from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
+from gmwm.estimate.scales import Scales
+from gmwm.estimate.start import Reference, dictionary_fit, search
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+)
+from gmwm.variance.pooled import PooledVariance
+from gmwm.variance.wavelet import WaveletVariance
+
+MAX_GAUSS_MARKOV = 5
+
+_USELESS = 1.0  # a Gauss-Markov that lowers the objective by less ends the search for more
+_STRICTNESS = 1.5  # c of Hannan & Quinn; consistent above 1
+_RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
+_RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
+_RAMP_ROUNDS = 3
+_FITS = 5  # candidates without a ramp whose own noise prices the slope
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a model may be made of.
+
+    Attributes
+    ----------
+    max_gauss_markov : int
+        Largest number of Gauss-Markov terms.
+    extra : tuple of Process
+        Further terms of open amplitude and given shape, each of which a candidate may have.
+    """
+
+    max_gauss_markov: int = MAX_GAUSS_MARKOV
+    extra: tuple[Process, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.max_gauss_markov <= MAX_GAUSS_MARKOV:
+            raise InputError(
+                f"max_gauss_markov = {self.max_gauss_markov!r}: give a number from 0 to "
+                f"{MAX_GAUSS_MARKOV}"
+            )
+        for process in self.extra:
+            linear = process.linear_parameter
+            shape = [process.values[p.name] for p in process.shape_parameters]
+            if linear is None or process.values[linear.name] is not None or None in shape:
+                raise InputError(
+                    f"extra = {process!r}: give its shape and leave its amplitude open, as in "
+                    "Sinusoid(frequency=0.5)"
+                )
+
+    def bases(self) -> Iterator[tuple[Process, ...]]:
+        """All sums of the terms whose shape is given, the empty one first."""
+        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        for chosen in product((False, True), repeat=len(kinds)):
+            yield tuple(kind for kind, on in zip(kinds, chosen, strict=True) if on)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model of the ranking.
+
+    Attributes
+    ----------
+    model : Model
+        With open parameters.
+    criterion : float
+        Objective plus ``3 p ln ln n``; less is better.
+    objective : float
+        Weighted sum of squares under weights common to all candidates.
+    n_parameters : int
+    dof : int
+        Moments less parameters.
+    """
+
+    model: Model
+    criterion: float
+    objective: float
+    n_parameters: int
+    dof: int
+
+    @property
+    def wic(self) -> float:
+        """Wavelet information criterion, objective + 2 tr{cov(nu_hat, nu) Omega}.
+
+        Under the inverse covariance as weights, the trace is the number of parameters. It is an
+        estimate of the error of prediction, and chooses more terms than ``criterion``.
+        """
+        return self.objective + 2.0 * self.n_parameters
+
+    @property
+    def p_value(self) -> float:
+        """Chi-square probability of an objective as large; NaN without degrees of freedom."""
+        return float(chi2.sf(self.objective, self.dof)) if self.dof > 0 else float("nan")
+
+
+def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
+    """All candidates, best first.
+
+    Parameters
+    ----------
+    wv : WaveletVariance
+        Of one recording, or pooled of several; a drift is sought in one recording only.
+    choices : Choices
+    """
+    reference = dictionary_fit(wv, wv.variance)
+    allowed = reference.discrepancy
+    plain = _candidates(wv, wv.variance, reference.weights(wv.variance, allowed), choices)
+    plain.sort(key=lambda item: item[0].criterion)
+    if isinstance(wv, PooledVariance):
+        return [candidate for candidate, _ in plain]
+    slope = _slope_under(plain[0], wv)
+    without = slope.value**2 / slope.variance
+    ramped: list[Candidate] = []
+    if without > _RAMP_PLAUSIBLE:
+        target, drift_free = _drift_free(wv, slope)
+        if drift_free.discrepancy < allowed:
+            # Both kinds must be compared under the same allowance.
+            allowed = drift_free.discrepancy
+            weights = reference.weights(wv.variance, allowed)
+            plain = _candidates(wv, wv.variance, weights, choices)
+        found = _candidates(wv, target, drift_free.weights(target, allowed), choices)
+        ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
+    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+
+
+def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
+    """Generalized least-squares slope under the noise of a candidate."""
+    candidate, point = item
+    design = Design(candidate.model, Scales.of(wv))
+    return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+
+
+def _drift_free(wv: WaveletVariance, slope: Slope) -> tuple[FloatArray, Reference]:
+    """Wavelet variances without the drift, and the mixture fitted to them.
+
+    Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
+    estimated again under the mixture that is left.
+    """
+    for _ in range(_RAMP_ROUNDS):
+        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        reference = dictionary_fit(wv, target)
+        slope = gls_slope(wv, reference.mixture.psd)
+    return target, reference
+
+
+def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
+    return Candidate(
+        candidate.model + RateRamp(),
+        candidate.criterion + penalty,
+        candidate.objective,
+        candidate.n_parameters + 1,
+        candidate.dof,  # the slope is a moment of its own
+    )
+
+
+def _without_ramp(
+    plain: list[tuple[Candidate, Point]], wv: WaveletVariance, squared_slope: float
+) -> list[Candidate]:
+    """Candidates that pay the squared slope over its variance: under their own noise, if good."""
+    result = []
+    for rank, item in enumerate(sorted(plain, key=lambda item: item[0].criterion)):
+        price = squared_slope
+        if squared_slope > _RAMP_PLAUSIBLE and rank < _FITS:
+            slope = _slope_under(item, wv)
+            price = slope.value**2 / slope.variance
+        candidate = item[0]
+        result.append(
+            replace(
+                candidate,
+                criterion=candidate.criterion + price,
+                objective=candidate.objective + price,
+            )
+        )
+    return result
+
+
+def rank_key(candidate: Candidate) -> float:
+    ramped = any(isinstance(term, RateRamp) for term in candidate.model.terms)
+    return candidate.criterion + (_RAMP_MARGIN if ramped else 0.0)
+
+
+def _penalty(n: int) -> float:
+    """Price of a parameter: 2 c ln ln n."""
+    return 2.0 * _STRICTNESS * float(np.log(np.log(n)))
+
+
+def _candidates(
+    wv: WaveletVariance, target: FloatArray, weights: FloatArray, choices: Choices
+) -> list[tuple[Candidate, Point]]:
+    """All sums whose terms come out positive, each started from the one with one term less."""
+    root = weight_root(weights)
+    penalty = _penalty(wv.n)
+    found = []
+    for base in choices.bases():
+        shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
+        before = np.inf
+        for g in range(choices.max_gauss_markov + 1):
+            if not base and g == 0:
+                continue
+            model = Model((*base, *(GaussMarkov() for _ in range(g))))
+            design = Design(model, Scales.of(wv))
+            if design.n_free >= wv.tau.size:
+                break
+            if g:
+                shapes.append(None)
+            point = search(Profile(design, target, root), shapes)
+            shapes = list(point.shapes)
+            if np.any(point.x <= 0.0) or before - point.objective < _USELESS:
+                if g:
+                    break
+                before = point.objective
+                continue
+            before = point.objective
+            criterion = point.objective + penalty * design.n_free
+            candidate = Candidate(
+                model, criterion, point.objective, design.n_free, wv.tau.size - design.n_free
+            )
+            found.append((candidate, point))
+    return found or [_fallback(wv, target, root)]
+
+
+def _fallback(wv: WaveletVariance, target: FloatArray, root: FloatArray) -> tuple[Candidate, Point]:
+    """White noise alone, for records too short for anything else."""
+    model = Model((WhiteNoise(),))
+    design = Design(model, Scales.of(wv))
+    point = search(Profile(design, target, root))
+    criterion = point.objective + _penalty(wv.n)
+    return Candidate(model, criterion, point.objective, 1, wv.tau.size - 1), point
+
+
+def _given_shape(process: Process) -> tuple[float, ...]:
+    return tuple(float(process.values[p.name] or 0.0) for p in process.shape_parameters)
