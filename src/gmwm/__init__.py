@@ -14,8 +14,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gmwm.budget import ErrorBudget, ErrorRow
     from gmwm.calibration import Calibration, calibrate, load
+    from gmwm.coasting import error_budget
     from gmwm.errors import InputError
+    from gmwm.estimate.bootstrap import Bootstrap, bootstrap, bootstrap_test
     from gmwm.estimate.bounds import CramerRao, cramer_rao
     from gmwm.estimate.fit import Fit
     from gmwm.estimate.methods import fit
@@ -51,8 +54,11 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    **dict.fromkeys(("ErrorBudget", "ErrorRow"), "budget"),
     **dict.fromkeys(("Calibration", "calibrate", "load"), "calibration"),
+    "error_budget": "coasting",
     "InputError": "errors",
+    **dict.fromkeys(("Bootstrap", "bootstrap", "bootstrap_test"), "estimate.bootstrap"),
     **dict.fromkeys(("CramerRao", "cramer_rao"), "estimate.bounds"),
     "Fit": "estimate.fit",
     "fit": "estimate.methods",
@@ -95,10 +101,13 @@ __all__ = [
     "ARMA",
     "MA",
     "BiasInstability",
+    "Bootstrap",
     "Calibration",
     "Channel",
     "CramerRao",
     "Deviations",
+    "ErrorBudget",
+    "ErrorRow",
     "Fit",
     "GaussMarkov",
     "InputError",
@@ -117,9 +126,12 @@ __all__ = [
     "StateSpace",
     "WaveletVariance",
     "WhiteNoise",
+    "bootstrap",
+    "bootstrap_test",
     "calibrate",
     "cramer_rao",
     "deviations",
+    "error_budget",
     "fit",
     "haar_covariance",
     "imodwt",
