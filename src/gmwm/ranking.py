@@ -122,7 +122,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
         Of one recording, or pooled of several; a drift is sought in one recording only.
     choices : Choices
     """
-    reference = dictionary_fit(wv, wv.variance)
+    reference = dictionary_fit(wv, wv.variance, choices.extra)
     allowed = reference.discrepancy
     plain = _candidates(wv, wv.variance, reference.weights(wv.variance, allowed), choices)
     plain.sort(key=lambda item: item[0].criterion)
@@ -132,7 +132,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
     if without > _RAMP_PLAUSIBLE:
-        target, drift_free = _drift_free(wv, slope)
+        target, drift_free = _drift_free(wv, slope, choices)
         if drift_free.discrepancy < allowed:
             # Both kinds must be compared under the same allowance.
             allowed = drift_free.discrepancy
@@ -150,7 +150,9 @@ def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
     return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
 
 
-def _drift_free(wv: WaveletVariance, slope: Slope) -> tuple[FloatArray, Reference]:
+def _drift_free(
+    wv: WaveletVariance, slope: Slope, choices: Choices
+) -> tuple[FloatArray, Reference]:
     """Wavelet variances without the drift, and the mixture fitted to them.
 
     Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
@@ -158,7 +160,7 @@ def _drift_free(wv: WaveletVariance, slope: Slope) -> tuple[FloatArray, Referenc
     """
     for _ in range(_RAMP_ROUNDS):
         target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
-        reference = dictionary_fit(wv, target)
+        reference = dictionary_fit(wv, target, choices.extra)
         slope = gls_slope(wv, reference.mixture.psd)
     return target, reference
 

@@ -159,7 +159,9 @@ def dictionary_fit(
     ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
     first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
-    # Lines are left out: a comb of them follows anything, and has no spectrum to weight with.
+    # Lines to be found are left out: a comb of them follows anything. Those at given frequencies
+    # follow one thing only, which no other process can.
+    lines = tuple(p for p in extra if isinstance(p, Sinusoid) and p.frequency is not None)
     # Simulated processes are too: they take their time, and the mixture does without them.
     left_out = (Sinusoid, SimulatedProcess)
     kinds = {type(process): process for process in extra if not isinstance(process, left_out)}
@@ -171,6 +173,7 @@ def dictionary_fit(
         GaussMarkov(),
     )
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
+    processes += tuple(line.with_values(amplitude=None) for line in lines)
     design = Design(Model(processes), Scales.of(wv))
     atoms = [
         (i, shape)
@@ -193,7 +196,8 @@ def dictionary_fit(
                 f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
                 "line or a pattern): check the data"
             )
-        covariance = wv.covariance_under(Model(tuple(mixture)).psd)
+        whole = Model(tuple(mixture))
+        covariance = wv.covariance_under(whole.psd, whole.lines())
     return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
 
 
