@@ -27,9 +27,9 @@ BOUNDS = {
     "sigma2_3": {"table4": 0.00185},
 }
 STUDIES = {
-    "table2": (TABLE_2, ["GMWM", "EM*", "AV"], 100),
-    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 100),
-    "table4": (TABLE_4, ["GMWM"], 20),
+    "table2": (TABLE_2, ["GMWM", "EM*", "AV"], 60),
+    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 60),
+    "table4": (TABLE_4, ["GMWM"], 12),
 }
 CASES = [(study, name) for name, by_study in BOUNDS.items() for study in by_study]
 # 48 correlation times in the record: maximum likelihood is above the bound, too.
@@ -123,14 +123,28 @@ def test_study_at_full_length(tmp_path, scenario, runs):
     table = run_scenario(scenario, tmp_path, runs=runs, methods=["GMWM", efficient], jobs=2)
     summary = summarise(scenario, table, 0)
     print(summary)
-    assert summary.invalid["GMWM"] <= 1 + runs // 200
-    chance = 1.0 + 2.0 / np.sqrt(2.0 * runs)
+    # Of five Gauss-Markov terms, one is not significant in some records, which the fit says.
+    assert summary.invalid["GMWM"] <= (runs // 10 if scenario is FIVE else 1 + runs // 200)
     for quantity in scenario.quantities:
         moments = summary.scores[quantity.name, "GMWM"]
         best = summary.scores[quantity.name, efficient]
-        assert moments.relative <= 1.1 * best.relative
+        assert moments.missing == best.missing == 0
+        truth = scenario.true_value(quantity)
+        chance = [
+            1.0 + 2.0 * relative_error_of_rmse(column(table, method, quantity.name) / truth - 1.0)
+            for method in ("GMWM", efficient)
+        ]
         if scenario is FIVE:
-            assert moments.moment_ratio <= 1.1 * chance
-            assert best.ratio <= 1.1 * chance
-        elif scenario is not TABLE_3:
-            assert moments.ratio <= 1.05 * chance
+            assert moments.moment_ratio <= 1.1 * chance[0]
+            assert best.ratio <= 1.1 * chance[1]
+        elif scenario is TABLE_3:
+            # At long averaging times coefficients free of end effects are fewer than samples.
+            assert moments.relative <= 1.08 * best.relative
+        else:
+            assert moments.ratio <= 1.05 * chance[0]
+
+
+def relative_error_of_rmse(error):
+    """Standard error of a root mean square over it, skewed errors included."""
+    square = error**2
+    return np.std(square, ddof=1) / np.sqrt(square.size) / (2.0 * np.mean(square))
