@@ -1,4 +1,4 @@
-"""Interactive deviation plots, as the JSON that plotly.js draws."""
+"""Interactive plots, as the JSON that plotly.js draws."""
 
 from __future__ import annotations
 
@@ -6,11 +6,25 @@ from typing import Any
 
 import numpy as np
 
+from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.estimate.fit import Fit
 from gmwm.plot import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
 from gmwm.units import field_units
 
 _GRID = "#dddddd"
+_LAYOUT: dict[str, Any] = {
+    "margin": {"l": 75, "r": 15, "t": 36, "b": 50},
+    "height": 420,
+    "plot_bgcolor": "#ffffff",
+    "paper_bgcolor": "#ffffff",
+    "hovermode": "closest",
+    "font": {"family": "system-ui, sans-serif", "size": 13},
+}
+_CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "modeBarButtonsToRemove": ["lasso2d", "select2d"],
+}
 
 
 def deviation_figure(fitted: Fit) -> dict[str, Any]:
@@ -59,25 +73,48 @@ def deviation_figure(fitted: Fit) -> dict[str, Any]:
     )
     low, high = deviation_range(np.concatenate([total, value]))
     layout = {
+        **_LAYOUT,
         "xaxis": _axis("averaging time [s]"),
         "yaxis": {
             **_axis(f"Allan deviation [{unit}]"),
             "range": [float(np.log10(low)), float(np.log10(high))],
         },
-        "margin": {"l": 75, "r": 15, "t": 36, "b": 50},
-        "height": 420,
         "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 1, "xanchor": "right", "y": 1},
-        "plot_bgcolor": "#ffffff",
-        "paper_bgcolor": "#ffffff",
-        "hovermode": "closest",
-        "font": {"family": "system-ui, sans-serif", "size": 13},
     }
-    config = {
-        "displaylogo": False,
-        "responsive": True,
-        "modeBarButtonsToRemove": ["lasso2d", "select2d"],
+    return {"data": traces, "layout": layout, "config": _CONFIG}
+
+
+def growth_figure(
+    known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str
+) -> dict[str, Any]:
+    """Growth of an error with coasting time: its parts, their total, and that of unknown starts.
+
+    Returns
+    -------
+    dict
+        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
+    """
+    unit, times = FIELD_UNITS[quantity], list(known.grid)
+    curves = known.curves(of, quantity)
+    traces = [
+        _line(times, curve, label, colour, "dash", 1.5)
+        for (label, curve), colour in zip(curves.items(), _colours(len(curves)), strict=True)
+    ]
+    for budget, label, dash, width in (
+        (known, "total, slow errors known", "solid", 3.0),
+        (unknown, "total, nothing known", "dot", 2.0),
+    ):
+        parts = list(budget.curves(of, quantity).values())
+        if parts:
+            traces.append(_line(times, root_sum(parts), label, SUM_COLOUR, dash, width))
+    title = f"{of} {quantity} error, 1 sigma [{unit}]"
+    layout = {
+        **_LAYOUT,
+        "xaxis": _axis("coasting time [s]"),
+        "yaxis": _axis(title[0].upper() + title[1:]),
+        "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 0, "y": 1},
     }
-    return {"data": traces, "layout": layout, "config": config}
+    return {"data": traces, "layout": layout, "config": _CONFIG}
 
 
 def _line(

@@ -12,6 +12,7 @@ from gmwm.calibration import Calibration
 from gmwm.estimate.fit import Fit
 from gmwm.files import written
 from gmwm.report.figure import deviation_figure
+from gmwm.report.navigation import navigation
 from gmwm.selection import describe
 from gmwm.summary import floor, sentence, white_density
 from gmwm.units import field_units
@@ -54,6 +55,7 @@ def page(calibration: Calibration) -> str:
         version=gmwm.__version__,
         length=duration_text(calibration.duration),
         channels=[_channel(name, fit) for name, fit in calibration.fits.items()],
+        navigation=navigation(calibration),
         plotly_js=get_plotlyjs(),
     )
 

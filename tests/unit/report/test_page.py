@@ -11,13 +11,24 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import Channel, InputError, QuantizationNoise, RandomWalk, Recording, WhiteNoise
+from gmwm import (
+    Channel,
+    InputError,
+    Parameter,
+    QuantizationNoise,
+    RandomWalk,
+    Recording,
+    SimulatedProcess,
+    WhiteNoise,
+)
 from gmwm.report import write_report
 from gmwm.report.figure import deviation_figure
+from gmwm.report.navigation import navigation
 from gmwm.report.page import duration_text, number, page
 
 DT = 0.01
 VOID = {"meta", "link", "br", "img", "input", "hr"}
+NAVIGATION = 'Plotly.newPlot("plot-navigation", '
 
 
 class Page(HTMLParser):
@@ -67,13 +78,21 @@ class Page(HTMLParser):
         return " ".join("".join(self.texts).split())
 
     def figures(self):
-        """What is given to plotly, as strict JSON."""
+        """The channels' figures, as given to plotly, in strict JSON; see `navigation_figure`."""
+        return [self._figure(script) for script in self.scripts[1:] if NAVIGATION not in script]
+
+    def navigation_figure(self):
+        (script,) = [script for script in self.scripts[1:] if NAVIGATION in script]
+        return self._figure(script)
+
+    @staticmethod
+    def _figure(script):
 
         def refuse(constant):
             raise AssertionError(f"{constant} in a figure")
 
-        bodies = [re.search(r"var figure = (.*);\n", script) for script in self.scripts[1:]]
-        return [json.loads(body.group(1), parse_constant=refuse) for body in bodies]
+        body = re.search(r"var figure = (.*);\n", script)
+        return json.loads(body.group(1), parse_constant=refuse)
 
 
 def channel(name, values, quantity):
@@ -145,11 +164,12 @@ def test_plotly_is_inside(parsed):
 
 def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
-    assert headings == list(calibration)
+    assert headings == ["navigation", *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
     assert links == [f"#{name}" for name in calibration]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
-    assert len(plots) == len(parsed.scripts) - 1 == len(calibration)
+    assert len(plots) == len(parsed.scripts) - 1 == len(calibration) + 1
+    assert len(set(plots)) == len(plots)
     for name, script in zip(plots, parsed.scripts[1:], strict=True):
         assert f'Plotly.newPlot("{name}", ' in script
 
@@ -176,7 +196,7 @@ def test_valid_and_not_valid(calibration):
     for valid in (True, False):
         fits = {name: replace(fit, valid=valid) for name, fit in calibration.fits.items()}
         shown = Page(page(replace(calibration, fits=fits)))
-        verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits}
+        verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 5}
         assert verdicts == dict.fromkeys(fits, "valid" if valid else "not valid")
 
 
@@ -220,6 +240,81 @@ def test_upper_bounds_are_shown_as_such(parsed, calibration):
 def test_fitness_is_told(parsed, calibration):
     fit = calibration["gyro_x"]
     assert f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom" in parsed.text
+
+
+# -- what it means for navigation -----------------------------------------------------------------
+
+
+def test_the_error_budget_is_in_the_report(parsed, calibration):
+    times = [1.0, 10.0, 60.0, 600.0]
+    rows = [row for row in parsed.cells if row[:1] == ["horizontal position"]]
+    for row, calibrated in zip(rows, (True, False), strict=True):
+        total = gmwm.error_budget(calibration, times, calibrated=calibrated).total()["position"]
+        shown = [float(cell.replace(",", "")) for cell in row[1:5]]
+        assert shown == pytest.approx(total, rel=6e-3)
+        assert row[5] == "m"
+        assert re.fullmatch(r"gyro_x .*, \d+ %", row[6])
+    head = next(row for row in parsed.cells if row[0] == "error after coasting for (1 sigma)")
+    assert head[1:5] == ["1 s", "10 s", "60 s", "600 s"]
+
+
+def test_every_term_of_the_error_budget_is_listed(parsed, calibration):
+    budget = gmwm.error_budget(calibration)
+    shown = [tuple(row[:3]) for row in parsed.cells if len(row) == 8 and row[0] in calibration]
+    assert shown == [(r.channel, r.component, r.quantity) for r in budget.rows if any(r.values)]
+
+
+def test_the_notes_of_the_error_budget(parsed, calibration):
+    notes = gmwm.error_budget(calibration).notes
+    assert notes, "the fixture must have some"
+    for note in notes:
+        assert f"{note[0].upper()}{note[1:]}." in parsed.text
+
+
+def test_the_headline_of_a_minute(parsed, calibration):
+    budgets = [gmwm.error_budget(calibration, [60.0], calibrated=c) for c in (True, False)]
+    metres = [budget.total()["position"][0] for budget in budgets]
+    sentence = re.search(r"A minute without aiding costs .*? of them\.", parsed.text).group()
+    found = re.findall(r"([\d.,]+) m of horizontal position", sentence)
+    assert [float(text.replace(",", "")) for text in found] == pytest.approx(metres, rel=6e-3)
+
+
+def test_the_growth_figure(parsed, calibration):
+    figure = parsed.navigation_figure()
+    names = [trace["name"] for trace in figure["data"]]
+    assert names == ["gyro_x", "accel_x", "total, slow errors known", "total, nothing known"]
+    assert figure["layout"]["yaxis"]["title"]["text"] == "Horizontal position error, 1 sigma [m]"
+    for trace, calibrated in zip(figure["data"][2:], (True, False), strict=True):
+        total = gmwm.error_budget(calibration, calibrated=calibrated).total()["position"]
+        assert [trace["y"][0], trace["y"][-1]] == pytest.approx(total[[0, -1]], rel=1e-5)
+
+
+def test_without_inertial_sensors_nothing_is_said_of_navigation(calibration):
+    fits = {"voltage": calibration["voltage"]}
+    shown = Page(page(replace(calibration, fits=fits)))
+    assert [a.get("id") for t, a in shown.elements if t == "h2"] == ["voltage"]
+
+
+def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
+    fits = {"gyro": calibration["gyro_x"]}
+    shown = Page(page(replace(calibration, fits=fits)))
+    names = [row[0] for row in shown.cells if row[:1] and row[0].startswith("gyro ")]
+    assert names[:3] == ["gyro attitude", "gyro velocity", "gyro position"]
+    assert "A minute without" not in shown.text
+
+
+def test_a_term_without_a_budget_is_told(calibration):
+    fit = calibration["gyro_x"]
+    odd = replace(fit, model=fit.model + OnlySimulated(1.0))
+    content = navigation(replace(calibration, fits={"gyro_x": odd}))
+    assert content["problem"].startswith("OnlySimulated is known by simulation only")
+
+
+class OnlySimulated(SimulatedProcess):
+    parameters = (Parameter("level", "u"),)
+
+    def _draw(self, n, dt, rng):
+        return self.level * rng.standard_normal(n)
 
 
 # -- figures --------------------------------------------------------------------------------------
@@ -294,13 +389,14 @@ def test_names_are_text_not_markup(calibration):
         notes=(f"note {HOSTILE}",),
     )
     shown = Page(page(hostile))
-    assert len(shown.scripts) == 2
+    assert len(shown.scripts) == 3
     assert shown.count("b") == len(gyro.params)  # those of the table alone
     for words in (f"models of {HOSTILE}", f"skip {HOSTILE}", f"why {HOSTILE}", f"note {HOSTILE}"):
         assert words in shown.text
     assert f"A {HOSTILE}." in shown.text
     headings = [attributes["id"] for tag, attributes in shown.elements if tag == "h2"]
-    assert headings == [HOSTILE]
+    assert headings == ["navigation", HOSTILE]
+    assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == HOSTILE
 
 
 def test_units_are_text_not_markup(calibration):
