@@ -21,6 +21,7 @@ _MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation
 _POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
 _POOR_DOF = 30.0
 _IDLE_P = 0.01
+_CONFOUNDED, _LOOSE = 0.999, 0.1  # correlation, relative standard error
 
 
 def bound_remarks(model: Model, upper: dict[str, float]) -> list[str]:
@@ -68,6 +69,24 @@ def merged_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> l
                 f"two Gauss-Markov terms do not differ significantly ({first} = {a:.3g} s, "
                 f"{second} = {b:.3g} s): use one less"
             )
+    return remarks
+
+
+def confounded_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:
+    """Parameters of which the data know one combination only."""
+    errors = np.sqrt(np.diag(matrix))
+    remarks = []
+    for i, first in enumerate(keys):
+        for j in range(i + 1, len(keys)):
+            if errors[i] == 0.0 or errors[j] == 0.0:
+                continue
+            correlation = matrix[i, j] / (errors[i] * errors[j])
+            loose = errors[j] > _LOOSE * abs(model.params[keys[j]] or 0.0)
+            if abs(correlation) > _CONFOUNDED and loose:
+                remarks.append(
+                    f"{first} and {keys[j]} cannot be told apart (their estimates have a "
+                    f"correlation of {correlation:.5f}): give one of them"
+                )
     return remarks
 
 

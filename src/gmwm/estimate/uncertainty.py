@@ -17,6 +17,7 @@ from gmwm.estimate.profile import Point, weight_root
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
     bound_remarks,
+    confounded_remarks,
     count_remarks,
     idle_remarks,
     merged_remarks,
@@ -99,6 +100,7 @@ def describe(
         *idle_remarks(sub, Point(shapes, x, objective), target, covariance),
         *undetermined_remarks(model, keys, matrix),
         *merged_remarks(model, keys, matrix),
+        *confounded_remarks(model, keys, matrix),
         *count_remarks(design, sub),
     ]
     misfits, poor = misfit(wv, target, implied, covariance, discrepancy)

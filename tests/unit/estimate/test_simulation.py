@@ -148,3 +148,11 @@ def test_likelihoods_refuse_what_has_no_spectrum(series):
             gmwm.fit(BlockBias(hold=8.0), series, dt=1.0, method=method)
     with pytest.raises(gmwm.InputError, match="simulation only"):
         BlockBias(1.0, 8.0).psd(np.ones(1), 1.0)
+
+
+def test_two_parameters_of_one_number_are_said_not_to_be_told_apart(series):
+    """Rounded white noise is white: its variance alone gives no step."""
+    x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 1)
+    fit = gmwm.fit(RoundedNoise(), x, dt=1.0, method="simulated", replications=4)
+    assert not fit.valid
+    assert "sigma and lsb cannot be told apart" in fit.message
