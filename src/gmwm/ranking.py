@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
+from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
 from gmwm.estimate.scales import Scales
@@ -84,9 +85,12 @@ class Candidate:
     model : Model
         With open parameters.
     criterion : float
-        Objective plus ``3 p ln ln n``; less is better.
+        Chi-square plus ``3 p ln ln n``; less is better.
     objective : float
         Weighted sum of squares under weights common to all candidates.
+    chi_square : float
+        The same on cube roots of the wavelet variances, which are close to normal at coarse levels
+        too: a level of few degrees of freedom that is high by chance asks for a term otherwise.
     n_parameters : int
     dof : int
         Moments less parameters.
@@ -95,22 +99,23 @@ class Candidate:
     model: Model
     criterion: float
     objective: float
+    chi_square: float
     n_parameters: int
     dof: int
 
     @property
     def wic(self) -> float:
-        """Wavelet information criterion, objective + 2 tr{cov(nu_hat, nu) Omega}.
+        """Wavelet information criterion, chi-square + 2 tr{cov(nu_hat, nu) Omega}.
 
         Under the inverse covariance as weights, the trace is the number of parameters. It is an
         estimate of the error of prediction, and chooses more terms than ``criterion``.
         """
-        return self.objective + 2.0 * self.n_parameters
+        return self.chi_square + 2.0 * self.n_parameters
 
     @property
     def p_value(self) -> float:
-        """Chi-square probability of an objective as large; NaN without degrees of freedom."""
-        return float(chi2.sf(self.objective, self.dof)) if self.dof > 0 else float("nan")
+        """Probability of a chi-square as large; NaN without degrees of freedom."""
+        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
 
 
 def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
@@ -124,7 +129,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     """
     reference = dictionary_fit(wv, wv.variance, choices.extra)
     allowed = reference.discrepancy
-    plain = _candidates(wv, wv.variance, reference.weights(wv.variance, allowed), choices)
+    plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
     plain.sort(key=lambda item: item[0].criterion)
     if isinstance(wv, PooledVariance):
         return [candidate for candidate, _ in plain]
@@ -136,9 +141,8 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
         if drift_free.discrepancy < allowed:
             # Both kinds must be compared under the same allowance.
             allowed = drift_free.discrepancy
-            weights = reference.weights(wv.variance, allowed)
-            plain = _candidates(wv, wv.variance, weights, choices)
-        found = _candidates(wv, target, drift_free.weights(target, allowed), choices)
+            plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
+        found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
         ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
     return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
 
@@ -166,12 +170,12 @@ def _drift_free(
 
 
 def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
-    return Candidate(
-        candidate.model + RateRamp(),
-        candidate.criterion + penalty,
-        candidate.objective,
-        candidate.n_parameters + 1,
-        candidate.dof,  # the slope is a moment of its own
+    # The slope is a moment of its own: the degrees of freedom stay.
+    return replace(
+        candidate,
+        model=candidate.model + RateRamp(),
+        criterion=candidate.criterion + penalty,
+        n_parameters=candidate.n_parameters + 1,
     )
 
 
@@ -191,6 +195,7 @@ def _without_ramp(
                 candidate,
                 criterion=candidate.criterion + price,
                 objective=candidate.objective + price,
+                chi_square=candidate.chi_square + price,
             )
         )
     return result
@@ -206,12 +211,39 @@ def _penalty(n: int) -> float:
     return 2.0 * _STRICTNESS * float(np.log(np.log(n)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What all candidates are compared on: moments, and their covariance under the mixture."""
+
+    target: FloatArray
+    covariance: FloatArray
+    root: FloatArray
+    basis: FloatArray
+
+    @classmethod
+    def of(cls, target: FloatArray, reference: Reference, discrepancy: float) -> _Ground:
+        covariance = reference.weights(target, discrepancy)
+        return cls(target, covariance, weight_root(covariance), reference.curve)
+
+    def candidate(self, design: Design, point: Point) -> Candidate:
+        implied = design.curves(point.shapes) @ design.amplitudes(point.x)
+        statistic = point.objective
+        if np.all(implied > 0.0) and np.all(self.basis > 0.0):
+            statistic = chi_square(self.target, implied, self.covariance, self.basis)[1]
+        return Candidate(
+            model=design.model,
+            criterion=statistic + _penalty(design.scales.n) * design.n_free,
+            objective=point.objective,
+            chi_square=statistic,
+            n_parameters=design.n_free,
+            dof=self.target.size - design.n_free,
+        )
+
+
 def _candidates(
-    wv: WaveletVariance, target: FloatArray, weights: FloatArray, choices: Choices
+    wv: WaveletVariance, ground: _Ground, choices: Choices
 ) -> list[tuple[Candidate, Point]]:
     """All sums whose terms come out positive, each started from the one with one term less."""
-    root = weight_root(weights)
-    penalty = _penalty(wv.n)
     found = []
     for base in choices.bases():
         shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
@@ -225,7 +257,7 @@ def _candidates(
                 break
             if g:
                 shapes.append(None)
-            point = search(Profile(design, target, root), shapes)
+            point = search(Profile(design, ground.target, ground.root), shapes)
             shapes = list(point.shapes)
             if np.any(point.x <= 0.0) or before - point.objective < _USELESS:
                 if g:
@@ -233,21 +265,15 @@ def _candidates(
                 before = point.objective
                 continue
             before = point.objective
-            criterion = point.objective + penalty * design.n_free
-            candidate = Candidate(
-                model, criterion, point.objective, design.n_free, wv.tau.size - design.n_free
-            )
-            found.append((candidate, point))
-    return found or [_fallback(wv, target, root)]
+            found.append((ground.candidate(design, point), point))
+    return found or [_fallback(wv, ground)]
 
 
-def _fallback(wv: WaveletVariance, target: FloatArray, root: FloatArray) -> tuple[Candidate, Point]:
+def _fallback(wv: WaveletVariance, ground: _Ground) -> tuple[Candidate, Point]:
     """White noise alone, for records too short for anything else."""
-    model = Model((WhiteNoise(),))
-    design = Design(model, Scales.of(wv))
-    point = search(Profile(design, target, root))
-    criterion = point.objective + _penalty(wv.n)
-    return Candidate(model, criterion, point.objective, 1, wv.tau.size - 1), point
+    design = Design(Model((WhiteNoise(),)), Scales.of(wv))
+    point = search(Profile(design, ground.target, ground.root))
+    return ground.candidate(design, point), point
 
 
 def _given_shape(process: Process) -> tuple[float, ...]:

@@ -1,0 +1,114 @@
+"""How often the true model is chosen: `gmwm.select` on simulated series of known form."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    Sinusoid,
+    WhiteNoise,
+    as_model,
+)
+from gmwm.selection import select
+
+LENGTHS = (100_000, 1_000_000)
+
+TRUTHS: tuple[Model, ...] = (
+    as_model(WhiteNoise(1.0)),
+    WhiteNoise(1.0) + RandomWalk(0.003),
+    QuantizationNoise(3.0) + WhiteNoise(1.0),
+    QuantizationNoise(3.0) + WhiteNoise(1.0) + RandomWalk(0.003),
+    as_model(GaussMarkov(1.0, 30.0)),
+    WhiteNoise(1.0) + GaussMarkov(0.5, 50.0),
+    WhiteNoise(1.0) + GaussMarkov(0.5, 50.0) + RandomWalk(0.003),
+    WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0),
+    WhiteNoise(1.0) + GaussMarkov(1.0, 3.0) + GaussMarkov(1.0, 60.0) + GaussMarkov(1.0, 1500.0),
+    WhiteNoise(1.0)
+    + RandomWalk(0.02)
+    + GaussMarkov(2.0, 3.0)
+    + GaussMarkov(1.5, 40.0)
+    + GaussMarkov(1.5, 700.0),
+    WhiteNoise(1.0) + RateRamp(1e-4),
+    WhiteNoise(1.0) + GaussMarkov(0.5, 50.0) + Sinusoid(0.3, 0.0565),
+)
+"""One-sample noise of 1, dt = 1 s; each term has 5 % of the variance at some level at least."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen for one true model at one length.
+
+    Attributes
+    ----------
+    truth : Model
+    n : int
+    runs : int
+    right : int
+        Runs in which the very model was chosen.
+    surplus : mapping of int to int
+        Terms more than the truth has -> runs.
+    """
+
+    truth: Model
+    n: int
+    runs: int
+    right: int
+    surplus: Counter[int]
+
+
+def choose(index: int, n: int, seed: int) -> tuple[bool, int]:
+    """Whether the true model is chosen for a simulated series, and the terms it has too many."""
+    truth = TRUTHS[index]
+    series = truth.simulate(n, 1.0, np.random.default_rng([seed, index, n]))
+    lines = tuple(
+        Sinusoid(frequency=term.frequency) for term in truth.terms if isinstance(term, Sinusoid)
+    )
+    chosen = select(series, dt=1.0, extra=lines).model
+    kinds = [Counter(type(term).__name__ for term in m.terms) for m in (truth, chosen)]
+    return kinds[0] == kinds[1], len(chosen.terms) - len(truth.terms)
+
+
+def study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> list[Choice]:
+    """Choose models for ``runs`` series of every truth and length, in parallel processes."""
+    from joblib import Parallel, delayed, parallel_config
+
+    cases = [(index, n) for n in lengths for index in range(len(TRUTHS))]
+    with parallel_config("loky", inner_max_num_threads=1):
+        found = Parallel(n_jobs=jobs)(
+            delayed(choose)(index, n, seed + run) for index, n in cases for run in range(runs)
+        )
+    result = []
+    for place, (index, n) in enumerate(cases):
+        part = found[place * runs : (place + 1) * runs]
+        right = sum(is_right for is_right, _ in part)
+        result.append(Choice(TRUTHS[index], n, runs, right, Counter(more for _, more in part)))
+    return result
+
+
+def text(choices: Sequence[Choice]) -> str:
+    """The study as a table."""
+    from gmwm.selection import describe
+
+    runs = choices[0].runs
+    lines = [
+        f"Models chosen by gmwm.select, {runs} series each",
+        "",
+        f"{'n':>9} {'right':>6} {'fewer':>6} {'+1':>5} {'+2..':>5}  true model",
+    ]
+    for choice in choices:
+        fewer = sum(count for more, count in choice.surplus.items() if more < 0)
+        many = sum(count for more, count in choice.surplus.items() if more > 1)
+        lines.append(
+            f"{choice.n:>9,} {choice.right / runs:>6.0%} {fewer / runs:>6.0%} "
+            f"{choice.surplus[1] / runs:>5.0%} {many / runs:>5.0%}  {describe(choice.truth)}"
+        )
+    return "\n".join([*lines, "", "right: the very terms; fewer, +1, +2..: terms less or too many"])
