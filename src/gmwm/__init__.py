@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from gmwm.budget import ErrorBudget, ErrorRow
     from gmwm.calibration import Calibration, calibrate, load
     from gmwm.coasting import error_budget
+    from gmwm.diagnosis import Health, health
     from gmwm.errors import InputError
     from gmwm.estimate.bootstrap import Bootstrap, bootstrap, bootstrap_test
     from gmwm.estimate.bounds import CramerRao, cramer_rao
     from gmwm.estimate.fit import Fit
+    from gmwm.estimate.joint import JointFit
     from gmwm.estimate.methods import fit
     from gmwm.process import (
         AR,
@@ -57,10 +59,12 @@ _HOME = {
     **dict.fromkeys(("ErrorBudget", "ErrorRow"), "budget"),
     **dict.fromkeys(("Calibration", "calibrate", "load"), "calibration"),
     "error_budget": "coasting",
+    **dict.fromkeys(("Health", "health"), "diagnosis"),
     "InputError": "errors",
     **dict.fromkeys(("Bootstrap", "bootstrap", "bootstrap_test"), "estimate.bootstrap"),
     **dict.fromkeys(("CramerRao", "cramer_rao"), "estimate.bounds"),
     "Fit": "estimate.fit",
+    "JointFit": "estimate.joint",
     "fit": "estimate.methods",
     **dict.fromkeys(
         (
@@ -110,7 +114,9 @@ __all__ = [
     "ErrorRow",
     "Fit",
     "GaussMarkov",
+    "Health",
     "InputError",
+    "JointFit",
     "Model",
     "Modwt",
     "Parameter",
@@ -134,6 +140,7 @@ __all__ = [
     "error_budget",
     "fit",
     "haar_covariance",
+    "health",
     "imodwt",
     "load",
     "modwt",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,12 @@ from joblib import Parallel, delayed
 
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.joint import JointFit
 from gmwm.estimate.methods import fit
+from gmwm.estimate.stored import fit_from_dict
 from gmwm.files import written
 from gmwm.process import Model, Process
 from gmwm.recording import Channel, Recording
+from gmwm.remedies import REMEDIES, remedied
 from gmwm.selection import select
 from gmwm.variance.analysis import MIN_SAMPLES, wavelet_variance
 
@@ -118,7 +119,7 @@ class Calibration:
             )
         try:
             return cls(
-                fits={name: _fit_from_dict(item) for name, item in content["channels"].items()},
+                fits={name: fit_from_dict(item) for name, item in content["channels"].items()},
                 skipped=dict(content["skipped"]),
                 source=content["source"],
                 rate=float(content["rate_hz"]),
@@ -152,10 +153,6 @@ class Calibration:
         return write_report(self, path)
 
 
-def _fit_from_dict(content: dict[str, Any]) -> Fit:
-    return JointFit.from_dict(content) if "parts" in content else Fit.from_dict(content)
-
-
 def load(path: str | os.PathLike[str]) -> Calibration:
     """Read a calibration written by `Calibration.save`.
 
@@ -180,12 +177,15 @@ def calibrate(
     recording: Recording | Sequence[Recording],
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
+    remedies: Collection[str] = REMEDIES,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
     """Error model of every channel of a static recording, or of several of one sensor.
 
-    A channel that is constant, or of which more than half of the samples are missing, is skipped.
+    The recording is examined first: samples of knocks and spikes are left out, periodic lines and
+    resonances are terms that a selected model may have; notes tell what was found. A channel that
+    is constant, or of which more than half of the samples are missing, is skipped.
 
     Parameters
     ----------
@@ -194,6 +194,8 @@ def calibrate(
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
+    remedies : collection of str, optional
+        Some of "events", "lines" and "resonances"; none leaves the recording as it is, unexamined.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter take in turns; -1 is one per core.
@@ -209,8 +211,10 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
-    recordings = [recording] if isinstance(recording, Recording) else list(recording)
-    _check_together(recordings)
+    given = [recording] if isinstance(recording, Recording) else list(recording)
+    _check_together(given)
+    treated = [remedied(each, remedies) for each in given]
+    recordings = [each.recording for each in treated]
     alive, dead = _usable(recordings)
     if isinstance(model, Mapping):
         for name in alive:
@@ -223,7 +227,8 @@ def calibrate(
 
     def one(name: str) -> Fit | InputError:
         try:
-            return _channel_fit(alive[name], _model_of(name, model))
+            extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
+            return _channel_fit(alive[name], _model_of(name, model), extra)
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -311,7 +316,9 @@ def _model_of(
     return model[name]
 
 
-def _channel_fit(channels: Sequence[Channel], model: Process | Model | None) -> Fit:
+def _channel_fit(
+    channels: Sequence[Channel], model: Process | Model | None, extra: Sequence[Process]
+) -> Fit:
     parts = [wavelet_variance(channel) for channel in channels]
     data = parts[0] if len(parts) == 1 else parts
-    return select(data).fit if model is None else fit(model, data)
+    return select(data, extra=extra).fit if model is None else fit(model, data)

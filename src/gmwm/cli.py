@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from gmwm import __version__
+from gmwm.arguments import read_recording, reading_options
 from gmwm.errors import InputError
+from gmwm.health_command import health
 from gmwm.study.command import reproduce
 
 if TYPE_CHECKING:
@@ -46,14 +48,11 @@ def cli() -> None:
 @click.argument("files", metavar="FILE...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
 @_output_option("gmwm-out")
-@click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column.")
-@click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ...")
-@click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ...")
-@click.option("--channel", "channels", multiple=True, metavar="NAME=COLUMN",
-              help="Role of a column by its name or 0-based number, e.g. gyro_x=wx or accel_z=5; "
-                   "repeat. By default roles are guessed from the column names.")  # fmt: skip
-@click.option("--time", "time_column", metavar="COLUMN",
-              help="Time column by name or number; 'none' to ignore it.")  # fmt: skip
+@reading_options
+@click.option("--leave", "left", multiple=True,
+              type=click.Choice(["events", "lines", "resonances", "all"]),
+              help="Leave these as they are: samples of knocks are masked otherwise, lines and "
+                   "resonances are terms that a model may have; repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
     files: tuple[Path, ...],
@@ -63,6 +62,7 @@ def calibrate(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    left: tuple[str, ...],
     jobs: int,
 ) -> None:
     """Calibrate every channel of a static recording, or of several of one sensor.
@@ -79,19 +79,19 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm.calibration import calibrate as run
-    from gmwm.files import output_folder
-    from gmwm.readers import read
+    from gmwm.files import folder_to_fill
+    from gmwm.remedies import REMEDIES
 
-    folder = output_folder(output)
-    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    recordings = [
-        read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
-        for file in files
-    ]
-    with _progress(recordings[0], "calibrating") as progress:
-        result = run(recordings, jobs=jobs, progress=progress)
-    # The files first: who pipes the table into head must not lose them.
-    written = _write(result, folder)
+    with folder_to_fill(output) as folder:
+        recordings = [
+            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
+            for file in files
+        ]
+        with _progress(recordings[0], "calibrating") as progress:
+            chosen = () if "all" in left else [name for name in REMEDIES if name not in left]
+            result = run(recordings, remedies=chosen, jobs=jobs, progress=progress)
+        # The files first: who pipes the table into head must not lose them.
+        written = _write(result, folder)
     _show(result)
     click.echo(written)
 
@@ -112,18 +112,18 @@ def demo(output: Path, hours: float, seed: int) -> None:
     """
     from gmwm.calibration import calibrate as run
     from gmwm.demo import simulated_imu
-    from gmwm.files import output_folder
+    from gmwm.files import folder_to_fill
     from gmwm.report.page import duration_text
     from gmwm.selection import describe
 
-    folder = output_folder(output)
-    recording, truth = simulated_imu(3600.0 * hours, seed)
-    forms = {name: model.opened() for name, model in truth.items()}
-    with _progress(recording, "fitting") as progress:
-        fitted = run(recording, forms, progress=progress)
-    with _progress(recording, "selecting") as progress:
-        selected = run(recording, progress=progress)
-    written = _write(selected, folder)
+    with folder_to_fill(output) as folder:
+        recording, truth = simulated_imu(3600.0 * hours, seed)
+        forms = {name: model.opened() for name, model in truth.items()}
+        with _progress(recording, "fitting") as progress:
+            fitted = run(recording, forms, progress=progress)
+        with _progress(recording, "selecting") as progress:
+            selected = run(recording, progress=progress)
+        written = _write(selected, folder)
     click.echo(f"{recording.source}: {duration_text(recording.duration)} at {recording.rate:g} Hz")
     click.echo("\nTruth and estimate, the form of each model known:\n")
     _show_truth(fitted, truth)
@@ -157,6 +157,7 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     click.echo(error_budget(load(file), _seconds(times), calibrated=not unknown_start))
 
 
+cli.add_command(health)
 cli.add_command(reproduce)
 
 
@@ -178,28 +179,6 @@ def main() -> None:
 
 
 # -- arguments ------------------------------------------------------------------------------------
-
-
-def _column(text: str) -> str | int:
-    return int(text) if text.isascii() and text.isdigit() else text
-
-
-def _roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
-    roles = {}
-    for pair in pairs:
-        name, separator, column = pair.partition("=")
-        if not (name and separator and column):
-            raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
-        if name in roles:
-            raise InputError(f"--channel {name}=... is given twice: a channel has one column")
-        roles[name] = _column(column)
-    return roles or None
-
-
-def _time(text: str | None) -> str | int | bool | None:
-    if text is None:
-        return None
-    return False if text.lower() == "none" else _column(text)
 
 
 def _seconds(text: str) -> list[float]:

@@ -82,6 +82,26 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
+@contextmanager
+def folder_to_fill(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """An output folder, which is taken away again if it was made and an error left it empty.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written.
+    """
+    folder = Path(path)
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        yield output_folder(folder)
+    except BaseException:
+        for made in missing:
+            with suppress(OSError):  # there is something in it
+                made.rmdir()
+        raise
+
+
 def _sentence(path: Path, error: OSError) -> str:
     return f"{path}: cannot be written ({error.strerror}): choose another place with -o"
 

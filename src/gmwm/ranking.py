@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from scipy.stats import chi2
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
@@ -24,6 +25,7 @@ from gmwm.process import (
     QuantizationNoise,
     RandomWalk,
     RateRamp,
+    Sinusoid,
     WhiteNoise,
 )
 from gmwm.variance.pooled import PooledVariance
@@ -55,12 +57,18 @@ class Choices:
     extra: tuple[Process, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 0 <= self.max_gauss_markov <= MAX_GAUSS_MARKOV:
+        most = self.max_gauss_markov
+        if not checks.is_number(most) or most not in range(MAX_GAUSS_MARKOV + 1):
             raise InputError(
-                f"max_gauss_markov = {self.max_gauss_markov!r}: give a number from 0 to "
+                f"max_gauss_markov = {checks.shown(most)}: give a whole number from 0 to "
                 f"{MAX_GAUSS_MARKOV}"
             )
         for process in self.extra:
+            if not isinstance(process, Process):
+                raise InputError(
+                    f"extra holds {checks.shown(process)}: give processes, as in "
+                    "[Sinusoid(frequency=0.5)]"
+                )
             linear = process.linear_parameter
             shape = [process.values[p.name] for p in process.shape_parameters]
             if linear is None or process.values[linear.name] is not None or None in shape:
@@ -249,8 +257,8 @@ def _candidates(
         shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
         before = np.inf
         for g in range(choices.max_gauss_markov + 1):
-            if not base and g == 0:
-                continue
+            if g == 0 and all(isinstance(process, Sinusoid) for process in base):
+                continue  # lines are no noise
             model = Model((*base, *(GaussMarkov() for _ in range(g))))
             design = Design(model, Scales.of(wv))
             if design.n_free >= wv.tau.size:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
+from gmwm import checks
+from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import Data, are_several, fit
+from gmwm.estimate.table import describe, wrapped
 from gmwm.process import Model, Process
 from gmwm.ranking import MAX_GAUSS_MARKOV, Candidate, Choices, rank, rank_key
 from gmwm.variance.analysis import as_wavelet_variance
 from gmwm.variance.pooled import PooledVariance
 from gmwm.variance.wavelet import WaveletVariance
+
+__all__ = ["Selection", "describe", "select"]
 
 _TIE = 2.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
@@ -58,28 +63,20 @@ class Selection:
     def __str__(self) -> str:
         best = self.ranking[0].criterion
         ties = self.ties
-        lines = [
-            f"{'':2}{'difference':>10} {'objective':>10} {'p-value':>8} {'parameters':>10}  model"
-        ]
+        lines = [f"{'':2}{'difference':>10} {'objective':>10} {'p-value':>8} {'param.':>6}  model"]
         for item in self.ranking[:_SHOWN]:
             mark = ">" if item is self.chosen else " "
             tie = "=" if len(ties) > 1 and item in ties else " "
-            lines.append(
+            row = (
                 f"{mark}{tie}{item.criterion - best:>10.4g} {item.objective:>10.4g} "
-                f"{item.p_value:>8.2g} {item.n_parameters:>10}  {describe(item.model)}"
+                f"{item.p_value:>8.2g} {item.n_parameters:>6}  "
             )
+            lines += wrapped(describe(item.model), first=row, indent=len(row))
         if len(self.ranking) > _SHOWN:
             lines.append(f"  and {len(self.ranking) - _SHOWN} more")
         if len(ties) > 1:
             lines.append("= these tie: the data hardly tell them apart, the simplest is preferred")
         return "\n".join(lines)
-
-
-def describe(model: Model) -> str:
-    """A model's terms in a few words: ``white noise + 2 Gauss-Markov``."""
-    titles = [term.title() for term in model.terms]
-    counts = {title: titles.count(title) for title in titles}
-    return " + ".join(f"{n} {title}" if n > 1 else title for title, n in counts.items())
 
 
 def select(
@@ -125,6 +122,11 @@ def select(
     ranking. Models within 2 of the best are a tie, in which the smaller one wins. Of the best
     candidates the first one is chosen whose own fit finds all of its terms identifiable.
     """
+    if not isinstance(extra, Iterable):
+        raise InputError(
+            f"extra = {checks.shown(extra)}: give a list of processes, as in "
+            "[Sinusoid(frequency=0.5)]"
+        )
     choices = Choices(max_gauss_markov, tuple(extra))
     if are_several(data):
         parts = [as_wavelet_variance(part, dt) for part in cast("Sequence[Data]", data)]

@@ -133,7 +133,6 @@ def _response(taps: FloatArray, f: FloatArray) -> ComplexArray:
     return np.asarray(np.polynomial.polynomial.polyval(np.exp(-2j * np.pi * f), taps))
 
 
-@lru_cache(maxsize=len(NAMES))
 def wavelet(name: str) -> Wavelet:
     """The wavelet of a name.
 
@@ -152,11 +151,16 @@ def wavelet(name: str) -> Wavelet:
     InputError
         For a name that is not known.
     """
-    if name not in NAMES:
+    if not isinstance(name, str) or name not in NAMES:
         raise InputError(
             f"wavelet {name!r} is not known: choose haar, db2 to db10, sym2 to sym10 or coif1 to "
             "coif5"
         )
+    return _made(name)
+
+
+@lru_cache(maxsize=len(NAMES))
+def _made(name: str) -> Wavelet:
     import pywt
 
     source = pywt.Wavelet(name)

@@ -474,7 +474,7 @@ def test_interruption_is_told_and_leaves_nothing(run, tmp_path, monkeypatch):
     assert code == 130
     assert printed == ""
     assert told.strip() == "gmwm: interrupted, no file is half-written"
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_exit_code_of_the_process(tmp_path):
@@ -499,6 +499,62 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     assert "Traceback" not in done.stderr
     files = ["calibration.json", "imu.yaml", "report.html"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
+
+
+# -- health ---------------------------------------------------------------------------------------
+
+
+def knocked_csv(path):
+    rng = np.random.default_rng(3)
+    n = 6000
+    gyro = 0.3 * rng.normal(size=n)
+    gyro[4000:4003] += 17.0
+    accel = 4e-3 * rng.normal(size=n) + 4e-3 * np.sin(2.0 * np.pi * 3.3 * np.arange(n) / 100.0)
+    return write_csv(path, {"gyro_x": gyro, "accel_x": np.rint(accel / 0.00333) * 0.00333})
+
+
+def test_health_says_what_is_wrong(run, tmp_path):
+    knocked_csv(tmp_path / "static.csv")
+    units = ("--gyro-unit", "deg/s", "--accel-unit", "g")
+    code, printed, told = run("health", "static.csv", *RATE, *units, "--json", "health.json")
+    assert (code, told) == (0, "")
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    words = " ".join(printed.split())
+    assert re.search(r"warning a spike or knock \+1\d(\.\d)? deg/s at (39|40)\.\d+ s", words)
+    assert "a periodic line at 3.3 Hz, amplitude" in words
+    assert "samples come in steps of 3.33 mg" in words
+    content = json.loads((tmp_path / "health.json").read_text())
+    assert content["schema"] == "gmwm.health"
+    ((frequency, amplitude),) = content["channels"]["accel_x"]["lines"]
+    assert frequency == pytest.approx(3.3, abs=0.005)
+    assert amplitude == pytest.approx(4e-3 * 9.80665, rel=0.1)
+    ((start, stop),) = content["channels"]["gyro_x"]["events"]
+    assert start <= 4000 < 4003 <= stop
+    assert words.endswith("wrote health.json")
+
+
+def test_health_writes_nothing_unless_asked(run, tmp_path):
+    knocked_csv(tmp_path / "static.csv")
+    code, _, _ = run("health", "static.csv", *RATE, *SI)
+    assert code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["static.csv"]
+
+
+def test_health_refuses_what_it_cannot_use(run, tmp_path):
+    knocked_csv(tmp_path / "static.csv")
+    (tmp_path / "taken").mkdir()
+    for arguments, words in (
+        (("absent.csv", *RATE, *SI), "absent.csv does not exist"),
+        (("static.csv", *SI), "--rate 100"),
+        (("static.csv", *RATE, *SI, "--json", "taken"), "a folder of that name is in the way"),
+        (("static.csv", *RATE, *SI, "--json", "no/where.json"), "cannot be written"),
+        (("static.csv", *RATE, *SI, "--channel", "gyro_x"), "write NAME=COLUMN"),
+    ):
+        code, printed, told = run("health", *arguments)
+        assert (code, printed) == (2, ""), arguments
+        assert words in told
+        assert told.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["static.csv", "taken"]
 
 
 # -- demo -----------------------------------------------------------------------------------------
@@ -701,6 +757,41 @@ def test_reproduce_refuses_in_one_sentence(run, arguments, words):
     assert code == 2
     assert words in told
     assert "Traceback" not in told
+
+
+@pytest.mark.parametrize("option", [("--method", "FOO"), ("--cluster", "tcp://x:1"), ("--resume",)])
+def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
+    code, _, told = run("reproduce", "appendix-a", *option, "-o", "s")
+    assert code == 2
+    assert f"appendix-a has no option {option[0]}: leave it out" in told
+    assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("reproduce", "table2", "--method", "AV2", "--runs", 2),
+        ("reproduce", "table2", "--cluster", "nonsense://x", "--runs", 2),
+        ("calibrate", "missing.csv", "--rate", 100),
+    ],
+    ids=lambda arguments: " ".join(map(str, arguments[:3])),
+)
+def test_a_failed_command_leaves_no_empty_folder(run, tmp_path, arguments):
+    if "--cluster" in arguments:
+        pytest.importorskip("distributed")
+    code, _, _ = run(*arguments, "-o", "new/s")
+    assert code == 2
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "mine").mkdir()
+    run(*arguments, "-o", "mine")
+    assert list((tmp_path / "mine").iterdir()) == []
+
+
+def test_experiments_are_not_broken_in_the_help(run):
+    _, printed, _ = run("reproduce", "--help")
+    assert "[OPTIONS] EXPERIMENT" in printed
+    for name in ("table2", "table4", "five-gm", "fig4", "appendix-a", "weights4"):
+        assert name in printed
 
 
 def test_reproduce_does_not_touch_earlier_runs(run):

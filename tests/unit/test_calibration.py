@@ -448,3 +448,36 @@ def test_recordings_of_other_rates_are_refused():
         gmwm.calibrate([first, other])
     with pytest.raises(gmwm.InputError, match="no recording"):
         gmwm.calibrate([])
+
+
+def noisy_recording():
+    """A line, a knock and a channel that is left alone."""
+    rng = np.random.default_rng(5)
+    t = np.arange(40_000) * 0.01
+    accel = gmwm.WhiteNoise(1e-3).simulate(t.size, 0.01, rng) + 0.01 * np.sin(2 * np.pi * 0.7 * t)
+    gyro = gmwm.WhiteNoise(1e-3).simulate(t.size, 0.01, rng)
+    gyro[20_000:20_020] += 1.0
+    return gmwm.Recording.from_arrays(
+        {"gyro_x": gyro, "accel_x": accel}, 100.0, {"gyro": "rad/s", "accel": "m/s^2"}
+    )
+
+
+def test_what_is_wrong_is_told_and_taken_care_of():
+    calibration = gmwm.calibrate(noisy_recording())
+    assert calibration["gyro_x"].params["N"] == pytest.approx(1e-3, rel=0.03)
+    assert calibration["gyro_x"].wv.runs.present < 40_000
+    line = calibration["accel_x"].params
+    assert line["sinusoid_frequency"] == pytest.approx(0.7, abs=1e-3)
+    assert line["sinusoid_amplitude"] == pytest.approx(0.01, rel=0.1)
+    told = " ".join(calibration.notes)
+    assert "periodic line at 0.7" in told
+    assert "knock" in told
+
+
+def test_remedies_can_be_left_out():
+    calibration = gmwm.calibrate(noisy_recording(), remedies=())
+    assert calibration.notes == ()
+    assert calibration["gyro_x"].wv.present is None
+    assert "sinusoid_amplitude" not in calibration["accel_x"].params
+    with pytest.raises(gmwm.InputError, match="there are events, lines, resonances"):
+        gmwm.calibrate(noisy_recording(), remedies=["magic"])

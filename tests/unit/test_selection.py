@@ -54,9 +54,9 @@ def test_ranking_is_sorted_and_printed():
     criteria = [item.criterion for item in selection if "ramp" not in describe(item.model)]
     assert criteria == sorted(criteria)
     lines = str(selection).splitlines()
-    assert lines[0].split() == ["difference", "objective", "p-value", "parameters", "model"]
+    assert lines[0].split() == ["difference", "objective", "p-value", "param.", "model"]
     assert sum(line.startswith(">") for line in lines) == 1
-    assert max(map(len, lines)) <= 100
+    assert max(map(len, lines)) <= 80
     assert selection[0].model in [item.model for item in selection]
 
 

@@ -57,6 +57,7 @@ _LEAST_DOF = 30.0
 _TOLERANCE = 0.10
 _NOISE_SIGMA = 2.0
 
+_FAR_OFF = 0.25  # half way from one slope to the next
 _MISFIT_SIGMA = 3.0  # below this many standard errors a misfit is an accident of the data
 
 
@@ -111,7 +112,8 @@ def fit_allan(
     wv : WaveletVariance
     regions : mapping of str to (float, float), optional
         Key -> first and last averaging time (s, both included) of its region. Those of other keys
-        are found in the plot, on the side of the given ones where their slope belongs.
+        are found in the plot, on the side of the given ones where their slope belongs. Where the
+        plot does not have the slope in a given region, a remark says so, and the fit is not valid.
 
     Returns
     -------
@@ -125,7 +127,8 @@ def fit_allan(
     Raises
     ------
     InputError
-        For another process, regions that cannot be used, or if nothing is found.
+        For another process, a wavelet other than "haar", regions that cannot be used, or if nothing
+        is found.
 
     Notes
     -----
@@ -134,8 +137,14 @@ def fit_allan(
 
     IEEE Std 952-2020, annex C; Stebler et al. (2012), *Proc. IEEE/ION PLANS*, figure 5.
     """
+    if wv.wavelet != "haar":
+        raise InputError(
+            f'method = "allan" reads the Allan deviation, which {wv.wavelet!r} does not give: make '
+            'the wavelet variance with wavelet="haar"'
+        )
     lines = _wanted(model)
-    runs = _given_runs(model, wv, lines, {} if regions is None else regions)
+    given = _given_runs(model, wv, lines, {} if regions is None else regions)
+    runs = dict(given)
     runs |= _found_runs(wv, [line for key, line in lines.items() if key not in runs], lines, runs)
     absent = [line for key, line in lines.items() if key not in runs]
     if not runs:
@@ -152,7 +161,11 @@ def fit_allan(
     fitted = _fitted(model, dict(zip(keys, map(float, scale * coefficients), strict=True)))
     residual = wv.variance - fitted.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     whitened = weight_root(wv.covariance) @ residual
-    remarks = (*_absence_remarks(absent), *_misfit_remarks(fitted, wv))
+    remarks = (
+        *_absence_remarks(absent),
+        *_steepness_remarks(wv, [(lines[key], run) for key, run in given.items()]),
+        *_misfit_remarks(fitted, wv),
+    )
     return Fit(
         model=fitted,
         wv=wv,
@@ -337,6 +350,29 @@ def _absence_remarks(absent: Sequence[_Line]) -> list[str]:
         "so it is not estimated"
         for line in absent
     ]
+
+
+def _steepness_remarks(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> list[str]:
+    """Which of the regions that the user gave have another slope than their line."""
+    remarks = []
+    for line, run in given:
+        levels = np.arange(run.first, run.last + 1)
+        levels = levels[wv.variance[levels] > 0.0]
+        if levels.size < 2:
+            continue  # one level has no slope
+        positive = wv.variance[levels]
+        covariance = wv.covariance[np.ix_(levels, levels)] / np.outer(positive, positive) / 4.0
+        x = np.log(wv.tau[levels])
+        combination = (x - np.mean(x)) / np.sum((x - np.mean(x)) ** 2)
+        slope = float(combination @ np.log(wv.allan_deviation[levels]))
+        error = float(np.sqrt(combination @ covariance @ combination))
+        if abs(slope - line.slope) > max(_FAR_OFF, _MISFIT_SIGMA * error):
+            remarks.append(
+                f"{line.key}: from {wv.tau[run.first]:.4g} to {wv.tau[run.last]:.4g} s the Allan "
+                f"plot has the slope {slope:+.2f}, not {slope_name(line.slope)}: give another "
+                "region"
+            )
+    return remarks
 
 
 def _misfit_remarks(model: Model, wv: WaveletVariance) -> list[str]:

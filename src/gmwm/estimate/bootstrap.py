@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
@@ -55,8 +56,7 @@ class Bootstrap:
         InputError
             If ``level`` is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(f"level = {level!r}: give a number between 0 and 1, e.g. 0.95")
+        level = checks.share("level", level, 0.95)
         ends = np.quantile(self.draws, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
         return {key: (float(a), float(b)) for key, a, b in zip(self.keys, *ends, strict=True)}
 
@@ -83,8 +83,8 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -
     InputError
         If the fit is of another method, or ``runs`` is less than 2.
     """
-    _check(fit, runs)
-    rng = np.random.default_rng(seed)
+    runs = _check(fit, runs)
+    rng = checks.generator(seed)
     opened = _opened(fit)
     if full:
         draws = [_from_series(fit, opened, rng) for _ in range(runs)]
@@ -128,13 +128,13 @@ def bootstrap_test(fit: Fit, larger: Process | Model, runs: int = 200, seed: int
     InputError
         If the fit is of another method, or ``runs`` is less than 2.
     """
-    _check(fit, runs)
+    runs = _check(fit, runs)
     problem = _Problem.of(fit)
     designs = [Design(model, problem.scales) for model in (_opened(fit), as_model(larger))]
     if designs[1].n_free <= designs[0].n_free:
         raise InputError(f"{larger!r} is not larger than {fit.model.opened()!r}")
     observed = _gain(designs, problem.target, problem.root)
-    rng = np.random.default_rng(seed)
+    rng = checks.generator(seed)
     gains = [_gain(designs, target, problem.root) for target in problem.targets(runs, rng)]
     return float((1 + np.sum(np.array(gains) >= observed)) / (runs + 1))
 
@@ -170,11 +170,10 @@ class _Problem:
         return np.asarray(self.implied * np.maximum(cube_root, 0.0) ** 3)
 
 
-def _check(fit: Fit, runs: int) -> None:
+def _check(fit: Fit, runs: int) -> int:
     if fit.method != "gmwm":
         raise InputError(f"a fit by {fit.method!r} has no weights to simulate: take method 'gmwm'")
-    if int(runs) != runs or runs < 2:
-        raise InputError(f"runs = {runs!r}: give a whole number, 2 or more")
+    return checks.whole("runs", runs, 2)
 
 
 def _is_ramp(process: Process) -> bool:

@@ -25,6 +25,10 @@ from gmwm.estimate.uncertainty import SIGNIFICANT, in_model_order, quantile_abov
 from gmwm.process import Model, Process, RateRamp
 from gmwm.variance.wavelet import WaveletVariance
 
+_BRIDGED = (
+    "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by lines"
+)
+
 
 def conclude(
     coordinates: Coordinates,
@@ -36,6 +40,7 @@ def conclude(
     method: str,
     log_likelihood: float,
     absent: Mapping[int, float],
+    is_bridged: bool = False,
     remarks: Sequence[str] = (),
     trace: Sequence[float] = (),
 ) -> Fit:
@@ -57,6 +62,9 @@ def conclude(
     log_likelihood : float
     absent : mapping of int to float
         Noise term of zero amplitude -> 95 % upper bound of the amplitude.
+    is_bridged : bool
+        Whether ``wv`` is that of a series whose gaps are bridged by lines. Nothing is then said
+        of how the model agrees with it.
     remarks, trace : sequence
         See `Fit`.
     """
@@ -92,6 +100,8 @@ def conclude(
     objective, p_value, levels, misfits, poor = _agreement(
         coordinates.model, noise, slope, wv, len(present)
     )
+    if is_bridged:
+        p_value, poor, misfits = float("nan"), False, [_BRIDGED]
     return Fit(
         model=model,
         wv=wv,

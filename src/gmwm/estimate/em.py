@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -74,7 +75,8 @@ def fit_em(
         raise InputError(f"drift = {drift!r}: known are {', '.join(DRIFTS)}")
     if not tolerance > 0.0:
         raise InputError(f"tolerance = {tolerance!r}: give a small positive number, e.g. 1e-10")
-    if max_iterations < 1:
+    is_whole = isinstance(max_iterations, Integral) and not isinstance(max_iterations, bool)
+    if not is_whole or max_iterations < 1:
         raise InputError(f"max_iterations = {max_iterations!r}: give a positive whole number")
     for term in Coordinates(model).terms:
         check_supported(term)
@@ -166,33 +168,41 @@ class Iteration:
     def run(
         self, tolerance: float, max_iterations: int, accelerate: bool
     ) -> tuple[Stage, list[float], bool]:
-        """Iterate; returns the last stage, the log-likelihoods, and whether it converged."""
+        """Iterate; returns the best stage, the log-likelihoods, and whether it converged.
+
+        Each of the log-likelihoods is after one M step; none is below the one before.
+        """
         stage = Stage(self.series.start)
         if self.in_state:
             size = sum(em_space(p, self.dt).n_states for p in stage.processes)
             stage = Stage(stage.processes, np.zeros(size), np.zeros(size))
         e = self.expectation(stage)
-        trace = [e.log_likelihood]
-        while len(trace) <= max_iterations:
-            before = e.log_likelihood
+        trace: list[float] = []
+        while len(trace) < max_iterations:
+            previous, before = stage, e.log_likelihood
             first = self.maximization(stage, e)
-            e = self.expectation(first)
-            trace.append(e.log_likelihood)
-            latest = first
-            if accelerate and len(trace) <= max_iterations:
-                second = self.maximization(first, e)
-                latest, e = self._extrapolated(stage, first, second, trace[-1])
+            after = self.expectation(first)
+            if not after.log_likelihood > before:
+                # Rounding errors, or an M step that leaves the first state out, at the top.
+                return stage, [*trace, before], True
+            trace.append(after.log_likelihood)
+            stage, e = first, after
+            if accelerate and len(trace) < max_iterations:
+                stage, e = self._extrapolated(previous, first, e)
                 trace.append(e.log_likelihood)
-            stage = latest
             gain = e.log_likelihood - before
             if gain < tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
                 return stage, trace, True
         return stage, trace, False
 
     def _extrapolated(
-        self, stage: Stage, first: Stage, second: Stage, reached: float
+        self, stage: Stage, first: Stage, reached: Expectation
     ) -> tuple[Stage, Expectation]:
-        """A long step in the direction of two, if it climbs; else the second of them."""
+        """A long step in the direction of two, if it climbs; else the second of them, if it does.
+
+        ``reached`` is the expectation of the first.
+        """
+        second = self.maximization(first, reached)
         coordinates = self.series.coordinates
         zs = [coordinates.pack(s.processes) for s in (stage, first, second)]
         r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
@@ -201,15 +211,20 @@ class Iteration:
         step = 2.0 * length * r + length**2 * v
         # Where an amplitude has all but vanished EM hardly moves: do not jump there.
         if length > 1.0 and not self.in_state and np.max(np.abs(step)) < _FARTHEST:
-            try:
-                far = coordinates.processes(zs[0] + step, stage.processes)
-                with np.errstate(all="ignore"):
-                    e = self.expectation(Stage(far))
-            except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
-                e = None
-            if e is not None and np.isfinite(e.log_likelihood) and e.log_likelihood >= reached:
-                return Stage(far), e
-        return second, self.expectation(second)
+            there = self._reached(zs[0] + step, stage)
+            if there is not None and there[1].log_likelihood >= reached.log_likelihood:
+                return there
+        e = self.expectation(second)
+        return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
+
+    def _reached(self, z: FloatArray, like: Stage) -> tuple[Stage, Expectation] | None:
+        """The stage of these coordinates, where it is one."""
+        try:
+            stage = Stage(self.series.coordinates.processes(z, like.processes))
+            with np.errstate(all="ignore"):
+                return stage, self.expectation(stage)
+        except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+            return None
 
 
 def _describe(
@@ -242,7 +257,8 @@ def _describe(
             remarks.append(f"a drift that enters the {name} state is no ramp of the signal")
     return conclude(
         coordinates, final, regular_inverse(top.information), slope, series.wv, method="em",
-        log_likelihood=trace[-1], absent=bounds, remarks=remarks, trace=trace,
+        log_likelihood=trace[-1], absent=bounds, is_bridged=series.is_bridged,
+        remarks=remarks, trace=trace,
     )  # fmt: skip
 
 

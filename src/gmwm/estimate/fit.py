@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -9,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import norm
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.interval import confidence_interval
 from gmwm.estimate.scales import Scales
-from gmwm.process import Model, model_from_list
+from gmwm.estimate.table import HEAD, describe, parameter_row, wrapped
+from gmwm.process import Model
 from gmwm.units import field_units, si_parameter_unit
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -21,12 +24,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_METHOD_NAMES = {
+METHOD_NAMES = {
+    "gmwm": "GMWM",
+    "simulated": "simulated moments",
     "allan": "slopes of the Allan deviation",
     "em": "EM",
     "mle": "exact maximum likelihood",
     "whittle": "debiased Whittle likelihood",
 }
+"""Methods as they are named in tables."""
 
 
 @dataclass(frozen=True)
@@ -160,8 +166,7 @@ class Fit:
         InputError
             If ``level`` is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(f"level = {level!r}: give a number between 0 and 1, e.g. 0.95")
+        level = checks.share("level", level, 0.95)
         params, errors = self.params, self.stderr
         result = {}
         for item in self.model.parameters:
@@ -206,6 +211,7 @@ class Fit:
             In u, same shape as ``tau``; by linear propagation of the parameters' covariance to
             the logarithm of the deviation.
         """
+        level = checks.share("level", level, 0.95)
         tau = np.asarray(tau, dtype=float)
         scales = replace(Scales.of(self.wv), tau=tau)
         curve = scales.curve(self.model)
@@ -260,33 +266,28 @@ class Fit:
         return result
 
     def __str__(self) -> str:
-        wv = self.wv
-        name = wv.name or "series"
-        lines = [
-            f"{name}: {' + '.join(self.model.term_labels())}",
-            f"{wv.n:,} samples at {1.0 / wv.dt:g} Hz, {wv.tau.size} levels; {self._how()}",
-            "",
-            f"{'parameter':<20} {'estimate':>11} {'std. error':>10}  {'95 % interval':<23} unit",
-        ]
-        lines += [_row(row) for row in self.rows()]
+        lines = wrapped(f"{self.wv.name or 'series'}: {describe(self.model)}", indent=2)
+        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {self._how()}", indent=2)
+        lines += ["", HEAD, *(parameter_row(row) for row in self.rows()), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"
         if np.isfinite(self.log_likelihood):
-            fitness = (
-                f"log-likelihood {self.log_likelihood:.8g}; of the wavelet variances: " + fitness
-            )
-        lines += ["", fitness, "valid" if self.valid else "NOT VALID"]
-        lines += [f"- {remark}" for remark in self.remarks]
+            lines.append(f"log-likelihood {self.log_likelihood:.8g}")
+            fitness = f"of the wavelet variances: {fitness}"
+        lines += [fitness, "valid" if self.valid else "NOT VALID"]
+        for remark in self.remarks:
+            lines += wrapped(remark, first="- ", indent=2)
         return "\n".join(lines)
 
+    def _size(self) -> str:
+        return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
+
     def _how(self) -> str:
+        name = METHOD_NAMES[self.method]
         if self.omega:
-            moments = "simulated moments" if self.method == "simulated" else "GMWM"
-            return f"{moments}, {self.omega} weights"
-        if self.trace:
-            return f"EM, {len(self.trace)} iterations"
-        return _METHOD_NAMES[self.method]
+            return f"{name}, {self.omega} weights"
+        return f"{name}, {len(self.trace)} iterations" if self.trace else name
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars, fitted curve and components; returns the axes.
@@ -374,50 +375,14 @@ class Fit:
         }
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Fit:
-        """Inverse of `to_dict`."""
-        model = model_from_list(content["model"])
-        unknown = set(content["keys"]) - set(model.params)
-        if model.is_open or unknown:
-            raise InputError(f"its model {model!r} and its parameters do not belong together")
-        p = len(content["keys"])
-        return cls(
-            model=model,
-            wv=WaveletVariance.from_dict(content["wavelet_variance"]),
-            keys=tuple(content["keys"]),
-            covariance=np.array(content["covariance"], dtype=float).reshape(p, p),
-            upper_bounds={
-                key: float("inf") if bound is None else bound
-                for key, bound in content["upper_bounds"].items()
-            },
-            objective=content["objective"],
-            dof=content["dof"],
-            discrepancy=content["discrepancy"],
-            p_value=_number(content["p_value"]),
-            method=content["method"],
-            omega=content["omega"],
-            valid=content["valid"],
-            remarks=tuple(content["remarks"]),
-            log_likelihood=_number(content.get("log_likelihood")),
-            trace=tuple(content.get("trace", ())),
-            slope_dof=_number(content.get("slope_dof"), float("inf")),
-            error_growth=dict(content.get("error_growth", {})),
-            regions=tuple(Region(**region) for region in content.get("regions", ())),
-        )
+    def from_dict(cls, content: Mapping[str, Any]) -> Fit:
+        """Inverse of `to_dict`; a `JointFit` if it was one.
 
+        Raises
+        ------
+        InputError
+            If the content is no fit, or a damaged one.
+        """
+        from gmwm.estimate.stored import fit_from_dict
 
-def _number(value: float | None, missing: float = float("nan")) -> float:
-    return missing if value is None else float(value)
-
-
-def _row(row: dict[str, Any]) -> str:
-    head = f"{row['key']:<20}"
-    if row["kind"] == "undefined":
-        return f"{head} {'-':>11} {'':>10}  {'term has no amplitude':<23} {row['unit']}"
-    if row["kind"] == "given":
-        return f"{head} {row['value']:>11.5g} {'':>10}  {'given':<23} {row['unit']}"
-    if row["kind"] == "bound":
-        bound = f"< {row['upper']:.4g}"
-        return f"{head} {row['value']:>11.5g} {'':>10}  {bound:<23} {row['unit']}"
-    interval = f"{row['lower']:.4g} .. {row['upper']:.4g}"
-    return f"{head} {row['value']:>11.5g} {row['stderr']:>10.2g}  {interval:<23} {row['unit']}"
+        return fit_from_dict(content)

@@ -17,6 +17,7 @@ from gmwm.variance.pooled import PooledVariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _SIGNIFICANT = 0.01
+_CELLS = 4  # numbers in a line of the table
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +44,16 @@ class JointFit(Fit):
         lines = [super().__str__(), "", self.agreement]
         lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
         for key in self.keys:
-            values = " ".join(f"{part.params.get(key, np.nan):>10.4g}" for part in self.parts)
-            lines.append(f"{key:<20} {self._spread_text(key, self.spread.get(key)):>8} {values}")
+            head = f"{key:<20} {self._spread_text(key, self.spread.get(key)):>8}"
+            cells = [f" {part.params.get(key, np.nan):>10.4g}" for part in self.parts]
+            for start in range(0, len(cells), _CELLS):
+                lines.append(f"{head:<29}{''.join(cells[start : start + _CELLS])}")
+                head = ""
         return "\n".join(lines)
+
+    def _size(self) -> str:
+        pooled = f"{len(self.parts)} recordings, {self.wv.n_all:,} samples in all"
+        return f"{pooled} at {1.0 / self.wv.dt:g} Hz"
 
     @property
     def agreement(self) -> str:
@@ -72,21 +80,6 @@ class JointFit(Fit):
             "equality_p": None if np.isnan(self.equality_p) else self.equality_p,
             "spread": self.spread,
         }
-
-    @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> JointFit:
-        """Inverse of `to_dict`."""
-        whole = Fit.from_dict(content)
-        parts = tuple(Fit.from_dict(part) for part in content["parts"])
-        p_value = content["equality_p"]
-        values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
-        values["wv"] = PooledVariance.of([part.wv for part in parts])
-        return cls(
-            **values,
-            parts=parts,
-            equality_p=float("nan") if p_value is None else p_value,
-            spread=dict(content["spread"]),
-        )
 
 
 def fit_joint(

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.allan import fit_allan
-from gmwm.estimate.em import fit_em
+from gmwm.estimate.em import DRIFTS, fit_em
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit_gmwm, fit_simulated
 from gmwm.estimate.joint import fit_joint
 from gmwm.estimate.mle import fit_mle, fit_whittle
+from gmwm.estimate.weights import OMEGAS
 from gmwm.process import Model, Process, as_model
 from gmwm.recording import Channel
 from gmwm.variance.analysis import as_channel, as_wavelet_variance
@@ -43,6 +46,24 @@ _OPTIONS = {
     "em": ("start", "tolerance", "max_iterations", "accelerate", "drift"),
 }
 METHODS = tuple(_OPTIONS)
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "omega": lambda given: checks.choice("omega", given, OMEGAS),
+    "discrepancy": lambda given: _discrepancy(given),
+    "replications": lambda given: checks.whole(
+        "replications", given, 1, "give a positive whole number"
+    ),
+    "seed": lambda given: checks.whole("seed", given, 0, "give a whole number, zero or more"),
+    "start": as_model,
+    "tolerance": lambda given: checks.positive(
+        "tolerance", given, "give a small positive number, e.g. 1e-10"
+    ),
+    "max_iterations": lambda given: checks.whole(
+        "max_iterations", given, 1, "give a positive whole number"
+    ),
+    "accelerate": lambda given: checks.truth("accelerate", given),
+    "drift": lambda given: checks.choice("drift", given, DRIFTS),
+    "regions": lambda given: _regions(given),
+}
 
 
 def fit(
@@ -125,8 +146,7 @@ def fit(
     >>> fit.valid
     True
     """
-    if method not in METHODS:
-        raise InputError(f"method = {method!r}: known are {', '.join(METHODS)}")
+    checks.choice("method", method, METHODS)
     options = {
         "omega": omega, "discrepancy": discrepancy, "replications": replications, "seed": seed,
         "start": start, "tolerance": tolerance,
@@ -151,6 +171,9 @@ def fit(
             f"method = {method!r} needs the samples: give the series, not its variance"
         )
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    where = f"channel {channel.name!r}" if channel.name else "the series"
+    values = checks.real_numbers(channel.values, where)
+    channel = replace(channel, values=values, dt=checks.sampling_interval(channel.dt))
     return _OF_SAMPLES[method](model, channel, **given)
 
 
@@ -158,7 +181,16 @@ def are_several(data: Data | Sequence[Data]) -> bool:
     """Whether it is a list of recordings; one of numbers is a series."""
     if not isinstance(data, list | tuple):
         return False
-    return bool(data) and all(isinstance(part, _SERIES) for part in data)
+    if not data:
+        raise InputError("there is no recording: give one wavelet variance at least")
+    several = [isinstance(part, _SERIES) for part in data]
+    if any(several) and not all(several):
+        odd = data[several.index(False)]
+        raise InputError(
+            f"{checks.shown(odd)} stands among the recordings: give wavelet variances, channels "
+            "or arrays"
+        )
+    return all(several)
 
 
 def _variance(data: Data, dt: float | None, omega: str | None) -> WaveletVariance:
@@ -172,4 +204,23 @@ def _belonging(method: str, options: Mapping[str, Any]) -> dict[str, Any]:
         if name not in _OPTIONS[method]:
             known = ", ".join(_OPTIONS[method])
             raise InputError(f"{name} is no option of method {method!r}: it has {known}")
+    return {name: _CHECKS[name](value) for name, value in given.items()}
+
+
+def _discrepancy(given: Any) -> float:
+    if not checks.is_number(given) or not 0.0 <= given < 1.0:
+        raise InputError(
+            f"discrepancy = {checks.shown(given)}: give a share of the variance, e.g. 0.02"
+        )
+    return float(given)
+
+
+def _regions(given: Any) -> Any:
+    """Regions as they are; `gmwm.estimate.allan` knows what they must be but for the start."""
+    for key, region in given.items() if isinstance(given, Mapping) else ():
+        first = region[0] if isinstance(region, Sequence | np.ndarray) and len(region) else 1.0
+        if checks.is_number(first) and first < 0.0:
+            raise InputError(
+                f"regions[{key!r}] starts at {first:g} s: give an averaging time above zero"
+            )
     return given

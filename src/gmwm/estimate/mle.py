@@ -9,11 +9,19 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.absent import Top, idle_term, upper_bound
+from gmwm.estimate.candidates import candidates
 from gmwm.estimate.conclusion import conclude
 from gmwm.estimate.coordinates import Coordinates
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.information import spectral_information
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood, objective_of
+from gmwm.estimate.likelihood import (
+    Columns,
+    KalmanLikelihood,
+    Regression,
+    defined,
+    objective_of,
+    whitened,
+)
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.scoring import (
     Objective,
@@ -101,6 +109,45 @@ def _tilted(objective: Objective, origin: FloatArray, tilt: FloatArray) -> Objec
     return lambda z: objective(z) + float(tilt @ (z - origin))
 
 
+def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
+    """The top, or the one reached from another candidate that lies above it already."""
+    likelihood = KalmanLikelihood(series.columns)
+    reached = defined(likelihood, top.processes)
+    places = [_rescaled(point, series) for point in candidates(series)]
+    height, best = max(places, key=lambda place: place[0], default=(-np.inf, ()))
+    if not height > reached:
+        return top
+    other = climb(series.coordinates, best)
+    return other if defined(likelihood, other.processes) > reached else top
+
+
+def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:
+    """The terms with all variances times the factor of highest likelihood, and that likelihood.
+
+    Innovations keep their proportions when all variances grow alike, so that the factor is their
+    mean square. Where an amplitude is given nothing is changed.
+    """
+    coordinates, columns = series.coordinates, series.columns
+    amplitudes = np.array([is_amplitude for _, is_amplitude in coordinates.owners])
+    if np.sum(amplitudes) < len(processes):
+        return defined(KalmanLikelihood(columns), processes), processes
+    try:
+        with np.errstate(all="ignore"):
+            innovations, log_variance, count = whitened(columns, processes)
+            regression = Regression.of(innovations.T @ innovations)
+            free = count - regression.beta.size
+            log_factor = np.log(regression.residual / free)
+            z = coordinates.pack(processes)
+            z[amplitudes] += log_factor
+            moved = coordinates.processes(z, processes)
+    except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+        return -np.inf, processes
+    height = -0.5 * (
+        free * (np.log(2.0 * np.pi) + 1.0 + log_factor) + log_variance + regression.log_determinant
+    )
+    return float(height) if np.isfinite(height) else -np.inf, moved
+
+
 def _fit(series: Series, climb: Climb, method: str) -> Fit:
     coordinates, processes = series.coordinates, list(series.start)
     absent: list[int] = []
@@ -108,6 +155,8 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         present = [i for i in range(len(processes)) if i not in absent]
         part = coordinates.without(absent)
         top = climb(part, tuple(processes[i] for i in present))
+        if not absent:
+            top = _or_higher(top, series, climb)
         for i, process in zip(present, top.processes, strict=True):
             processes[i] = process
         idle = idle_term(part, top.processes, top.likelihood)
@@ -126,5 +175,6 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         slope = Slope(*series.columns.slope(regression))
     return conclude(
         coordinates, final, covariance, slope, series.wv, method=method,
-        log_likelihood=top.maximum.value, absent=bounds, remarks=remarks,
+        log_likelihood=top.maximum.value, absent=bounds, is_bridged=series.is_bridged,
+        remarks=remarks,
     )  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.estimate.simulation import Simulation
 from gmwm.process import Model, Process, SimulatedProcess
 from gmwm.process.base import Shape
@@ -70,5 +71,9 @@ class Scales:
         if not any(isinstance(term, SimulatedProcess) for term in model.terms):
             return model.psd
         curve = self.curve(model)
+        if not np.any(curve > 0.0):
+            raise InputError(
+                f"{model!r} has no variance when simulated: check its _draw, or add WhiteNoise()"
+            )
         positive = np.maximum(curve, 1e-12 * np.max(curve))
         return pilot_psd(positive, np.rint(self.tau / self.dt), self.dt)

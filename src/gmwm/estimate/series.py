@@ -13,7 +13,8 @@ from gmwm.estimate.gmwm import fit_gmwm
 from gmwm.estimate.likelihood import Columns
 from gmwm.process import Model, Process, RateRamp, as_model
 from gmwm.recording import Channel
-from gmwm.variance.analysis import wavelet_variance
+from gmwm.variance.analysis import MIN_SAMPLES, wavelet_variance
+from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
 
 _SMALL = 0.1  # of its upper bound: where an amplitude that was found to be zero starts
@@ -28,7 +29,10 @@ class Series:
     columns : Columns
         The samples and regressors.
     wv : WaveletVariance
-        Of the samples.
+        Of the samples; where gaps leave none, of the series bridged by straight lines.
+    is_bridged : bool
+        Whether it is the latter: fine levels are then too low, so that it is a starting point but
+        no test of a fit.
     coordinates : Coordinates
         Of the model's noise.
     start : tuple of Process
@@ -37,6 +41,7 @@ class Series:
 
     columns: Columns
     wv: WaveletVariance
+    is_bridged: bool
     coordinates: Coordinates
     start: tuple[Process, ...]
 
@@ -59,12 +64,15 @@ class Series:
                     f"{type(term).__name__} has no state-space form, which a likelihood needs: "
                     'take method = "gmwm"'
                 )
-        wv = wavelet_variance(channel)
-        if wv.present is not None and not gaps:
+        missing = _missing(channel)
+        if missing and not gaps:
             raise InputError(
-                f"the series misses {wv.n - wv.present.present:,} samples, which a Fourier "
+                f"the series misses {missing:,} samples, which a Fourier "
                 'transform needs: take method = "mle" or "gmwm"'
             )
+        bridged = wavelet_variance(_bridged(channel) if missing else channel)
+        is_bridged = missing > 0 and not _has_run(channel)
+        wv = wavelet_variance(channel) if missing and not is_bridged else bridged
         ramp = next((term for term in model.terms if isinstance(term, RateRamp)), None)
         columns = Columns(
             np.asarray(channel.values, dtype=float),
@@ -73,24 +81,48 @@ class Series:
             ramp is not None,
         )
         if start is None:
-            first = _from_moments(model, _bridged(channel, wv), coordinates)
+            first = _from_moments(model, bridged, coordinates)
         else:
             first = _from_user(model, as_model(start), coordinates)
-        return cls(columns, wv, coordinates, first)
+        return cls(columns, wv, is_bridged, coordinates, first)
 
 
-def _bridged(channel: Channel, wv: WaveletVariance) -> WaveletVariance:
-    """Wavelet variance with gaps bridged by straight lines, near enough to start from.
+def _missing(channel: Channel) -> int:
+    """Number of missing samples of a series that has enough of them.
 
-    Scattered gaps leave no coefficient of the coarse levels.
+    Raises
+    ------
+    InputError
+        If hardly any sample is there.
     """
-    if wv.present is None:
-        return wv
+    values = np.asarray(channel.values, dtype=float)
+    if values.ndim != 1 or np.any(np.isinf(values)):
+        return 0  # no series, as the wavelet variance will say
+    missing = int(np.sum(np.isnan(values)))
+    if missing and values.size - missing < MIN_SAMPLES:
+        where = f"channel {channel.name!r}" if channel.name else "the series"
+        raise InputError(
+            f"{where} has {values.size - missing} samples that are not missing: give "
+            f"{MIN_SAMPLES} or more"
+        )
+    return missing
+
+
+def _has_run(channel: Channel) -> bool:
+    """Whether some samples follow each other without a gap, as a wavelet variance needs."""
+    return Runs.of(np.asarray(channel.values, dtype=float)).longest >= MIN_SAMPLES
+
+
+def _bridged(channel: Channel) -> Channel:
+    """The series with gaps bridged by straight lines, near enough to start from.
+
+    Scattered gaps leave no wavelet coefficient of the coarse levels, or none at all.
+    """
     values = np.asarray(channel.values, dtype=float)
     k = np.arange(values.size)
     known = k[~np.isnan(values)]
     bridged = np.interp(k, known, values[known])[known[0] : known[-1] + 1]
-    return wavelet_variance(replace(channel, values=bridged))
+    return replace(channel, values=bridged)
 
 
 def _from_moments(

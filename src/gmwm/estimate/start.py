@@ -191,7 +191,7 @@ def dictionary_fit(
             for (i, shape), value in zip(atoms, x, strict=True)
             if value > 0.0
         ]
-        if not mixture:
+        if all(isinstance(process, Sinusoid) for process in mixture):
             raise InputError(
                 f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
                 "line or a pattern): check the data"

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import lru_cache
+from inspect import Signature, signature
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import spectral, synthesis
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
+
+_INTERVAL = "give a positive sampling interval in seconds"
 
 Shape = tuple[float, ...]
 """Values of a process's shape parameters, in the order of ``parameters``."""
@@ -55,6 +60,15 @@ class Process(ABC):
     separable_shape: ClassVar[bool] = True
     """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
 
+    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
+        # A constructor that names its parameters would answer with a TypeError.
+        try:
+            _signature(cls).bind_partial(None, *args, **kwargs)
+        except TypeError as error:
+            names = ", ".join([*_signature(cls).parameters][1:]) or "none"
+            raise InputError(f"{cls.__name__}: {error}, its parameters are {names}") from None
+        return super().__new__(cls)
+
     def __init__(self, *args: float | None, **kwargs: float | None) -> None:
         names = [parameter.name for parameter in self.parameters]
         if len(args) > len(names):
@@ -79,10 +93,13 @@ class Process(ABC):
 
     def _checked(self, parameter: Parameter, value: Any) -> float:
         where = f"{type(self).__name__}: {parameter.name}"
+        wrong = f"{where} is {checks.shown(value)}: give a number, or None to estimate"
+        if isinstance(value, str):
+            raise InputError(wrong)
         try:
             number = float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"{where} is {value!r}: give a number, or None to estimate") from None
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(wrong) from None
         if not np.isfinite(number) or not parameter.admits(number):
             raise InputError(
                 f"{where} = {number:g} is out of range: it must lie in "
@@ -277,14 +294,30 @@ class Process(ABC):
         Raises
         ------
         InputError
-            If a parameter is open, or ``n`` or ``dt`` is not positive.
+            If a parameter is open, ``n`` or ``dt`` is not positive or too large, or ``_draw`` of a
+        subclass gives no series.
         """
         self._require_given()
-        if int(n) != n or n < 1:
-            raise InputError(f"n = {n!r}: give a positive whole number of samples")
-        if not dt > 0.0:
-            raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
-        return self._draw(int(n), float(dt), np.random.default_rng(seed))
+        n, dt = checks.samples(n), checks.positive("dt", dt, _INTERVAL)
+        try:
+            drawn = self._draw(n, dt, checks.generator(seed))
+        except MemoryError:
+            raise InputError(f"n = {n:,}: the memory does not hold so many, give less") from None
+        return self._series(drawn, n)
+
+    def _series(self, drawn: Any, n: int) -> FloatArray:
+        """What ``_draw`` of any subclass gave, as a series."""
+        where = f"_draw of {type(self).__name__}"
+        if drawn is None:
+            raise InputError(f"{where} returns nothing: let it return {n:,} samples")
+        series = checks.real_numbers(drawn, f"what {where} returns")
+        if series.shape != (n,):
+            raise InputError(
+                f"{where} returns an array of shape {series.shape}: let it return {n:,} samples"
+            )
+        if not np.all(np.isfinite(series)):
+            raise InputError(f"{where} returns samples that are not finite: repair it")
+        return series
 
     def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return synthesis.from_psd(self.psd, n, dt, rng)
@@ -338,7 +371,7 @@ class Process(ABC):
     def __radd__(self, other: Any) -> Any:
         from gmwm.process.model import Model
 
-        return other + Model((self,)) if other else Model((self,))
+        return Model((self,)).__radd__(other)
 
     def __rmul__(self, times: int) -> Any:
         from gmwm.process.model import Model
@@ -366,6 +399,11 @@ class Process(ABC):
     def title(cls) -> str:
         """Name for tables and legends."""
         return cls.label or cls.__name__
+
+
+@lru_cache(maxsize=256)
+def _signature(kind: type[Process]) -> Signature:
+    return signature(kind.__init__)
 
 
 def _grid_axis(parameter: Parameter, dt: float, n: int, points: int = 16) -> FloatArray:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process.base import Process
@@ -170,7 +171,7 @@ class Model:
     ) -> FloatArray:
         """Draw ``n`` samples, in u; see `Process.simulate`."""
         self._require_given()
-        rng = np.random.default_rng(seed)
+        rng = checks.generator(seed)
         total = self.terms[0].simulate(n, dt, rng)
         for term in self.terms[1:]:
             total += term.simulate(n, dt, rng)
@@ -202,18 +203,18 @@ class Model:
             return Model((*self.terms, other))
         if isinstance(other, Model):
             return Model((*self.terms, *other.terms))
-        return NotImplemented
+        raise InputError(_no_term(other))
 
     def __radd__(self, other: Any) -> Model:
         # sum([...]) starts from 0
-        return self if isinstance(other, int) and other == 0 else NotImplemented
+        if isinstance(other, int) and other == 0:
+            return self
+        raise InputError(_no_term(other))
 
     def __rmul__(self, times: int) -> Model:
-        if isinstance(times, bool) or not isinstance(times, int):
-            return NotImplemented
-        if times < 1:
-            raise InputError(f"{times} * process: the number of terms must be 1 or more")
-        return Model(self.terms * times)
+        if not isinstance(times, int | np.integer) or isinstance(times, bool) or times < 1:
+            raise InputError(f"{times!r} * process: the number of terms must be 1 or more, whole")
+        return Model(self.terms * int(times))
 
     def __repr__(self) -> str:
         counts = Counter(repr(term) for term in self.terms)
@@ -224,6 +225,10 @@ class Model:
 
     def __hash__(self) -> int:
         return hash(self.terms)
+
+
+def _no_term(other: Any) -> str:
+    return f"{other!r} is no error process: add processes, like WhiteNoise() + GaussMarkov()"
 
 
 def as_model(model: Process | Model) -> Model:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -24,7 +26,7 @@ EXPERIMENTS = (
 
 
 @click.command()
-@click.argument("experiment", type=click.Choice(EXPERIMENTS))
+@click.argument("experiment", type=click.Choice(EXPERIMENTS), metavar="EXPERIMENT")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-study"),
               show_default=True, help="Folder for tables, figures and raw estimates.")  # fmt: skip
 @click.option("--runs", type=click.IntRange(min=2), help="Number of simulated series.")
@@ -59,35 +61,44 @@ def reproduce(
       gmwm reproduce table2 --runs 200 -o study
       gmwm reproduce fig2 --runs 200 -o study --resume
     """
-    from gmwm.files import output_folder
+    from gmwm.files import folder_to_fill
 
-    folder = output_folder(output)
     processes = jobs or os.cpu_count() or 1
     if experiment == "appendix-a":
-        _appendix(folder, runs or 200, seed, processes)
+        _check_appendix({"--method": methods, "--resume": resume, "--cluster": cluster})
+        with folder_to_fill(output) as folder:
+            _appendix(folder, runs or 200, seed, processes)
         return
     from gmwm.study.catalogue import SCENARIOS
     from gmwm.study.runs import run_scenario
     from gmwm.study.scenario import FIGURES
 
     scenario = FIGURES.get(experiment) or SCENARIOS[experiment]
-    try:
-        with _progress(scenario.name) as progress:
-            table = run_scenario(
-                scenario, folder, runs=runs or scenario.runs, seed=seed, methods=methods or None,
-                jobs=processes, resume=resume, cluster=cluster, progress=progress,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
-        raise
-    written = [_raw(experiment, table, folder)]
-    if experiment in FIGURES:
-        from gmwm.study.figures import boxplots
+    with folder_to_fill(output) as folder:
+        try:
+            with _progress(scenario.name) as progress:
+                table = run_scenario(
+                    scenario, folder, runs=runs or scenario.runs, seed=seed,
+                    methods=methods or None, jobs=processes, resume=resume, cluster=cluster,
+                    progress=progress,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+            raise
+        written = [_raw(experiment, table, folder)]
+        if experiment in FIGURES:
+            from gmwm.study.figures import boxplots
 
-        written += boxplots(scenario, table, folder / experiment)
-    else:
-        written += _tables(scenario, table, seed, folder)
+            written += boxplots(scenario, table, folder / experiment)
+        else:
+            written += _tables(scenario, table, seed, folder)
     click.echo("\n".join(f"wrote {path}" for path in written))
+
+
+def _check_appendix(options: Mapping[str, object]) -> None:
+    for name, given in options.items():
+        if given:
+            raise InputError(f"appendix-a has no option {name}: leave it out")
 
 
 def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:

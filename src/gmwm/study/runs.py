@@ -19,7 +19,7 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import fit
-from gmwm.files import moved_into_place, output_folder
+from gmwm.files import folder_to_fill, moved_into_place
 from gmwm.study.catalogue import SCENARIOS
 from gmwm.study.scenario import Quantity, Scenario
 from gmwm.variance.analysis import wavelet_variance
@@ -148,24 +148,23 @@ def run_scenario(
             )
     if runs < 1:
         raise InputError(f"runs = {runs!r}: give a positive whole number")
-    store = _Store(
-        output_folder(folder) / f"{scenario.name}-runs",
-        {"scenario": scenario.name, "seed": seed, "methods": list(chosen)},
-    )
-    done = store.open(resume)
-    todo = [run for run in range(runs) if run not in done]
-    if progress is not None:
-        progress(runs - len(todo), runs)
-    work = partial(one_run, scenario.name, chosen, seed)
-    results = _on_cluster(work, todo, cluster) if cluster else _here(work, todo, jobs)
-    finished = runs - len(todo)
-    with closing(results), store:
-        for rows in results:
-            store.add(rows)
-            finished += 1
-            if progress is not None:
-                progress(finished, runs)
-    table = store.read()
+    study = {"scenario": scenario.name, "seed": seed, "methods": list(chosen)}
+    with folder_to_fill(folder / f"{scenario.name}-runs") as parts:
+        store = _Store(parts, study)
+        done = store.open(resume)
+        todo = [run for run in range(runs) if run not in done]
+        finished = runs - len(todo)
+        if progress is not None:
+            progress(finished, runs)
+        work = partial(one_run, scenario.name, chosen, seed)
+        results = _on_cluster(work, todo, cluster) if cluster else _here(work, todo, jobs)
+        with closing(results), store:
+            for rows in results:
+                store.add(rows)
+                finished += 1
+                if progress is not None:
+                    progress(finished, runs)
+        table = store.read()
     return table.filter(pc.less(table["run"], runs)).sort_by(
         [("run", "ascending"), ("method", "ascending")]
     )
@@ -189,7 +188,6 @@ class _Store:
 
     def open(self, resume: bool) -> set[int]:
         """The runs that are there already."""
-        output_folder(self._folder)
         parts = self._parts()
         if parts and not resume:
             raise InputError(
@@ -204,9 +202,10 @@ class _Store:
                 raise InputError(f"{part}: is no Parquet file of a study, remove it") from None
             found = json.loads((table.schema.metadata or {}).get(_KEY, b"{}"))
             if found != self._study:
+                other = ", ".join(k for k, v in self._study.items() if found.get(k) != v)
                 raise InputError(
-                    f"{part}: belongs to another study ({found}), not to {self._study}: choose "
-                    "another folder with -o"
+                    f"{part}: belongs to another study, of other {other}: choose another folder "
+                    "with -o"
                 )
             done |= set(table["run"].to_pylist())
         self._next = len(parts)

@@ -8,7 +8,7 @@ variance; these serve those who compare with figures given in such terms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.recording import Channel
-from gmwm.variance.analysis import MIN_SAMPLES, as_channel
+from gmwm.variance.analysis import as_channel, checked_samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -211,11 +212,9 @@ def deviations(
     many: a million samples take some two seconds for all four kinds.
     """
     allantools = _allantools()
-    channel = _checked(data, dt)
-    if not 0.0 < confidence < 1.0:
-        raise InputError(f"confidence = {confidence!r}: give a number between 0 and 1, e.g. 0.95")
+    channel, values = _checked(data, dt)
+    confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
-    values = np.ascontiguousarray(channel.values, dtype=float)
     averaging = _averaging(tau, channel)
     slopes = _noise_slopes(values, averaging)
     found: dict[str, list[FloatArray]] = {}
@@ -261,32 +260,26 @@ def _allantools() -> ModuleType:
     return allantools
 
 
-def _checked(data: Channel | FloatArray, dt: float | None) -> Channel:
+def _checked(data: Channel | FloatArray, dt: float | None) -> tuple[Channel, FloatArray]:
     if not isinstance(data, Channel) and dt is None:
         raise InputError("give the sampling interval of the array: deviations(x, dt=0.01)")
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
     where = f"channel {channel.name!r}" if channel.name else "the series"
-    values = np.asarray(channel.values)
-    if values.ndim != 1 or values.size < MIN_SAMPLES:
+    missing = np.count_nonzero(np.isnan(checks.real_numbers(channel.values, where)))
+    if missing:
         raise InputError(
-            f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
-        )
-    if channel.missing:
-        raise InputError(
-            f"{where} has {channel.missing:,} missing samples: cut it to a part without any, or "
+            f"{where} has {missing:,} missing samples: cut it to a part without any, or "
             "take gmwm.wavelet_variance, whose Allan deviation copes with gaps"
         )
-    if not np.all(np.isfinite(values)):
-        raise InputError(f"{where} has infinite samples: remove or repair them")
-    if channel.is_constant:
-        raise InputError(f"{where} is constant ({values[0]:g}): a dead channel has no deviation")
-    return channel
+    return channel, checked_samples(channel)[0]
 
 
 def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
+    if not isinstance(kinds, Iterable):
+        raise InputError(f"kinds = {kinds!r}: take some of {', '.join(_KINDS)}")
     names = [kinds] if isinstance(kinds, str) else list(kinds)
     for name in names:
-        if name not in _KINDS:
+        if not isinstance(name, str) or name not in _KINDS:
             raise InputError(f"kind {name!r} is not known: take some of {', '.join(_KINDS)}")
     if not names:
         raise InputError(f"no kind of deviation is given: take some of {', '.join(_KINDS)}")

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from numbers import Real
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.recording import Channel
 from gmwm.variance.covariance import dyadic_levels
+from gmwm.variance.data_covariance import WINDOWS
 from gmwm.variance.data_covariance import data_covariance as covariance_of_data
 from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
 from gmwm.variance.runs import Runs
@@ -72,11 +73,12 @@ def wavelet_variance(
     variance.
     """
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
-    values, runs = _checked(channel)
-    if not 0.0 < confidence < 1.0:
-        raise InputError(f"confidence = {confidence!r}: give a number between 0 and 1, e.g. 0.95")
-    if not 0.0 < efficiency < 1.0:
-        raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
+    values, runs = checked_samples(channel)
+    confidence = checks.share("confidence", confidence, 0.95)
+    efficiency = checks.share("efficiency", efficiency, 0.6)
+    robust = checks.truth("robust", robust)
+    if data_covariance is not None:
+        checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
     averaging = _averaging(channel, runs, wavelet)
     mean = float(np.nanmean(values))
@@ -120,10 +122,18 @@ def _where(channel: Channel) -> str:
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
-def _checked(channel: Channel) -> tuple[FloatArray, Runs]:
-    """The samples, and which of them exist."""
-    values = np.ascontiguousarray(channel.values, dtype=float)
+def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
+    """The samples of a channel, and which of them exist.
+
+    Raises
+    ------
+    InputError
+        If they are no series of numbers, too few, infinite, constant or of no sensor's size, or
+        the sampling interval is none.
+    """
     where = _where(channel)
+    checks.sampling_interval(channel.dt)
+    values = np.ascontiguousarray(checks.real_numbers(channel.values, where))
     if values.ndim != 1 or values.size < MIN_SAMPLES:
         raise InputError(
             f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
@@ -242,10 +252,5 @@ def as_channel(data: FloatArray, dt: float | None) -> Channel:
     """
     if dt is None:
         raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")
-    if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
-        raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
-    try:
-        values = np.asarray(data, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("the series holds something that is not a number") from None
-    return Channel("", values, float(dt))
+    interval = checks.sampling_interval(dt)
+    return Channel("", checks.real_numbers(data, "the series"), interval)

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.wavelets import wavelet as wavelet_of
@@ -198,10 +199,7 @@ def _levels(
 
 
 def _series(x: FloatArray) -> FloatArray:
-    try:
-        values = np.ascontiguousarray(x, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("the series holds something that is not a number") from None
+    values = np.ascontiguousarray(checks.real_numbers(x, "the series"))
     if np.ndim(x) != 1 or values.size == 0:
         raise InputError(f"the series has shape {np.shape(x)}: give one series of samples")
     bad = np.flatnonzero(~np.isfinite(values))

@@ -314,3 +314,42 @@ def test_the_picture_shows_lines_across_it_and_regions_on_top(corner):
     assert bottom < corner.allan_deviation.min()
     assert corner.allan_deviation.max() < top
     plt.close("all")
+
+
+@pytest.mark.parametrize("wavelet", ["db2", "sym4"])
+def test_other_wavelets_are_refused(wavelet):
+    wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(2000, 1.0, seed=1), 1.0, wavelet=wavelet)
+    with pytest.raises(InputError, match='wavelet="haar"'):
+        gmwm.fit(WhiteNoise(), wv, method="allan")
+
+
+def test_robust_variances_are_read_too():
+    wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(5000, 1.0, seed=1), 1.0, robust=True)
+    fit = gmwm.fit(WhiteNoise(), wv, method="allan")
+    assert fit.params["N"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("model", "region"),
+    [
+        (RandomWalk(), {"K": (1, 100)}),
+        (BiasInstability(), {"B": (1, 64)}),
+        (RateRamp(), {"R": (1, 8)}),
+    ],
+)
+def test_a_given_region_of_another_slope_is_not_valid(model, region):
+    wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(6000, 1.0, seed=1), 1.0)
+    fit = gmwm.fit(WhiteNoise(1.0) + model, wv, method="allan", regions=region)
+    assert not fit.valid
+    assert "has the slope -0.5" in fit.message
+
+
+def test_a_given_region_of_the_right_slope_is_seldom_blamed():
+    """A slope is off by three standard errors in three of a thousand records."""
+    blamed = dict.fromkeys([(1, 8), (4, 64), (8, 128)], 0)
+    for seed in range(100):
+        wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(600, 1.0, seed=seed), 1.0)
+        for region in blamed:
+            fit = gmwm.fit(WhiteNoise(), wv, method="allan", regions={"N": region})
+            blamed[region] += "has the slope" in fit.message
+    assert max(blamed.values()) <= RARE

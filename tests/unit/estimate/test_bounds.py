@@ -142,6 +142,44 @@ def test_wavelet_variances_know_no_more_than_the_series(name, n):
         assert bound.wavelet_stderr[key] > 0.99 * bound.stderr[key]
 
 
+@pytest.mark.parametrize(
+    ("model", "n"),
+    [
+        (WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(1e-3), 20_000),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 1000.0) + RateRamp(1e-3), 6000),
+        (WhiteNoise(1.0) + BiasInstability(1.0) + RandomWalk(0.01) + RateRamp(1e-3), 20_000),
+        (WhiteNoise(1.0) + BiasInstability(0.1) + RandomWalk(1e-3), 5000),
+    ],
+)
+def test_no_direction_of_the_wavelet_bound_is_below_the_other(model, n):
+    bound = cramer_rao(model, n, 1.0)
+    scale = np.sqrt(np.diag(bound.covariance))
+    excess = (bound.wavelet_covariance - bound.covariance) / np.outer(scale, scale)
+    assert np.min(np.linalg.eigvalsh(excess)) > -1e-6
+    for key in bound.keys:
+        assert bound.wavelet_stderr[key] >= bound.stderr[key] * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "n", "relative"),
+    [
+        (WhiteNoise(0.2) + RandomWalk(0.02), 1000, 0.01),
+        (WhiteNoise(1.0) + RandomWalk(0.003), 4000, 0.01),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 300.0), 4000, 0.05),
+        (gmwm.Model((GaussMarkov(1.0, 50.0),)), 1000, 0.03),
+    ],
+)
+def test_spectral_information_holds_for_what_shows_at_the_lowest_frequencies(model, n, relative):
+    bound = cramer_rao(model, n, 1.0)
+    assert bound.exact
+    coordinates = Coordinates(model.opened())
+    information = spectral_information(coordinates, model.terms, n, 1.0)
+    jacobian = coordinates.jacobian(model.terms)
+    spectral = np.sqrt(np.diag(jacobian @ np.linalg.inv(information) @ jacobian.T))
+    for key, value in zip(keys_of(bound, coordinates), spectral, strict=True):
+        assert value == pytest.approx(bound.stderr[key], rel=relative)
+
+
 def test_separated_gauss_markov_processes_cost_the_moments_one_per_cent():
     model = GaussMarkov(1.0, 0.5) + GaussMarkov(1.0, 20.0)
     bound = cramer_rao(model, 1_000_000, 1.0)

@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from itertools import product
 
 import numpy as np
 import pytest
@@ -19,10 +20,14 @@ from gmwm import (
     RateRamp,
     WhiteNoise,
 )
+from gmwm.errors import InputError
+from gmwm.estimate.candidates import candidates
 from gmwm.estimate.fit import Fit
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood, defined
+from gmwm.estimate.series import Series
 from gmwm.process import as_model
 from gmwm.recording import Channel
+from gmwm.variance.analysis import as_channel
 
 OF_SAMPLES = ("mle", "whittle", "em")
 
@@ -394,3 +399,104 @@ def test_a_channel_gives_its_name_and_sampling_interval():
     fit = gmwm.fit(truth.opened(), Channel("gyro_x", x, 0.01, "gyro", "rad/s"), method="mle")
     assert str(fit).startswith("gyro_x: ")
     assert fit.params == mle(truth.opened(), x, dt=0.01).params
+
+
+# -- awkward starts and gaps ----------------------------------------------------------------------
+
+
+def ramped():
+    """A walk on a ramp, which no stationary model describes."""
+    truth = WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003)
+    return truth.simulate(6000, 1.0, seed=1)[:1500]
+
+
+@pytest.mark.parametrize("method", ["mle", "whittle"])
+def test_a_start_in_a_corner_is_left(method):
+    x = ramped()
+    good = gmwm.fit(GaussMarkov(), x, 1.0, method="mle", start=GaussMarkov(1.0, 50.0))
+    bad = {"start": GaussMarkov(1.0, 3e-4)}
+    for options in ({}, bad):
+        fit = gmwm.fit(GaussMarkov(), x, 1.0, method=method, **options)
+        assert fit.params["tau"] == pytest.approx(good.params["tau"], rel=0.02)
+        assert fit.log_likelihood > good.log_likelihood - 0.01
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        GaussMarkov() + RateRamp(),
+        WhiteNoise(0.2) + GaussMarkov(),
+        GaussMarkov(sigma=1.0) + WhiteNoise(),
+        RandomWalk() + WhiteNoise(),
+        AR(1),
+    ],
+)
+def test_it_is_never_below_any_grid_point(model):
+    """Of times and amplitudes, by brute force."""
+    x = ramped()[:400]
+    fit = mle(model, x)
+    model = as_model(model)
+    columns = Columns(x, 1.0, None, any(isinstance(t, RateRamp) for t in model.terms))
+    likelihood = KalmanLikelihood(columns)
+    grids = []
+    for term in model.terms:
+        if isinstance(term, RateRamp):
+            continue
+        free = [name for name, value in term.values.items() if value is None]
+        axis = [
+            np.linspace(-0.9, 0.999, 12) if name.startswith("ar") else np.geomspace(1e-3, 1e3, 12)
+            for name in free
+        ]
+        points = [dict(zip(free, map(float, v), strict=True)) for v in product(*axis)]
+        grids.append([term.with_values(**point) for point in points])
+    best = max(defined(likelihood, processes) for processes in product(*grids))
+    assert fit.log_likelihood > best - 1e-3
+
+
+def test_candidates_are_few_positive_and_spread():
+    x = ramped()
+    for model in (WhiteNoise() + 2 * GaussMarkov(), WhiteNoise() + RandomWalk() + RateRamp()):
+        series = Series.of(model, as_channel(x, 1.0), None, gaps=True)
+        found = candidates(series)
+        assert 1 <= len(found) <= 8
+        for processes in found:
+            assert [type(p) for p in processes] == [type(p) for p in series.coordinates.terms]
+            assert np.all(np.isfinite(series.coordinates.pack(processes)))
+        times = [p.tau for processes in found for p in processes if isinstance(p, GaussMarkov)]
+        assert not times or max(times) > 100.0 * min(times)
+
+
+@pytest.mark.parametrize("method", ["mle", "em"])
+@pytest.mark.parametrize("kept", [lambda k: k % 2 == 1, lambda k: k * 7 % 10 < 4])
+def test_gaps_may_be_anywhere(method, kept):
+    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
+    x = truth.simulate(4000, 1.0, seed=3)
+    gappy = np.where(kept(np.arange(x.size)), x, np.nan)
+    fit = gmwm.fit(truth.opened(), gappy, 1.0, method=method)
+    for key, value in truth.params.items():
+        assert fit.params[key] == pytest.approx(value, abs=4.0 * fit.stderr[key])
+    assert fit.valid
+    assert np.isnan(fit.p_value)
+    assert "bridges" in fit.message
+    assert Fit.from_dict(fit.to_dict()).params == fit.params
+
+
+def test_every_second_sample_is_a_series_of_twice_the_interval():
+    """A walk and white noise seen half as often are a walk and white noise."""
+    x = (WhiteNoise(0.5) + RandomWalk(0.05)).simulate(2000, 1.0, seed=8)
+    model = WhiteNoise() + RandomWalk()
+    gappy = mle(model, np.where(np.arange(x.size) % 2 == 0, x, np.nan))
+    thin = mle(model, x[::2], dt=2.0)
+    assert gappy.params["K"] == pytest.approx(thin.params["K"], rel=1e-3)
+    assert gappy.params["N"] == pytest.approx(thin.params["N"] / np.sqrt(2.0), rel=1e-3)
+
+
+def test_hardly_any_sample_is_refused():
+    x = np.where(np.arange(100) % 20 == 0, 1.0, np.nan) * np.arange(100)
+    for method in ("mle", "em"):
+        with pytest.raises(InputError, match="5 samples that are not missing: give 8 or more"):
+            gmwm.fit(WhiteNoise(), x, 1.0, method=method)
+        x[1] = np.inf
+        with pytest.raises(InputError, match="infinite samples, the first at index 1"):
+            gmwm.fit(WhiteNoise(), x, 1.0, method=method)
+        x[1] = np.nan

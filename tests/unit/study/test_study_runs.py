@@ -108,7 +108,8 @@ def test_earlier_runs_are_not_overwritten(tmp_path):
 @pytest.mark.parametrize("change", [{"seed": 1}, {"methods": ["GMWM"]}])
 def test_runs_of_another_study_are_not_mixed_in(tmp_path, change):
     run_scenario(SMALL, tmp_path, runs=2)
-    with pytest.raises(InputError, match="belongs to another study"):
+    other = f"belongs to another study, of other {next(iter(change))}: choose another folder"
+    with pytest.raises(InputError, match=other):
         run_scenario(SMALL, tmp_path, runs=3, resume=True, **change)
 
 

@@ -259,7 +259,7 @@ GAPS = np.where(np.arange(100) % 40 == 7, np.nan, noise(100))
         ((np.ones((100, 2)), 1.0), "shape (100, 2): give one series"),
         ((["a"] * 100, 1.0), "something that is not a number"),
         ((np.ones(100), 1.0), "is constant (1)"),
-        ((np.where(np.arange(100) == 3, np.inf, 1.0), 1.0), "infinite samples: remove or repair"),
+        ((np.where(np.arange(100) == 3, np.inf, 1.0), 1.0), "1 infinite samples, the first at"),
         ((GAPS, 1.0), "the series has 3 missing samples: cut it to a part without any, or take"),
         ((Channel("gyro_x", GAPS, 1.0),), "channel 'gyro_x' has 3 missing samples"),
         ((noise(100), 1.0, ["allan"]), "kind 'allan' is not known: take some of overlapping,"),

@@ -1,0 +1,194 @@
+"""Examine a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import BoolArray
+from gmwm.diagnosis.drift import drift_finding, variance_finding
+from gmwm.diagnosis.events import event_finding, find_events
+from gmwm.diagnosis.findings import ChannelHealth, Finding, Health, worst_first
+from gmwm.diagnosis.innovations import FEWEST, Innovations, innovations
+from gmwm.diagnosis.lines import Line, find_lines, line_findings
+from gmwm.diagnosis.pairs import crosstalk_findings, temperature_findings
+from gmwm.diagnosis.resolution import rounding_finding, step_size
+from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_finding
+from gmwm.diagnosis.samples import dead_finding, gap_findings, saturation_finding, stuck_finding
+from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM
+from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.recording import Channel, Recording
+
+Progress = Callable[[str], None]
+"""Called with the name of each channel when it is done."""
+
+_LONG_ENOUGH = 3600.0  # s: slow errors of inertial sensors have correlation times of minutes
+_SAID_OTHERWISE = "samples missing"
+_SEVERE = ("warning", "bad")
+
+
+@dataclass(frozen=True, eq=False)
+class _Examined:
+    """A channel: its findings, its numbers, and its prediction errors in standard deviations."""
+
+    findings: list[Finding]
+    facts: ChannelHealth
+    errors: FloatArray | None
+
+
+def health(recording: Recording, *, progress: Progress | None = None) -> Health:
+    """Find what is wrong with a static recording, or needs a term of its own in the model.
+
+    Gaps, dead and stuck channels, saturation, spikes and knocks, rounding, periodic lines,
+    resonances, drift, changes of the noise, dependence on temperature and between channels. Each
+    kind of finding is made in at most about one of a thousand channels of clean Gaussian noise.
+
+    Parameters
+    ----------
+    recording : Recording
+    progress : callable, optional
+        Called with each channel's name when it is done.
+
+    Returns
+    -------
+    Health
+
+    Examples
+    --------
+    >>> import numpy as np, gmwm
+    >>> noise = np.random.default_rng(1).normal(size=(5000))
+    >>> noise[3000] = 40.0
+    >>> rec = gmwm.Recording.from_arrays({"gyro_x": noise}, 100.0, {"gyro": "deg/s"})
+    >>> found = gmwm.health(rec)
+    >>> [start <= 3000 < stop for start, stop in found.events("gyro_x")]
+    [True]
+    >>> found.masked(rec)["gyro_x"].is_complete
+    False
+    """
+    whole = [_length(recording), *_reader_findings(recording)]
+    examined: dict[str, _Examined] = {}
+    for channel in recording:
+        examined[channel.name] = _examined(channel)
+        if progress is not None:
+            progress(channel.name)
+    shared = gap_findings(recording, recording.dt)
+    shared += crosstalk_findings(
+        {name: one.errors for name, one in examined.items() if one.errors is not None}
+    )
+    shared += temperature_findings(recording)
+    findings = worst_first(whole + [found for found in shared if not found.channel])
+    for name, one in examined.items():
+        own = one.findings + [found for found in shared if found.channel == name]
+        if not any(found.severity in _SEVERE for found in own):
+            own.append(_clean(name))
+        findings += worst_first(own)
+    return Health(
+        findings=tuple(findings),
+        channels={name: one.facts for name, one in examined.items()},
+        source=recording.source,
+        rate=recording.rate,
+        n=recording.n,
+    )
+
+
+def _length(recording: Recording) -> Finding:
+    length = recording.duration
+    text = f"{recording.n:,} samples at {recording.rate:g} Hz, {length:.6g} s"
+    numbers = {"duration": length, "rate": recording.rate}
+    if length < _LONG_ENOUGH:
+        return Finding(
+            "", "length", "note", f"{text}, too short for slow errors of minutes and more",
+            "an hour or more shows them", numbers,
+        )  # fmt: skip
+    return Finding("", "length", "good", text, "", numbers)
+
+
+def _reader_findings(recording: Recording) -> list[Finding]:
+    """The reader's notes, but for those on missing samples of channels, which are told anew."""
+    findings = []
+    for note in recording.notes:
+        before = note.partition(": ")[0].split(", ")
+        if _SAID_OTHERWISE in note and set(before) <= set(recording.names):
+            continue
+        findings.append(Finding("", "reader", "note", note.removesuffix(".")))
+    return findings
+
+
+def _clean(name: str) -> Finding:
+    text = "nothing found that spoils the estimates"
+    return Finding(name, "clean", "good", text, "", {})
+
+
+def _examined(channel: Channel) -> _Examined:
+    name, unit, dt = channel.name, channel.unit, channel.dt
+    values = np.asarray(channel.values, dtype=float)
+    dead = dead_finding(channel)
+    if dead is not None or channel.missing == channel.n:
+        return _Examined([dead] if dead else [], ChannelHealth(), None)
+    infinite = int(np.count_nonzero(np.isinf(values)))
+    if infinite:
+        text = f"{infinite:,} infinite samples"
+        repair = "repair them, or set them to NaN for missing"
+        return _Examined([Finding(name, "infinite", "bad", text, repair)], ChannelHealth(), None)
+    present = values[~np.isnan(values)]
+    step = step_size(present)
+    errors = innovations(values, step)
+    if errors is None:
+        text = f"fewer than {FEWEST} samples in a row: nothing more can be said"
+        return _Examined(
+            [Finding(name, "length", "warning", text, "record longer")],
+            ChannelHealth(lsb=step), None,
+        )  # fmt: skip
+    events = find_events(errors)
+    usable = errors.known.copy()
+    quiet = values.copy()
+    for start, stop in events:
+        usable[start:stop] = False
+        quiet[start:stop] = np.nan
+    found = [
+        stuck_finding(name, unit, dt, values, step, errors),
+        saturation_finding(name, unit, present, step),
+        event_finding(name, unit, dt, values, events, errors.level),
+        rounding_finding(name, unit, step, errors.level),
+        variance_finding(name, unit, dt, errors, usable, step),
+        drift_finding(name, unit, dt, quiet),
+    ]
+    findings = [one for one in found if one is not None]
+    lines, bumps = _peaks(quiet, dt)
+    if any(one.kind == "rounding" and one.severity == "bad" for one in findings):
+        bumps = ()  # steps that come and go as the level passes them make bumps of their own
+    findings += line_findings(name, unit, lines)
+    findings += [resonance_finding(name, unit, bump) for bump in bumps]
+    facts = ChannelHealth(
+        lines=tuple((line.frequency, line.amplitude) for line in lines),
+        resonances=tuple((bump.frequency, bump.damping) for bump in bumps),
+        events=events,
+        lsb=step,
+    )
+    return _Examined(findings, facts, _standardized(errors, usable))
+
+
+def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
+    """Lines, and resonances of what they leave."""
+    if values.size < FEWEST_OF_SPECTRUM or np.count_nonzero(~np.isnan(values)) < values.size / 2:
+        return (), ()
+    power = spectrum(values, dt)
+    if not np.any(power.density > 0.0):
+        return (), ()
+    lines = find_lines(power, background(power, bands(power)))
+    taken = np.zeros(power.density.size, dtype=bool)
+    for line in lines:
+        margin = (line.stop - line.start) // 2
+        taken[max(line.start - margin, 0) : line.stop + margin] = True
+    rest = bands(power, taken)
+    return lines, find_resonances(power, rest, background(power, rest), taken)
+
+
+def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:
+    if not errors.level > 0.0:
+        return None
+    safe = np.where(errors.scale > 0.0, errors.scale, errors.level)
+    return np.where(usable, errors.values / safe, np.nan)

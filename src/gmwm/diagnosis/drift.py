@@ -1,0 +1,179 @@
+"""Slow changes: of the level, and of the size of the noise."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.stats import f as f_distribution
+from scipy.stats import norm
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import BoolArray
+from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.words import spoken
+
+FALSE_ALARM = 1e-3
+"""Chance of each finding where noise is Gaussian and stationary."""
+
+PARTS = 64
+"""Parts of the record whose means show the wander."""
+
+_SHORT = 64  # samples whose means give the fast noise
+_RAMP = 20.0  # change over the record, in rms of the wander: one random walk in 1000 has more
+_TENTHS = 10
+_CHANGE = 0.05  # of the standard deviation between halves that is worth a word
+_LARGE_CHANGE = 0.2
+
+
+def part_means(values: FloatArray, parts: int = PARTS) -> FloatArray:
+    """Means of equal parts of a series; NaN where more than half of a part is missing."""
+    size = values.size // parts
+    rows = values[: size * parts].reshape(parts, size)
+    known = ~np.isnan(rows)
+    count = np.count_nonzero(known, axis=1)
+    total = np.sum(np.where(known, rows, 0.0), axis=1)
+    return np.where(count > size / 2, total / np.maximum(count, 1), np.nan)
+
+
+def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Finding | None:
+    """Say how far the level wanders, and whether it does so in one direction.
+
+    The variance of the means of 64 parts is compared with what the differences between means of
+    64 samples would give if all noise were white (F test). A straight line through the means is a
+    drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
+    20 times the root mean square of what the line leaves (200,000 simulated).
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    dt : float
+        s.
+    values : (n,) ndarray
+        Samples, NaN where missing.
+    """
+    size = values.size // PARTS
+    if size < 2 * _SHORT:
+        return None
+    means = part_means(values)
+    place = np.arange(PARTS) - 0.5 * (PARTS - 1)
+    known = ~np.isnan(means)
+    short = part_means(values, values.size // _SHORT)
+    steps = np.diff(short)
+    steps = steps[~np.isnan(steps)]
+    if np.count_nonzero(known) < PARTS / 2 or steps.size < PARTS:
+        return None
+    means, place = means[known], place[known]
+    place = place - np.mean(place)
+    slope = float(place @ means / (place @ place))
+    rest = means - np.mean(means) - slope * place
+    freedom = means.size - 2
+    wander = float(np.sqrt(rest @ rest / freedom))
+    # Differences of means that are not independent have two thirds of the degrees of freedom.
+    white = float(np.sqrt(0.5 * np.mean(steps**2) * _SHORT / size))
+    if not white > 0.0:
+        return None
+    change = slope * PARTS
+    ratio = wander / white
+    ramp = abs(change) > _RAMP * wander
+    wanders = ratio**2 > f_distribution.isf(FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
+    if not (wanders or ramp):
+        return None
+    numbers = {"wander": wander, "white": white, "change": change}
+    if ramp:
+        return Finding(
+            name, "drift", "warning",
+            f"drifts by {spoken(change, unit, sign=True)} over the record, and wanders about "
+            f"that by {spoken(wander, unit)} rms",
+            "add a RateRamp to the model, or leave out the warm-up",
+            numbers,
+        )  # fmt: skip
+    text = (
+        f"means of {size * dt:.3g} s wander by {spoken(wander, unit)} rms, {ratio:.2g} times "
+        "what the fast noise leaves"
+    )
+    action = "estimated as random walk or slow Gauss-Markov process"
+    return Finding(name, "drift", "note", text, action, numbers)
+
+
+def variance_finding(
+    name: str,
+    unit: str,
+    dt: float,
+    errors: Innovations,
+    usable: BoolArray,
+    step: float,
+) -> Finding | None:
+    """Say whether the noise is as large at the end as at the beginning.
+
+    Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
+    variance gives the error of their means, so tails heavier than Gaussian do no harm.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    dt : float
+        s.
+    errors : Innovations
+    usable : (n,) ndarray of bool
+        Prediction errors outside events.
+    step : float
+        To which samples are rounded, u.
+    """
+    level = errors.level
+    if step > 2.0 * level or np.count_nonzero(usable) < 1000:
+        return None  # noise below the step is seen only when the level is between two steps
+    squares = [part[keep] ** 2 for part, keep in _tenths(errors.values, usable)]
+    if min(part.size for part in squares) < 50:
+        return None
+    means = np.array([np.mean(part) for part in squares])
+    spread = np.array([np.var(part) / part.size for part in squares])
+    usual = float(np.median(means))
+    loudest = int(np.argmax(means))
+    jump = np.sqrt(means[loudest] / usual) - 1.0
+    tail = norm.isf(FALSE_ALARM / _TENTHS) * np.sqrt(spread[loudest]) / usual
+    is_loud = jump > _LARGE_CHANGE and means[loudest] / usual - 1.0 > tail
+    # One loud tenth makes its half louder, which is no trend.
+    counted = np.arange(_TENTHS) != loudest if is_loud else np.ones(_TENTHS, dtype=bool)
+    first, first_error = _mean_of(means, spread, counted & (np.arange(_TENTHS) < _TENTHS // 2))
+    second, second_error = _mean_of(means, spread, counted & (np.arange(_TENTHS) >= _TENTHS // 2))
+    numbers = {
+        "first_half": float(np.sqrt(first)),
+        "second_half": float(np.sqrt(second)),
+        "loudest_tenth": float(loudest),
+        "loudest": float(np.sqrt(means[loudest])),
+    }
+    # On the logarithmic scale the ratio of two variances is nearly normal.
+    error = norm.isf(0.5 * FALSE_ALARM) * np.hypot(first_error / first, second_error / second)
+    growth = np.sqrt(second / first) - 1.0
+    if abs(np.log(second / first)) > error and abs(growth) > _CHANGE:
+        severity: Severity = "warning" if abs(growth) > _LARGE_CHANGE else "note"
+        text = (
+            f"the noise is {100.0 * abs(growth):.2g} % {'larger' if growth > 0.0 else 'smaller'} "
+            "in the second half than in the first"
+        )
+        action = "the model is an average: use the part that is like the use"
+        return Finding(name, "variance", severity, text, action, numbers)
+    if is_loud:
+        start = loudest * errors.values.size // _TENTHS * dt
+        text = (
+            f"the noise is {100.0 * jump:.2g} % larger than usual in the tenth of the record that "
+            f"begins at {start:.4g} s"
+        )
+        action = "look for people or machines then, and leave it out if it is none of the sensor"
+        return Finding(name, "variance", "warning", text, action, numbers)
+    return None
+
+
+def _mean_of(means: FloatArray, spread: FloatArray, which: BoolArray) -> tuple[float, float]:
+    """Mean of some tenths and its standard error."""
+    count = np.count_nonzero(which)
+    return float(np.mean(means[which])), float(np.sqrt(np.sum(spread[which])) / count)
+
+
+def _tenths(values: FloatArray, usable: BoolArray) -> list[tuple[FloatArray, BoolArray]]:
+    edges = np.linspace(0, values.size, _TENTHS + 1).astype(int)
+    return [(values[a:b], usable[a:b]) for a, b in pairwise(edges)]

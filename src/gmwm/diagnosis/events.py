@@ -1,0 +1,131 @@
+"""Spikes and knocks: samples that the noise does not explain."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import norm
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.findings import Finding
+from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.words import spoken
+
+FALSE_ALARM = 1e-3
+"""Chance of an event in a channel of Gaussian noise, however long."""
+
+_RING = 4.0  # standard deviations: what belongs to a knock, once there is one
+_JOINED = 24  # samples between exceedances of one event
+_GUARD = 8  # samples before and at least as many after that are left out with it
+_BESIDE = 200  # samples on both sides that tell the level without the event
+_LISTED = 3
+
+
+def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
+    """Sample intervals in which prediction errors are too large for noise.
+
+    An error is too large beyond the quantile of the normal distribution that noise passes with
+    `FALSE_ALARM` in the whole channel, plus what rounding can add. Errors beyond four standard
+    deviations next to it belong to the same event.
+
+    Parameters
+    ----------
+    errors : Innovations
+
+    Returns
+    -------
+    tuple of (int, int)
+        First sample and the one after the last, widened by a guard.
+    """
+    n = errors.values.size
+    beyond = np.abs(errors.values) - errors.rounding
+    known = max(int(np.count_nonzero(errors.known)), 1)
+    limit = float(norm.isf(0.5 * FALSE_ALARM / known))
+    if not np.any(beyond > limit * errors.scale):
+        return ()
+    weak = np.flatnonzero(beyond > _RING * errors.scale)
+    groups = np.split(weak, np.flatnonzero(np.diff(weak) > _JOINED) + 1)
+    found: list[tuple[int, int]] = []
+    for group in groups:
+        if not np.any(beyond[group] > limit * errors.scale[group]):
+            continue
+        # What rings dies away below the noise: as long again is left out.
+        after = max(_GUARD, int(group[-1] - group[0]))
+        start, stop = max(int(group[0]) - _GUARD, 0), min(int(group[-1]) + after + 1, n)
+        if found and start <= found[-1][1]:
+            start = found.pop()[0]
+        found.append((start, stop))
+    return tuple(found)
+
+
+def event_finding(
+    name: str,
+    unit: str,
+    dt: float,
+    values: FloatArray,
+    events: tuple[tuple[int, int], ...],
+    scatter: float,
+) -> Finding | None:
+    """Say when the events are, how large and how long.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    dt : float
+        s.
+    values : (n,) ndarray
+        Samples, NaN where missing.
+    events : tuple of (int, int)
+    scatter : float
+        Usual standard deviation of a prediction error, u.
+    """
+    if not events:
+        return None
+    clean = np.array(values)
+    for start, stop in events:
+        clean[start:stop] = np.nan
+    found = [_height(values, clean, *event) for event in events]
+    heights = np.array([height for height, _ in found])
+    energy = sum(energy for _, energy in found)
+    largest = int(np.argmax(np.abs(heights)))
+    start, stop = events[largest]
+    known = int(np.count_nonzero(~np.isnan(values)))
+    # Squares of the noise are among those of the events.
+    samples = sum(stop - start for start, stop in events)
+    share = max(energy / scatter**2 - samples, 0.0) / known if scatter > 0.0 else np.inf
+    # The variance of n samples is known to its (2/n)^(1/2)-th part.
+    harmful = share > np.sqrt(2.0 / known)
+    length = (stop - start) * dt
+    many = len(events) > 1
+    which = f"{len(events):,} spikes or knocks, the largest" if many else "a spike or knock"
+    height = spoken(heights[largest], unit, sign=True)
+    text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
+    if 1 < len(events) <= _LISTED + 1:
+        others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
+        text += f" (others at {', '.join(others)} s)"
+    action = (
+        "leave it out with Health.masked, or use robust=True"
+        if harmful
+        else "too small to change the variance; Health.masked leaves it out"
+    )
+    numbers = {
+        "count": float(len(events)),
+        "time": start * dt,
+        "height": float(heights[largest]),
+        "duration": length,
+        "samples": float(samples),
+        "variance_share": float(share),
+    }
+    return Finding(name, "event", "warning" if harmful else "note", text, action, numbers)
+
+
+def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:
+    """Largest departure from the level beside the event, and the sum of squares."""
+    beside = np.concatenate([clean[max(start - _BESIDE, 0) : start], clean[stop : stop + _BESIDE]])
+    beside = beside[~np.isnan(beside)]
+    inside = values[start:stop]
+    inside = inside[~np.isnan(inside)]
+    level = float(np.median(beside)) if beside.size else float(np.median(inside))
+    departure = inside - level
+    top = float(departure[np.argmax(np.abs(departure))])
+    return top, float(np.sum(departure**2))

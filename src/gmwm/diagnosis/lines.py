@@ -1,0 +1,260 @@
+"""Periodic lines: peaks of the periodogram too high for noise and too narrow for a resonance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import IntArray
+from gmwm.diagnosis.findings import Finding
+from gmwm.diagnosis.spectrum import FIRST, POWER_INFLATION, Spectrum
+from gmwm.diagnosis.words import spoken
+
+FALSE_ALARM = 1e-3
+"""Chance of a line in a channel of Gaussian noise."""
+
+_NARROW = 0.01  # of the frequency: wider is a resonance
+_UNRESOLVED = 6  # bins that a pure line takes
+_BESIDE = 64  # bins on both sides that tell the local background, or
+_BESIDE_SHARE = 0.015  # this part of the frequency
+_CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
+_EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
+_MOST = 40  # lines of one channel
+_NAMED = 4  # lines in the findings
+_ABOVE = 1.5  # ratio to the background that ends the foot of a line
+_FOOT = 0.05  # of the frequency: no foot reaches farther
+
+
+@dataclass(frozen=True)
+class Line:
+    """A periodic line.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz.
+    amplitude : float
+        Of a sinusoid of the same power, u.
+    ratio : float
+        Density over that of the surroundings, over the width.
+    width : float
+        Over which it is smeared, Hz.
+    start, stop : int
+        Bins that it takes.
+    """
+
+    frequency: float
+    amplitude: float
+    ratio: float
+    width: float
+    start: int
+    stop: int
+
+
+def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
+    """Lines by their power, strongest first.
+
+    The mean of m = 1, 2, 4, ... neighbouring bins, over the local background, is compared with
+    the quantile of an F distribution that noise passes with `FALSE_ALARM` in all bins and widths
+    together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
+    correlation between Hann bins, which rules the tail. Wider means find lines that wander.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    smooth : (n // 2 + 1,) ndarray
+        Background, u^2/Hz.
+    """
+    last = spectrum.density.size - 1
+    if last <= FIRST + 2 * _UNRESOLVED:
+        return ()
+    local, freedom = _local_background(spectrum.density, smooth)
+    ratio = spectrum.density / local
+    grid, limits = _limits(last, freedom)
+    score, best = _scores(ratio, freedom, grid, limits, 0, last)
+    lines: list[Line] = []
+    for _ in range(_MOST):
+        k = int(np.argmax(score))
+        if score[k] <= 1.0:
+            break
+        line = _measured(spectrum, local, k, int(best[k]))
+        wide = line.width > max(_NARROW * line.frequency, _UNRESOLVED * spectrum.resolution)
+        if not wide:
+            lines.append(line)
+        # What it takes, and half of that on both sides, is noise from here on.
+        margin = (line.stop - line.start) // 2
+        ratio[max(line.start - margin, 0) : line.stop + margin] = 1.0
+        reach = margin + max(limits)
+        low, high = max(line.start - reach, 0), min(line.stop + reach, last)
+        score[low:high], best[low:high] = _scores(ratio, freedom, grid, limits, low, high)
+    return tuple(sorted(lines, key=lambda line: -line.amplitude))
+
+
+def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding]:
+    """One finding for each of the strongest lines and its harmonics, one for the rest."""
+    families = _families(lines)
+    findings = []
+    for main, harmonics in families[:_NAMED]:
+        amplitude = spoken(main.amplitude, unit)
+        text = (
+            f"a periodic line at {main.frequency:.4g} Hz, amplitude {amplitude}, "
+            f"{main.ratio:.3g} times its surroundings"
+        )
+        if harmonics:
+            at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
+            text += f", with harmonics at {at} Hz"
+        findings.append(
+            Finding(
+                name, "line", "warning", text,
+                "add a Sinusoid to the model, or find what turns or hums",
+                {
+                    "frequency": main.frequency,
+                    "amplitude": main.amplitude,
+                    "ratio": main.ratio,
+                    "width": main.width,
+                    "harmonics": float(len(harmonics)),
+                },
+            )
+        )  # fmt: skip
+    rest = families[_NAMED:]
+    if rest:
+        strongest = rest[0][0]
+        text = (
+            f"{len(rest)} weaker periodic line{'s' if len(rest) > 1 else ''}, the strongest at "
+            f"{strongest.frequency:.4g} Hz, amplitude {spoken(strongest.amplitude, unit)}"
+        )
+        numbers = {"count": float(len(rest)), "frequency": strongest.frequency,
+                   "amplitude": strongest.amplitude}  # fmt: skip
+        findings.append(Finding(name, "line", "note", text, "", numbers))
+    return findings
+
+
+def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Background that follows bumps, and its degrees of freedom.
+
+    Mean logarithm over the neighbours, those cut that are too high for noise.
+    """
+    k = np.arange(density.size)
+    reach = np.maximum(_BESIDE, (_BESIDE_SHARE * k).astype(int))
+    low, high = np.maximum(k - reach, FIRST // 2), np.minimum(k + reach + 1, density.size - 1)
+    low = np.minimum(low, high - 1)
+    count = high - low
+    logs = np.log(np.maximum(density / smooth, np.finfo(float).tiny)) + np.euler_gamma
+    level = np.zeros(density.size)
+    for cut in (np.inf, _CLIP + np.euler_gamma, _CLIP + np.euler_gamma):
+        total = np.concatenate([[0.0], np.cumsum(np.minimum(logs, level + cut))])
+        level = (total[high] - total[low]) / count
+    # A mean of logarithms of exponential variates has 6/pi^2 of the efficiency.
+    freedom = 2.0 * count * (6.0 / np.pi**2) / POWER_INFLATION
+    return smooth * np.exp(level), freedom
+
+
+def _limits(bins: int, freedom: FloatArray) -> tuple[FloatArray, dict[int, FloatArray]]:
+    """Grid of degrees of freedom of the background, and largest ratios of noise on it by width."""
+    widest = max(int(_NARROW * bins), 1)
+    widths = [2**i for i in range(int(np.log2(widest)) + 1)]
+    grid = np.geomspace(np.min(freedom), np.max(freedom) * 1.001, 12)
+    chance = FALSE_ALARM / (bins * len(widths))
+    limits = {}
+    for width in widths:
+        eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
+        limits[width] = f_distribution.isf(chance, 2.0 * width / eigenvalue, grid)
+    return grid, limits
+
+
+def _scores(
+    ratio: FloatArray,
+    freedom: FloatArray,
+    grid: FloatArray,
+    limits: dict[int, FloatArray],
+    start: int,
+    stop: int,
+) -> tuple[FloatArray, IntArray]:
+    """Largest ratio to the limit over all widths, and the width that has it, of some bins.
+
+    Parameters
+    ----------
+    ratio : (n // 2 + 1,) ndarray
+        Density over background.
+    freedom : (n // 2 + 1,) ndarray
+        Degrees of freedom of the background.
+    grid, limits : (K,) ndarray and dict
+        See `_limits`.
+    start, stop : int
+        Bins.
+    """
+    last = ratio.size - 1
+    widest = max(limits)
+    low, high = max(start - widest, 0), min(stop + widest, last)
+    total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
+    score, best = np.zeros(stop - start), np.ones(stop - start, dtype=int)
+    for width, limit in limits.items():
+        slowest = int(width / _NARROW) if width > _UNRESOLVED else 0
+        centre = np.arange(max(start, FIRST, slowest, low + width // 2), stop)
+        begin = centre - width // 2 - low
+        fits = begin + width < total.size
+        centre, begin = centre[fits], begin[fits]
+        value = (
+            (total[begin + width] - total[begin]) / width / np.interp(freedom[centre], grid, limit)
+        )
+        better = value > score[centre - start]
+        score[centre[better] - start] = value[better]
+        best[centre[better] - start] = width
+    return score, best
+
+
+def _measured(spectrum: Spectrum, local: FloatArray, k: int, width: int) -> Line:
+    """Frequency, amplitude and foot of the line at bin k."""
+    density, df = spectrum.density, spectrum.resolution
+    surroundings = float(local[k])
+    # The feet of a strong line that wanders raise the background beneath it: look beyond them.
+    for _ in range(2):
+        start, stop = _foot(density / surroundings, k, width)
+        reach = max(_BESIDE, int(_BESIDE_SHARE * k))
+        sides = local[np.clip([start - reach, stop + reach], FIRST, local.size - 2)]
+        surroundings = float(min(np.exp(np.mean(np.log(sides))), local[k]))
+    bins = np.arange(start, stop)
+    excess = density[start:stop] - surroundings
+    area = float(np.sum(excess))
+    positive = np.maximum(excess, 0.0)
+    strong = positive * (positive > 0.05 * np.max(positive))
+    frequency = float(np.sum(strong * bins) / np.sum(strong)) * df
+    # Bins of equal height that would have the same power and the same sum of squares.
+    extent = float(np.sum(positive) ** 2 / np.sum(positive**2))
+    ratio = 1.0 + area / (extent * surroundings)
+    amplitude = float(np.sqrt(2.0 * max(area, 0.0) * df))
+    return Line(frequency, amplitude, ratio, extent * df, start, stop)
+
+
+def _foot(ratio: FloatArray, k: int, width: int) -> tuple[int, int]:
+    """Bins around k over which means stay above the surroundings."""
+    step = max(width, 8)
+    ends = []
+    for sign in (-1, 1):
+        at = k
+        for _ in range(4 + int(2.0 * _FOOT * k / step)):
+            block = ratio[max(at - step // 2, 1) : at + step // 2 + 1]
+            if block.size == 0 or np.mean(block) < _ABOVE:
+                break
+            at += sign * (step // 2)
+        ends.append(int(np.clip(at, 1, ratio.size - 1)))
+    return min(ends[0], k - 3), min(max(ends[1], k + 3) + 1, ratio.size - 1)
+
+
+def _families(lines: tuple[Line, ...]) -> list[tuple[Line, list[Line]]]:
+    """Lines with their harmonics, families by the power of their strongest line."""
+    families: list[tuple[Line, list[Line]]] = []
+    for line in sorted(lines, key=lambda line: line.frequency):
+        for main, harmonics in families:
+            order = round(line.frequency / main.frequency)
+            tolerance = order * max(main.width, 1e-3 * main.frequency) + line.width
+            off = abs(line.frequency - order * main.frequency)
+            if order > 1 and off <= min(tolerance, 0.01 * line.frequency):
+                harmonics.append(line)
+                break
+        else:
+            families.append((line, []))
+    return sorted(families, key=lambda family: -family[0].amplitude)

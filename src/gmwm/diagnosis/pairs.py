@@ -1,0 +1,98 @@
+"""What two channels have in common."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as t_distribution
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import inner
+from gmwm.diagnosis.drift import PARTS, part_means
+from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis.innovations import FEWEST
+from gmwm.recording import Recording
+
+FALSE_ALARM = 1e-3
+"""Chance of a finding where no two channels depend on each other."""
+
+_WORTH_A_WORD = 0.05
+_STRONG = 0.3
+_CLIP = 4.0  # standard deviations
+_FEWEST_PARTS = 16
+_PART = 32  # samples
+
+
+def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
+    """Find pairs of channels whose prediction errors are correlated.
+
+    The correlation of two white series has the variance 1/n, whatever the spectra of the channels
+    were; one that matters is above 0.05.
+
+    Parameters
+    ----------
+    errors : dict
+        Channel name -> prediction errors in units of their standard deviation, NaN where there is
+        none.
+    """
+    pairs = list(combinations(errors, 2))
+    # Zero counts for nothing in a sum of products.
+    clipped = {name: np.nan_to_num(np.clip(e, -_CLIP, _CLIP)) for name, e in errors.items()}
+    findings = []
+    for one, other in pairs:
+        a, b = clipped[one], clipped[other]
+        n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
+        if n < FEWEST:
+            continue
+        r = inner(a, b) / np.sqrt(inner(a, a) * inner(b, b))
+        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * FALSE_ALARM / len(pairs)):
+            continue
+        if abs(r) > _WORTH_A_WORD:
+            severity: Severity = "warning" if abs(r) > _STRONG else "note"
+            findings.append(
+                Finding(
+                    "", "crosstalk", severity,
+                    f"fast noise of {one} and {other} is correlated by {r:.2g}",
+                    "each channel is modelled for itself; a filter may want their covariance",
+                    {"correlation": r, "samples": float(n)},
+                )
+            )  # fmt: skip
+    return findings
+
+
+def temperature_findings(recording: Recording) -> list[Finding]:
+    """Find channels that follow a temperature channel (one whose name begins with ``temp``).
+
+    Changes from one of 64 parts of the record to the next are correlated: what only drifts in
+    the same direction does not count.
+    """
+    thermometers = [c for c in recording if c.name.lower().startswith("temp")]
+    others = [c for c in recording if c not in thermometers]
+    if recording.n < PARTS * _PART:
+        return []
+    findings = []
+    for thermometer in thermometers:
+        warmer = np.diff(part_means(thermometer.values))
+        for channel in others:
+            step = np.diff(part_means(channel.values))
+            known = ~np.isnan(warmer + step)
+            n = int(np.count_nonzero(known))
+            if n < _FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
+                continue
+            r = float(np.corrcoef(warmer[known], step[known])[0, 1])
+            size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
+            if size <= t_distribution.isf(0.5 * FALSE_ALARM / len(others), n - 2):
+                continue
+            slope = float(np.polyfit(warmer[known], step[known], 1)[0])
+            findings.append(
+                Finding(
+                    channel.name, "temperature", "warning",
+                    f"follows {thermometer.name} by {slope:.2g} {channel.unit} a degree "
+                    f"(correlation {r:.2g})",
+                    "compensate for it first, or slow terms of the model will stand for it",
+                    {"correlation": r, "slope": slope},
+                )
+            )  # fmt: skip
+    return findings

@@ -1,0 +1,107 @@
+"""The step of a sensor's output, and what rounding to it does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import inner
+from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis.words import spoken
+
+_LOOKED_AT = 65_536  # samples; a lattice shows in fewer
+_SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
+_CLOSE = 1.5  # steps up to this many times the smallest are counted as one step
+_DIVISORS = range(1, 7)  # the smallest difference seen may be a few steps
+_OFF_LATTICE = 0.1  # rms distance from the lattice, in steps; numbers at random have 0.29
+_FEWEST = 8  # levels that prove a lattice by their places alone
+_EXACT = 1e-3  # rms distance at which a smaller divisor is not worth a look
+
+
+def step_size(values: FloatArray) -> float:
+    """Largest step of which all differences between samples are multiples.
+
+    Text holds steps rounded to some decimals (0.00333, 0.00667, 0.01): places may be off the
+    lattice by a tenth of a step (root mean square).
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Samples, none missing.
+
+    Returns
+    -------
+    float
+        In the unit of ``values``; 0 if there is none.
+    """
+    stride = -(-values.size // _LOOKED_AT)
+    part = values[::stride]
+    levels = np.unique(part)
+    if levels.size < 2:
+        return 0.0
+    differences = np.diff(levels)
+    differences = differences[differences > _SMALLEST * (levels[-1] - levels[0])]
+    smallest = float(np.min(differences))
+    first = float(np.median(differences[differences <= _CLOSE * smallest]))
+    # Few levels that come again and again are steps whatever their places.
+    if levels.size < _FEWEST and levels.size > part.size / 2:
+        return 0.0
+    for divisor in _DIVISORS:
+        step, off = _lattice(levels, first / divisor)
+        if off <= _OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
+            return step
+    return 0.0
+
+
+def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
+    """Step after regression of the levels on their places, and rms distance in steps."""
+    places = np.concatenate([[0.0], np.cumsum(np.rint(np.diff(levels) / step))])
+    if places[-1] == 0.0:
+        return step, np.inf
+    centred = places - np.mean(places)
+    refined = inner(centred, levels - np.mean(levels)) / inner(centred, centred)
+    gaps = np.diff(levels) / refined
+    return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
+
+
+def rounding_finding(name: str, unit: str, step: float, scatter: float) -> Finding | None:
+    """Say how coarse the step is against the white noise.
+
+    The error of rounding is uniform, white and independent of the signal as long as the noise
+    before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
+    sec. 5): of variance step^2/12, plain additive noise.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    step : float
+        u; 0 if there is none.
+    scatter : float
+        Standard deviation of what cannot be foreseen from the samples before, rounding included,
+        u.
+    """
+    if step == 0.0:
+        return None
+    noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
+    values = {"lsb": step, "noise": noise}
+    text = f"samples come in steps of {spoken(step, unit)}"
+    if noise < step / 3.0:
+        return Finding(
+            name, "rounding", "bad",
+            f"{text}, more than three times the noise below them",
+            "nothing mends it: the noise below the step cannot be estimated; use a finer range",
+            values,
+        )  # fmt: skip
+    ratio = step / noise
+    text = f"{text}, {ratio:.2g} times the white noise of {spoken(noise, unit)}"
+    if ratio > 1.0:
+        return Finding(
+            name, "rounding", "warning", text,
+            "counted as additive noise, which is nearly true up to a step of twice the noise",
+            values,
+        )  # fmt: skip
+    severity: Severity = "note" if ratio > 0.5 else "good"
+    share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
+    action = f"counted as white noise: {100.0 * share:.2g} % of it"
+    return Finding(name, "rounding", severity, text, action, values)

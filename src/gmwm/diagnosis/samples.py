@@ -1,0 +1,234 @@
+"""Samples that are missing, stuck or cut off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.stats import binom
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import IntArray
+from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.words import spoken
+from gmwm.recording import Channel
+
+FALSE_ALARM = 1e-3
+"""Chance of a stuck value or of saturation in a channel of Gaussian noise."""
+
+_MUCH_MISSING = 0.1
+_TOO_MUCH_MISSING = 0.5
+_DITHERED = 0.05  # share of differences of two steps and more at which noise tells samples apart
+_LONG = 32  # equal samples in a row that are not asked whether noise tells samples apart
+_FEWEST_AT_END = 8
+
+
+def gap_findings(channels: Iterable[Channel], dt: float) -> list[Finding]:
+    """How much is missing; one finding for the recording where all channels miss the same."""
+    findings = [found for channel in channels if (found := _gap_finding(channel, dt))]
+    alike = {(found.sentence, found.severity) for found in findings}
+    channels = list(channels)
+    if len(findings) == len(channels) > 1 and len(alike) == 1:
+        first = findings[0]
+        return [Finding("", "gap", first.severity, first.sentence, first.action, first.values)]
+    return findings
+
+
+def _gap_finding(channel: Channel, dt: float) -> Finding | None:
+    gone = np.isnan(channel.values)
+    missing = int(np.count_nonzero(gone))
+    if not missing:
+        return None
+    edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+    lengths = edges[1::2] - edges[::2]
+    share = missing / channel.n
+    values = {
+        "missing": float(missing),
+        "share": share,
+        "gaps": float(lengths.size),
+        "longest": float(np.max(lengths)) * dt,
+    }
+    if missing == channel.n:
+        return Finding(
+            channel.name, "gap", "bad", "all samples missing", "look at cable and columns", values
+        )
+    plural = "s" if lengths.size > 1 else ""
+    text = (
+        f"{missing:,} of {channel.n:,} samples missing ({share:.2g} of all) in {lengths.size:,} "
+        f"gap{plural}, the longest {values['longest']:.3g} s"
+    )
+    if share > _TOO_MUCH_MISSING:
+        return Finding(channel.name, "gap", "bad", text, "too few are left: record again", values)
+    severity: Severity = "warning" if share > _MUCH_MISSING else "note"
+    action = "the wavelet variance leaves out what gaps touch"
+    return Finding(channel.name, "gap", severity, text, action, values)
+
+
+def dead_finding(channel: Channel) -> Finding | None:
+    """Say that a channel never changes."""
+    if channel.missing == channel.n or not channel.is_constant:
+        return None
+    return Finding(
+        channel.name, "dead", "bad",
+        f"every sample is {spoken(channel.mean, channel.unit, digits=6)}: the channel is dead",
+        "check sensor and columns; it is skipped in the calibration",
+        {"value": channel.mean},
+    )  # fmt: skip
+
+
+def is_dithered(values: FloatArray, step: float) -> bool:
+    """Whether noise is wide enough for neighbouring samples to differ by more than rounding.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Samples in their order, none missing.
+    step : float
+        To which they are rounded, u; 0 if they are not.
+    """
+    lengths = run_lengths(values)
+    free = np.repeat(lengths < _LONG, lengths)
+    steps = np.abs(np.diff(values))[free[1:] & free[:-1]]
+    if steps.size < _LONG:
+        return False
+    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > _DITHERED
+
+
+def run_lengths(values: FloatArray) -> IntArray:
+    """Lengths of the runs of equal samples, in their order."""
+    changes = np.flatnonzero(np.diff(values) != 0.0) + 1
+    return np.diff(np.concatenate([[0], changes, [values.size]]))
+
+
+def stuck_finding(
+    name: str, unit: str, dt: float, values: FloatArray, step: float, errors: Innovations
+) -> Finding | None:
+    """Find runs of equal samples longer than rounding explains.
+
+    Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
+    the step of the one before with a probability of at most erf(step / (2^(3/2) s)), that of the
+    interval around the prediction (Anderson 1955, *Proc. AMS* 6, 170-176). A run of L repetitions
+    somewhere in n samples therefore has a probability below n times the L-th power.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    dt : float
+        s.
+    values : (n,) ndarray
+        Samples, NaN where missing.
+    step : float
+        u; 0 if samples are not rounded.
+    errors : Innovations
+    """
+    present = np.flatnonzero(~np.isnan(values))
+    series = values[present]
+    if not is_dithered(series, step):
+        return None
+    lengths = run_lengths(series)
+    longest = _longest_by_chance(series.size, step, _scale_between(errors, present, lengths))
+    stuck = np.flatnonzero(lengths > longest)
+    if not stuck.size:
+        return None
+    starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    worst = int(stuck[np.argmax(lengths[stuck])])
+    total = int(np.sum(lengths[stuck]))
+    share = total / series.size
+    numbers = {
+        "count": float(stuck.size),
+        "longest": float(lengths[worst]),
+        "time": float(present[starts[worst]]) * dt,
+        "value": float(series[starts[worst]]),
+        "samples": float(total),
+    }
+    value = spoken(numbers["value"], unit, digits=5)
+    many = f"{stuck.size:,} times, the longest" if stuck.size > 1 else ""
+    text = (
+        f"stuck {many} at {value} for {lengths[worst]:,} samples from "
+        f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
+    ).replace("  ", " ")
+    severity: Severity = "bad" if share > _MUCH_MISSING else "warning"
+    return Finding(
+        name, "stuck", severity, text, "make such samples missing (NaN) before the fit", numbers
+    )
+
+
+def _scale_between(errors: Innovations, present: IntArray, lengths: IntArray) -> float:
+    """Usual standard deviation of prediction errors outside long runs."""
+    free = np.repeat(lengths < _LONG, lengths)
+    kept = present[free]
+    kept = kept[errors.known[kept]]
+    sizes = errors.values[kept]
+    return float(np.sqrt(np.median(errors.scale[kept]) * np.std(sizes))) if kept.size else 0.0
+
+
+def _longest_by_chance(n: int, step: float, scale: float) -> int:
+    from scipy.special import erf
+
+    noise = np.sqrt(max(scale**2 - step**2 / 12.0, 1e-3 * scale**2))
+    same = float(erf(step / (2.0**1.5 * noise))) if noise > 0.0 else 1.0
+    if same >= 1.0:
+        return n
+    fewest = 3  # equal numbers of a file with few digits
+    if same <= 0.0:
+        return fewest
+    return max(int(np.ceil(np.log(FALSE_ALARM / n) / np.log(same))) + 1, fewest)
+
+
+def saturation_finding(name: str, unit: str, values: FloatArray, step: float) -> Finding | None:
+    """Find more samples at the largest or smallest value than at the one before it.
+
+    A tail falls outwards, and for noise faster and faster: from the last step but one to the last
+    by no less than from the one before to it, up to chance (binomial test, with three standard
+    errors for that fall).
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    values : (n,) ndarray
+        Samples, none missing.
+    step : float
+        u; 0 if samples are not rounded.
+    """
+    if not is_dithered(values, step):
+        return None
+    lowest, highest = float(np.min(values)), float(np.max(values))
+    if step == 0.0:
+        step = (highest - lowest) / np.sqrt(values.size)
+        half = 0.0  # equal numbers are no chance where there are no steps
+    else:
+        half = 0.5
+    ends = {}
+    for end, sign in ((lowest, 1.0), (highest, -1.0)):
+        distance = sign * (values - end) / step
+        last = int(np.count_nonzero(distance <= half))
+        next_two = [
+            int(np.count_nonzero((distance > half + k) & (distance <= half + k + 1.0)))
+            for k in (0.0, 1.0)
+        ]
+        fall = _slowest_fall(*next_two)
+        chance = float(binom.sf(last - 1, last + next_two[0], fall / (1.0 + fall)))
+        if last >= _FEWEST_AT_END and chance < 0.5 * FALSE_ALARM:
+            ends[end] = last
+    if not ends:
+        return None
+    count = sum(ends.values())
+    share = count / values.size
+    where = " and ".join(spoken(end, unit, digits=5) for end in ends)
+    return Finding(
+        name, "saturation", "bad" if share > FALSE_ALARM else "warning",
+        f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
+        "use a wider range; make such samples missing (NaN) if they are few",
+        {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
+    )  # fmt: skip
+
+
+def _slowest_fall(near: int, far: int) -> float:
+    """Ratio of the counts of two steps of a tail, plus three standard errors; 1 at most."""
+    if near == 0 or far == 0:
+        return 1.0
+    error = np.sqrt(1.0 / near + 1.0 / far)
+    return float(min(near / far * (1.0 + 3.0 * error), 1.0))

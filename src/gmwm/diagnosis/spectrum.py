@@ -1,0 +1,164 @@
+"""Periodogram and its smooth background."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft
+
+from gmwm._typing import FloatArray
+from gmwm.diagnosis.arrays import BoolArray, IntArray, inner
+
+FEWEST = 512
+"""Samples below which there is no spectrum worth a look."""
+
+FIRST = 20
+"""First bin that is looked at: slower than a twentieth of the record is drift, not a line."""
+
+POWER_INFLATION = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)
+"""Variance of means of neighbouring Hann periodogram bins, over that of independent ones."""
+
+_BINS_PER_OCTAVE = 24
+_FEWEST_IN_BIN = 8
+_HALF_OCTAVE = _BINS_PER_OCTAVE // 2
+_LOG_VARIANCE = np.pi**2 / 6.0  # of the logarithm of an exponential variate
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Mean logarithm of the spectrum in bands of equal width in log frequency.
+
+    Attributes
+    ----------
+    edges : (J + 1,) ndarray of int
+        Bins of the spectrum.
+    frequency : (J,) ndarray
+        Hz.
+    level : (J,) ndarray
+        Logarithm of the density.
+    variance : (J,) ndarray
+        Of ``level``.
+    smooth : (J,) ndarray
+        Running median of ``level`` over an octave.
+    """
+
+    edges: IntArray
+    frequency: FloatArray
+    level: FloatArray
+    variance: FloatArray
+    smooth: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One-sided periodogram with a Hann window.
+
+    Attributes
+    ----------
+    density : (n // 2 + 1,) ndarray
+        u^2/Hz.
+    resolution : float
+        Distance of the bins, Hz.
+    dt : float
+        Sampling interval, s.
+    """
+
+    density: FloatArray
+    resolution: float
+    dt: float
+
+    @property
+    def frequency(self) -> FloatArray:
+        """Of each bin, Hz."""
+        return np.asarray(self.resolution * np.arange(self.density.size), dtype=float)
+
+
+def spectrum(values: FloatArray, dt: float) -> Spectrum:
+    """Periodogram of a series without its linear trend.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Samples, NaN where missing: there a straight line takes their place.
+    dt : float
+        s.
+
+    Returns
+    -------
+    Spectrum
+        Of unit gain for density; a line of amplitude A has the area A^2/2.
+    """
+    n = values.size
+    place = np.arange(n, dtype=float)
+    known = ~np.isnan(values)
+    filled = values if np.all(known) else np.interp(place, place[known], values[known])
+    centred = place - np.mean(place)
+    trend = inner(centred, filled) / inner(centred, centred)
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (place + 0.5) / n)
+    tapered = window * (filled - np.mean(filled) - trend * centred)
+    power = np.abs(fft.rfft(tapered)) ** 2
+    # What is missing has no power of its own.
+    weight = float(np.sum(window[known] ** 2))
+    return Spectrum(2.0 * dt / weight * power, 1.0 / (n * dt), dt)
+
+
+def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
+    """Band levels and their running median.
+
+    The mean of logarithms is little moved by lines, and the running median by bumps narrower than
+    half an octave; where the spectrum rises or falls steadily the median is exact.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    left_out : (n // 2 + 1,) ndarray of bool, optional
+        Bins that do not count.
+    """
+    logs = np.log(np.maximum(spectrum.density, np.finfo(float).tiny)) + np.euler_gamma
+    used = np.ones(logs.size)
+    if left_out is not None:
+        used[left_out] = 0.0
+    edges = _edges(logs.size - 1)  # the last bin, at half the rate, is another distribution
+    sums = np.add.reduceat(logs * used, edges[:-1])[: edges.size - 1]
+    sums[-1] -= np.sum((logs * used)[edges[-1] :])
+    counts = np.add.reduceat(used, edges[:-1])[: edges.size - 1]
+    counts[-1] -= np.sum(used[edges[-1] :])
+    kept = counts >= 0.5 * np.diff(edges)
+    if not np.all(kept):
+        # A band that is nearly all line takes the level of its neighbours.
+        places = np.arange(kept.size)
+        level = np.interp(places, places[kept], sums[kept] / counts[kept])
+        counts = np.where(kept, counts, 0.5 * np.diff(edges))
+    else:
+        level = sums / counts
+    middle = np.sqrt(edges[:-1] * (edges[1:] - 1.0)) * spectrum.resolution
+    variance = _LOG_VARIANCE * POWER_INFLATION / counts
+    return Bands(edges, middle, level, variance, _running_median(level))
+
+
+def background(spectrum: Spectrum, found: Bands) -> FloatArray:
+    """Density of the smooth background at every bin, u^2/Hz."""
+    place = np.log(np.maximum(spectrum.frequency, 0.5 * spectrum.resolution))
+    return np.exp(np.interp(place, np.log(found.frequency), found.smooth))
+
+
+def _edges(last: int) -> IntArray:
+    """Bins at which bands begin: a 24th of an octave, but eight bins at least."""
+    edges = [4]
+    while edges[-1] < last:
+        width = max(_FEWEST_IN_BIN, round(edges[-1] * (2.0 ** (1.0 / _BINS_PER_OCTAVE) - 1.0)))
+        edges.append(edges[-1] + width)
+    if edges[-1] > last:
+        edges.pop()
+    return np.array(edges)
+
+
+def _running_median(level: FloatArray) -> FloatArray:
+    """Median over an octave; beyond the ends the curve goes on turned by 180 degrees."""
+    reach = min(_HALF_OCTAVE, level.size - 1)
+    before = 2.0 * np.median(level[:3]) - level[reach:0:-1]
+    after = 2.0 * np.median(level[-3:]) - level[-2 : -reach - 2 : -1]
+    longer = np.concatenate([before, level, after])
+    windows = np.lib.stride_tricks.sliding_window_view(longer, 2 * reach + 1)
+    return np.asarray(np.median(windows, axis=1))

@@ -1,0 +1,46 @@
+"""What results look like when printed: 80 columns, whatever they say."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from gmwm.process import Model
+
+WIDTH = 80
+
+HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval':<22} unit"
+
+
+def describe(model: Model) -> str:
+    """A model's terms in a few words: ``white noise + 2 Gauss-Markov``."""
+    titles = [term.title() for term in model.terms]
+    counts = {title: titles.count(title) for title in titles}
+    return " + ".join(f"{n} {title}" if n > 1 else title for title, n in counts.items())
+
+
+def wrapped(text: str, first: str = "", indent: int = 0) -> list[str]:
+    """Lines of a text after ``first``, the second and later ones indented."""
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=first, subsequent_indent=" " * indent,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def parameter_row(row: Mapping[str, Any]) -> str:
+    """A line under `HEAD` from a dict of `gmwm.Fit.rows`."""
+    kind, error = row["kind"], ""
+    value = "-" if kind == "undefined" else f"{row['value']:.5g}"
+    if kind == "undefined":
+        said = "term has no amplitude"
+    elif kind == "given":
+        said = "given"
+    elif kind == "bound":
+        said = f"< {row['upper']:.4g}"
+    else:
+        said = f"{row['lower']:.4g} .. {row['upper']:.4g}"
+        error = f"{row['stderr']:.2g}"
+    # A long name takes the blanks before its value.
+    name = f"{row['key']} "
+    return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {said:<22} {row['unit']}"

@@ -1,0 +1,114 @@
+"""Drift, changes of the noise, and what channels have in common."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import gmwm
+from gmwm import Channel, RandomWalk, Recording, WhiteNoise
+from gmwm.diagnosis.drift import FALSE_ALARM
+
+DT = 0.01
+
+
+def white(n, seed):
+    return np.random.default_rng(seed).normal(size=n)
+
+
+def of_kind(record, x, kind):
+    return gmwm.health(record(gyro_x=x)).of("gyro_x", kind)
+
+
+def test_white_noise_does_not_drift(record):
+    runs = 100
+    count = sum(bool(of_kind(record, white(10_000, seed), "drift")) for seed in range(runs))
+    assert count <= binom.isf(1e-6, runs, FALSE_ALARM)
+
+
+def test_a_ramp_is_told_with_its_size(record):
+    x = white(20_000, 1) + np.linspace(-5.0, 5.0, 20_000)
+    (finding,) = of_kind(record, x, "drift")
+    assert finding.severity == "warning"
+    # Standard error of the change: sigma (12/n)^(1/2) = 0.024.
+    assert finding.values["change"] == pytest.approx(10.0, abs=0.12)
+
+
+def test_a_random_walk_wanders_and_does_not_drift(record):
+    runs = 40
+    ramps = 0
+    for seed in range(runs):
+        x = gmwm.simulate(WhiteNoise(0.1) + RandomWalk(0.2), n=10_000, dt=DT, seed=seed)
+        (finding,) = of_kind(record, x, "drift")
+        ramps += finding.severity == "warning"
+    assert ramps <= binom.isf(1e-6, runs, FALSE_ALARM)
+
+
+def test_size_of_the_wander(record):
+    # Means of parts of length T/64 of white noise plus a slow sine of amplitude 0.5.
+    n = 64_000
+    x = white(n, 2) + 0.5 * np.sin(2 * np.pi * 5.3 * np.arange(n) / n)
+    (finding,) = of_kind(record, x, "drift")
+    assert finding.values["wander"] == pytest.approx(0.5 / np.sqrt(2.0), rel=0.1)
+    assert finding.values["white"] == pytest.approx(1.0 / np.sqrt(1000.0), rel=0.15)
+
+
+@pytest.mark.parametrize("model", [WhiteNoise(0.1), RandomWalk(1.0)])
+def test_noise_of_one_size_does_not_change(record, model):
+    runs = 100
+    count = 0
+    for seed in range(runs):
+        x = gmwm.simulate(model, n=6000, dt=DT, seed=seed)
+        count += bool(of_kind(record, x, "variance"))
+    # Two tests, and the logarithm of a variance is normal for many samples only.
+    assert count <= binom.isf(1e-6, runs, 3.0 * FALSE_ALARM)
+
+
+@pytest.mark.parametrize(("factor", "severity"), [(1.12, "note"), (1.5, "warning")])
+def test_noise_that_grows(record, factor, severity):
+    x = white(100_000, 3)
+    x[50_000:] *= factor
+    (finding,) = of_kind(record, x, "variance")
+    assert finding.severity == severity
+    ratio = finding.values["second_half"] / finding.values["first_half"]
+    assert ratio == pytest.approx(factor, rel=0.03)
+
+
+def test_a_loud_tenth_is_placed(record):
+    x = white(100_000, 4)
+    x[42_000:48_000] *= 1.6
+    (finding,) = of_kind(record, x, "variance")
+    assert finding.values["loudest_tenth"] == 4
+    assert "begins at 400 s" in finding.sentence
+
+
+def test_crosstalk_is_found_whatever_the_slow_noise(record):
+    n = 50_000
+    common, walks = white(n, 5), np.random.default_rng(6).normal(size=(2, n)).cumsum(axis=1)
+    x = white(n, 7) + 0.5 * common + 0.05 * walks[0]
+    y = white(n, 8) + 0.5 * common + 0.05 * walks[1]
+    found = gmwm.health(record(gyro_x=x, gyro_y=y, gyro_z=white(n, 9)))
+    (finding,) = found.of(kind="crosstalk")
+    assert "gyro_x and gyro_y" in finding.sentence
+    assert finding.values["correlation"] == pytest.approx(0.2, abs=0.02)  # 0.25 / 1.25
+
+
+def test_random_walks_are_not_correlated(record):
+    walks = np.random.default_rng(10).normal(size=(6, 20_000)).cumsum(axis=1)
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    found = gmwm.health(record(**dict(zip(names, walks, strict=True))))
+    assert not found.of(kind="crosstalk")
+
+
+def test_temperature_that_a_channel_follows():
+    n = 40_000
+    rng = np.random.default_rng(11)
+    warm = rng.normal(size=n).cumsum() * 0.02
+    channels = (
+        Channel("gyro_x", rng.normal(size=n) + 0.5 * warm, DT, "gyro", "rad/s"),
+        Channel("gyro_y", rng.normal(size=n), DT, "gyro", "rad/s"),
+        Channel("temp", warm, DT, None, "K"),
+    )
+    found = gmwm.health(Recording(channels))
+    (finding,) = found.of(kind="temperature")
+    assert finding.channel == "gyro_x"
+    assert finding.values["slope"] == pytest.approx(0.5, rel=0.1)

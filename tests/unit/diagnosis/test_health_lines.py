@@ -1,0 +1,186 @@
+"""Periodic lines: frequency, amplitude, harmonics; none where there is only noise."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import periodogram
+from scipy.stats import binom
+
+import gmwm
+from gmwm import (
+    BiasInstability,
+    GaussMarkov,
+    QuantizationNoise,
+    RandomWalk,
+    Resonance,
+    Sinusoid,
+    WhiteNoise,
+)
+from gmwm.diagnosis.lines import FALSE_ALARM, find_lines, line_findings
+from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.process import as_model
+
+DT = 0.01
+NOISES = {
+    "white": WhiteNoise(0.1),
+    "walk": RandomWalk(1.0),
+    "white on walk": WhiteNoise(0.1) + RandomWalk(0.1),
+    "Gauss-Markov": WhiteNoise(0.02) + GaussMarkov(1.0, 5.0),
+    "fast Gauss-Markov": GaussMarkov(1.0, 0.02),
+    "flicker": WhiteNoise(0.01) + BiasInstability(0.1),
+    "quantization": QuantizationNoise(0.01),
+    "resonance": WhiteNoise(0.05) + Resonance(1.0, 20.0, 0.02),
+}
+
+
+def lines(x, dt=DT):
+    power = spectrum(x, dt)
+    return find_lines(power, background(power, bands(power)))
+
+
+def simulated(model, n, seed):
+    return gmwm.simulate(as_model(model), n=n, dt=DT, seed=seed)
+
+
+@pytest.mark.parametrize("n", [1024, 4001, 10_007])
+def test_spectrum_is_that_of_scipy(n):
+    # An independent library, with the same symmetric window.
+    x = np.random.default_rng(n).normal(size=n).cumsum()
+    window = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2
+    f, expected = periodogram(x, 1.0 / DT, window=window, detrend="linear")
+    found = spectrum(x, DT)
+    np.testing.assert_allclose(found.frequency, f, rtol=1e-12)
+    inner = slice(1, (n - 1) // 2)
+    np.testing.assert_allclose(found.density[inner], expected[inner], rtol=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    frequency=st.floats(0.8, 48.0),
+    amplitude=st.floats(0.3, 50.0),
+    n=st.integers(8000, 12_000),
+    name=st.sampled_from(["white", "white on walk", "fast Gauss-Markov", "quantization"]),
+    seed=st.integers(0, 1000),
+)
+def test_a_line_is_found_with_frequency_and_amplitude(frequency, amplitude, n, name, seed):
+    x = simulated(NOISES[name], n, seed) + simulated(Sinusoid(amplitude, frequency), n, seed + 1)
+    found = lines(x)
+    assert len(found) == 1
+    # Resolution 1/(n dt) = 0.01 Hz; the centre of a line is known to a part of it.
+    assert found[0].frequency == pytest.approx(frequency, abs=0.005)
+    # White noise of sigma 1 gives amplitudes an error of (2/n)^(1/2) = 0.014; other noises are
+    # up to seven times as large at some frequency.
+    assert found[0].amplitude == pytest.approx(amplitude, rel=0.05, abs=0.1)
+    assert found[0].width < 5.0 / (n * DT)
+
+
+@pytest.mark.parametrize("name", NOISES)
+def test_clean_noise_has_no_lines(name):
+    runs = 110
+    count = sum(bool(lines(simulated(NOISES[name], 3000, seed))) for seed in range(runs))
+    # One chance in a million that the bound is passed.
+    assert count <= binom.isf(1e-6, runs, FALSE_ALARM)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0])
+def test_rounded_noise_has_no_lines(ratio):
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        slow = rng.normal(size=3000).cumsum() * 0.02
+        assert not lines(np.rint((slow + rng.normal(size=3000)) / ratio) * ratio)
+
+
+def test_long_noise_has_no_lines():
+    for seed in range(3):
+        assert not lines(simulated(NOISES["white on walk"], 300_000, seed))
+
+
+def test_a_weak_line_in_a_long_record():
+    # Half a per cent of the power of the noise; 100 times the noise within its own bins.
+    n = 200_000
+    x = simulated(NOISES["white"], n, 1) + 0.06 * np.sin(2 * np.pi * 7.123456 * DT * np.arange(n))
+    (line,) = lines(x)
+    assert line.frequency == pytest.approx(7.123456, abs=2e-4)
+    assert line.amplitude == pytest.approx(0.06, rel=0.2)
+    assert line.ratio > 50.0
+
+
+def test_a_line_that_wanders_is_one_line():
+    # A random walk of the phase smears it over 0.01 Hz, 20 bins.
+    n = 200_000
+    rng = np.random.default_rng(2)
+    phase = 2 * np.pi * 2.0 * DT * np.arange(n) + np.cumsum(rng.normal(size=n)) * np.sqrt(
+        2 * np.pi * 0.01 * DT
+    )
+    (line,) = lines(rng.normal(size=n) + 0.5 * np.sin(phase))
+    assert line.frequency == pytest.approx(2.0, abs=0.005)
+    assert line.amplitude == pytest.approx(0.5, rel=0.1)
+    assert line.width > 5.0 / (n * DT)
+
+
+def test_harmonics_belong_to_their_line():
+    n = 50_000
+    t = DT * np.arange(n)
+    x = np.random.default_rng(3).normal(size=n) + 0.2 * np.sin(2 * np.pi * 11.3 * t)
+    x += 0.5 * np.sign(np.sin(2 * np.pi * 1.7 * t))  # odd harmonics: 1.7, 5.1, 8.5, ...
+    found = lines(x)
+    frequencies = sorted(line.frequency for line in found)
+    for expected in (1.7, 5.1, 8.5, 11.3, 11.9):
+        assert min(abs(f - expected) for f in frequencies) < 0.002
+    findings = line_findings("accel_x", "m/s^2", found)
+    assert [round(f.values["frequency"], 2) for f in findings] == [1.7, 11.3]
+    assert findings[0].values["harmonics"] >= 3
+    assert "harmonics at 5.1" in findings[0].sentence
+
+
+def test_many_lines_are_summed_up():
+    n = 50_000
+    t = DT * np.arange(n)
+    x = np.random.default_rng(4).normal(size=n)
+    for frequency in (3.1, 4.37, 7.71, 13.3, 19.9, 31.1, 43.0):
+        x += 0.3 * np.sin(2 * np.pi * frequency * t)
+    findings = line_findings("accel_x", "m/s^2", lines(x))
+    assert [f.severity for f in findings] == ["warning"] * 4 + ["note"]
+    assert findings[-1].values["count"] == 3
+
+
+def test_a_line_on_a_resonance():
+    x = simulated(NOISES["resonance"], 60_000, 5)
+    x += 0.5 * np.sin(2 * np.pi * 20.5 * DT * np.arange(x.size))
+    (line,) = lines(x)
+    assert line.frequency == pytest.approx(20.5, abs=0.005)
+
+
+def test_gaps_do_not_hide_or_make_lines():
+    rng = np.random.default_rng(6)
+    n = 50_000
+    noise = rng.normal(size=n)
+    gone = rng.random(n) < 0.02
+    gone[20_000:21_000] = True
+    noise[gone] = np.nan
+    assert not lines(noise)
+    (line,) = lines(noise + 0.5 * np.sin(2 * np.pi * 3.3 * DT * np.arange(n)))
+    assert line.frequency == pytest.approx(3.3, abs=0.002)
+    assert line.amplitude == pytest.approx(0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("n", [512, 513, 600])
+def test_short_records(n):
+    t = DT * np.arange(n)
+    x = np.random.default_rng(7).normal(size=n)
+    assert not lines(x)
+    (line,) = lines(x + 5.0 * np.sin(2 * np.pi * 20.0 * t))
+    assert line.frequency == pytest.approx(20.0, abs=0.1)
+
+
+def test_health_gives_lines_to_programs(record):
+    n = 30_000
+    x = np.random.default_rng(8).normal(size=n) * 0.02
+    x += 0.01 * np.sin(2 * np.pi * 0.565 * DT * np.arange(n))
+    found = gmwm.health(record(accel_x=x))
+    ((frequency, amplitude),) = found.lines("accel_x")
+    assert frequency == pytest.approx(0.565, abs=0.001)
+    assert amplitude == pytest.approx(0.01, rel=0.1)
+    (finding,) = found.of("accel_x", "line")
+    assert "a periodic line at 0.565 Hz, amplitude 1." in finding.sentence  # mg

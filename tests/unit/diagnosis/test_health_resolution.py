@@ -1,0 +1,81 @@
+"""The step of the samples: found exactly, from text too, and not where there is none."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmwm
+from gmwm.diagnosis.resolution import rounding_finding, step_size
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    step=st.floats(1e-7, 1e3),
+    noise=st.floats(0.35, 300.0),
+    offset=st.floats(-1e4, 1e4),
+    n=st.integers(300, 3000),
+    seed=st.integers(0, 10_000),
+)
+def test_step_is_found_whatever_the_scale_and_offset(step, noise, offset, n, seed):
+    x = np.random.default_rng(seed).normal(size=n) * noise + offset
+    assert step_size(np.rint(x) * step) == pytest.approx(step, rel=1e-6)
+
+
+@pytest.mark.parametrize(("step", "decimals"), [(1 / 300, 5), (0.05, 2), (1.0 / 7.0, 2), (2e-3, 3)])
+def test_text_with_few_decimals_does_not_hide_the_step(step, decimals):
+    x = np.random.default_rng(1).normal(size=5000) * 6.0
+    written = np.round(np.rint(x) * step, decimals)
+    assert step_size(written) == pytest.approx(step, rel=2e-2)
+
+
+def test_common_divisor_of_levels_that_leave_some_out():
+    # Differences of 2 and 3 steps only: the step is 1.
+    levels = np.cumsum([0, 2, 3, 2, 2, 3, 3, 2, 3, 2, 3, 2]) * 0.25
+    x = np.random.default_rng(2).choice(levels, size=2000)
+    assert step_size(x) == pytest.approx(0.25, rel=1e-9)
+
+
+def test_two_levels_are_one_step_apart():
+    x = np.where(np.random.default_rng(3).random(500) < 0.1, 0.3, 0.1)
+    assert step_size(x) == pytest.approx(0.2)
+
+
+def test_single_precision_keeps_its_own_step():
+    # Numbers near 9.8 stored with 24 bits come in steps of 2^-20.
+    x = (9.80665 + 1e-4 * np.random.default_rng(4).normal(size=50_000)).astype(np.float32)
+    assert step_size(x.astype(float)) == pytest.approx(2.0**-20, rel=1e-6)
+
+
+@pytest.mark.parametrize("n", [100, 4097, 200_000])
+@pytest.mark.parametrize("seed", range(5))
+def test_there_is_no_step_in_numbers_at_random(n, seed):
+    assert step_size(np.random.default_rng(seed).normal(size=n)) == 0.0
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
+def test_few_numbers_at_random_have_no_step(n):
+    assert step_size(np.random.default_rng(n).normal(size=n)) == 0.0
+
+
+def test_constant_has_no_step():
+    assert step_size(np.full(100, 3.3)) == 0.0
+
+
+def test_severity_rises_with_the_step():
+    def severity(ratio):
+        scatter = np.sqrt(1.0 + ratio**2 / 12.0)
+        return rounding_finding("accel_x", "m/s^2", ratio, scatter).severity
+
+    assert [severity(r) for r in (0.1, 0.8, 1.5, 5.0)] == ["good", "note", "warning", "bad"]
+
+
+def test_noise_before_rounding_is_told(record):
+    rng = np.random.default_rng(6)
+    x = np.rint(rng.normal(size=50_000) * 0.1 / 0.08) * 0.08
+    (finding,) = gmwm.health(record(accel_x=x)).of("accel_x", "rounding")
+    assert finding.values["lsb"] == pytest.approx(0.08)
+    # Predicted from 16 differences, white noise has 18/17 of its variance; the standard error of
+    # a standard deviation from 50,000 samples is 0.3 %.
+    assert finding.values["noise"] == pytest.approx(0.1 * np.sqrt(18.0 / 17.0), rel=0.015)
+    assert "8.16 mg" in finding.sentence  # 0.08 m/s^2

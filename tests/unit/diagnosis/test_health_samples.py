@@ -1,0 +1,105 @@
+"""Missing, dead, stuck and saturated samples."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import RandomWalk, WhiteNoise
+
+SEEDS = range(60)
+
+
+def white(n, seed):
+    return np.random.default_rng(seed).normal(size=n)
+
+
+def kinds(found, channel):
+    return {finding.kind for finding in found.of(channel)}
+
+
+def test_a_stuck_value_is_found_and_placed(record):
+    x = white(20_000, 1)
+    x[5000:5040] = x[4999]
+    (finding,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
+    assert finding.values["longest"] == 41
+    assert finding.values["time"] == pytest.approx(49.99)
+
+
+def test_a_sensor_that_is_stuck_most_of_the_time_is_bad(record):
+    x = np.round(white(20_000, 2), 2)
+    x[5000:16_000] = x[4999]
+    (finding,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
+    assert finding.severity == "bad"
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0, 5.0, 20.0])
+def test_rounding_explains_runs_of_equal_samples(record, ratio):
+    for seed in SEEDS:
+        x = np.rint((white(3000, seed) + 0.1 * seed) / ratio) * ratio
+        assert "stuck" not in kinds(gmwm.health(record(gyro_x=x)), "gyro_x")
+
+
+def test_rounded_noise_of_low_bandwidth_is_not_stuck(record):
+    smooth = gmwm.simulate(RandomWalk(0.3) + WhiteNoise(0.01), n=50_000, dt=0.01, seed=3)
+    x = np.rint(smooth / 0.1) * 0.1
+    assert "stuck" not in kinds(gmwm.health(record(gyro_x=x)), "gyro_x")
+
+
+def test_a_dead_channel_is_bad(record):
+    found = gmwm.health(record(gyro_x=np.full(1000, 0.5), gyro_y=white(1000, 4)))
+    (finding,) = found.of("gyro_x")
+    assert (finding.kind, finding.severity) == ("dead", "bad")
+    assert found.worst == "bad"
+    assert found.events("gyro_x") == found.lines("gyro_x") == found.resonances("gyro_x") == ()
+
+
+@pytest.mark.parametrize(
+    ("ends", "step"),
+    [((-np.inf, 1.5), 0.0), ((-np.inf, 1.5), 0.3), ((-2.1, 2.1), 0.0), ((-2.1, 2.1), 0.01),
+     ((-2.1, 2.1), 0.3), ((-np.inf, 2.7), 0.0), ((-np.inf, 2.7), 0.01)],
+)  # fmt: skip
+def test_saturation_is_found(record, ends, step):
+    x = np.clip(white(20_000, 5), *ends)
+    if step:
+        x = np.rint(x / step) * step
+    (finding,) = gmwm.health(record(accel_x=x)).of("accel_x", "saturation")
+    assert finding.values["highest"] == pytest.approx(ends[1], abs=0.51 * step)
+    assert finding.severity == "bad"
+
+
+@pytest.mark.parametrize("step", [0.0, 0.01, 0.3, 1.0, 2.0])
+def test_tails_of_noise_are_not_saturation(record, step):
+    for seed in SEEDS:
+        x = white(3000, seed)
+        if step:
+            x = np.rint((x + 0.1 * seed) / step) * step
+        assert "saturation" not in kinds(gmwm.health(record(gyro_x=x)), "gyro_x")
+
+
+def test_all_missing_and_mostly_missing(record):
+    x = white(2000, 6)
+    mostly = x.copy()
+    mostly[500:1700] = np.nan
+    found = gmwm.health(record(gyro_x=np.full(2000, np.nan), gyro_y=mostly, gyro_z=x))
+    assert [f.severity for f in found.of("gyro_x")] == ["bad"]
+    (gap,) = found.of("gyro_y", "gap")
+    assert gap.severity == "bad"
+    assert gap.values["missing"] == 1200
+    assert not found.of("gyro_z", "gap")
+
+
+def test_gaps_of_all_channels_are_told_once(record):
+    x, y = white(2000, 7), white(2000, 8)
+    x[100:110] = y[100:110] = np.nan
+    found = gmwm.health(record(gyro_x=x, gyro_y=y))
+    (gap,) = found.of(kind="gap")
+    assert gap.channel == ""
+    assert gap.values["longest"] == pytest.approx(0.1)
+    assert str(found).count("missing") == 1
+
+
+def test_every_other_sample_missing_is_survived(record):
+    x = white(5000, 9)
+    x[::2] = np.nan
+    found = gmwm.health(record(gyro_x=x))
+    assert "length" in kinds(found, "gyro_x")
