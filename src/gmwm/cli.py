@@ -51,7 +51,8 @@ def cli() -> None:
 @reading_options
 @click.option("--leave", "left", multiple=True,
               type=click.Choice(["events", "lines", "resonances", "all"]),
-              help="Leave these as they are: samples of knocks are masked otherwise, lines and "
+              metavar="WHAT",
+              help="Leave events, lines, resonances or all as they are: samples of knocks are masked otherwise, lines and "
                    "resonances are terms that a model may have; repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(

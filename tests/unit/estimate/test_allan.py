@@ -243,7 +243,7 @@ def test_other_processes_are_refused(corner):
         ({"Q": (1, 8)}, r"no parameter 'Q' to estimate, only N"),
         ({"N": (5, 7)}, r"no level lies between 5 and 7 s"),
         ({"N": (1e6, 1e7)}, r"no level lies between"),
-        ({"N": (-4, -1)}, r"no level lies between"),
+        ({"N": (-4, -1)}, r"starts at -4 s: give an averaging time above zero"),
         ({"N": (8, 1)}, r"starts at 8 s, after its end at 1 s"),
         ({"N": (1, 2, 3)}, r"give two numbers"),
         ({"N": (1,)}, r"give two numbers"),

@@ -388,8 +388,9 @@ def test_a_fit_says_how_it_was_made(method, how):
     assert third == ""
     assert head.split() == ["parameter", "estimate", "std.", "error", "95", "%", "interval", "unit"]
     assert [line.split()[0] for line in rest[:2]] == ["N", "K"]
-    assert rest[3].startswith(f"log-likelihood {fit.log_likelihood:.8g}; of the wavelet variances")
-    assert rest[4] == ("valid" if fit.valid else "NOT VALID")
+    assert rest[3] == f"log-likelihood {fit.log_likelihood:.8g}"
+    assert rest[4].startswith("of the wavelet variances: objective ")
+    assert rest[5] == ("valid" if fit.valid else "NOT VALID")
 
 
 def test_a_channel_gives_its_name_and_sampling_interval():
