@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
-from gmwm.diagnosis import Health, health
+from gmwm.diagnosis import Finding, Health, health
 from gmwm.errors import InputError
 from gmwm.process import Process, Resonance, Sinusoid
 from gmwm.recording import Recording
@@ -62,7 +62,7 @@ def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedi
     found = health(recording)
     result = found.masked(recording) if "events" in chosen else recording
     notes = tuple(
-        str(finding)
+        _told(finding, chosen)
         for finding in found.findings
         if finding.severity in _TOLD and finding.kind not in _KNOWN_BEFORE
     )
@@ -70,6 +70,15 @@ def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedi
         result, notes=(*result.notes, *(note for note in notes if note not in result.notes))
     )
     return Remedied(told, {c.name: _terms(found, c.name, chosen) for c in recording})
+
+
+def _told(finding: Finding, chosen: Collection[str]) -> str:
+    """What was found and what is done about it here, which is not what is advised elsewhere."""
+    done = {
+        "event": "left out" if "events" in chosen else "",
+        "line": "the strongest are terms that the model may have" if "lines" in chosen else "",
+    }.get(finding.kind, finding.action)
+    return f"{finding.channel or 'recording'}: {finding.sentence}" + (f" ({done})" if done else "")
 
 
 def _terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
