@@ -52,8 +52,9 @@ def cli() -> None:
 @click.option("--leave", "left", multiple=True,
               type=click.Choice(["events", "lines", "resonances", "all"]),
               metavar="WHAT",
-              help="Leave events, lines, resonances or all as they are: samples of knocks are masked otherwise, lines and "
-                   "resonances are terms that a model may have; repeat.")  # fmt: skip
+              help="Leave events, lines, resonances or all as they are: samples of knocks are "
+                   "masked otherwise, lines and resonances are terms that a model may have; "
+                   "repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
     files: tuple[Path, ...],
