@@ -30,7 +30,7 @@ def main() -> None:
         print(f"1 % of N(0, {size**2:g} sigma^2), bias of the variance at levels 1 to {LEVELS}")
         for name, row in (("classical", classical), ("robust", robust)):
             print(f"  {name:<10}" + "".join(f"{value:8.4f}" for value in row))
-        print(f"  {'ratio':<10}" + "".join(f"{r / c:8.2f}" for r, c in zip(robust, classical)))
+        print(f"  {'ratio':<10}" + "".join(f"{ratio:8.2f}" for ratio in robust / classical))
 
 
 if __name__ == "__main__":

@@ -29,11 +29,13 @@ def main() -> None:
     print(f"variance alone               {plain:6.2f}")
     for window in ("none", "octave"):
         both = seconds(lambda w=window: gmwm.wavelet_variance(x, dt=1.0, data_covariance=w))
-        print(f"covariance, window {window:<8}  {both - plain:6.2f}  ({(both - plain) / plain:.0f})")
+        more = both - plain
+        print(f"covariance, window {window:<8}  {more:6.2f}  ({more / plain:.0f})")
     implied = seconds(lambda: gmwm.haar_covariance(model.psd, x.size, 1.0))
     print(f"covariance, of the model     {implied:6.3f}  ({implied / plain:.2f})")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    print(f"peak memory {peak:,.0f} MB, of which {np.asarray(x).nbytes / 2**20:,.0f} MB are the data")
+    data = np.asarray(x).nbytes / 2**20
+    print(f"peak memory {peak:,.0f} MB, of which {data:,.0f} MB are the data")
 
 
 if __name__ == "__main__":
