@@ -28,12 +28,12 @@ from gmwm.selection import describe
 def test_the_true_model_is_chosen(truth, words):
     truth = gmwm.process.as_model(truth)
     chosen = []
-    for seed in range(8):
+    for seed in range(6):
         selection = gmwm.select(truth.simulate(100_000, 1.0, seed), dt=1.0)
         chosen.append(describe(selection.model))
         assert selection.fit.valid, selection.fit.message
         assert len(selection.model.terms) <= len(truth.terms) + 1
-    assert chosen.count(words) >= 7, chosen
+    assert chosen.count(words) >= 5, chosen
 
 
 def test_a_larger_model_is_never_worse():

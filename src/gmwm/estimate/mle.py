@@ -110,7 +110,12 @@ def _tilted(objective: Objective, origin: FloatArray, tilt: FloatArray) -> Objec
 
 
 def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
-    """The top, or the one reached from another candidate that lies above it already."""
+    """The top, or the one reached from another candidate that lies above it already.
+
+    None is looked for where the start describes the data.
+    """
+    if series.start_is_sound:
+        return top
     likelihood = KalmanLikelihood(series.columns)
     reached = defined(likelihood, top.processes)
     places = [_rescaled(point, series) for point in candidates(series)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from gmwm.errors import InputError
 from gmwm.estimate.coordinates import Coordinates
+from gmwm.estimate.fit import Fit
 from gmwm.estimate.gmwm import fit_gmwm
 from gmwm.estimate.likelihood import Columns
 from gmwm.process import Model, Process, RateRamp, as_model
@@ -37,6 +38,8 @@ class Series:
         Of the model's noise.
     start : tuple of Process
         Starting values of its terms, all of them positive.
+    start_is_sound : bool
+        Whether they are valid estimates by the method of moments.
     """
 
     columns: Columns
@@ -44,6 +47,7 @@ class Series:
     is_bridged: bool
     coordinates: Coordinates
     start: tuple[Process, ...]
+    start_is_sound: bool
 
     @classmethod
     def of(
@@ -81,10 +85,11 @@ class Series:
             ramp is not None,
         )
         if start is None:
-            first = _from_moments(model, bridged, coordinates)
+            fit = fit_gmwm(model, bridged)
+            first, is_sound = _from_moments(fit, coordinates), fit.valid
         else:
-            first = _from_user(model, as_model(start), coordinates)
-        return cls(columns, wv, is_bridged, coordinates, first)
+            first, is_sound = _from_user(model, as_model(start), coordinates), False
+        return cls(columns, wv, is_bridged, coordinates, first, is_sound)
 
 
 def _missing(channel: Channel) -> int:
@@ -125,12 +130,9 @@ def _bridged(channel: Channel) -> Channel:
     return replace(channel, values=bridged)
 
 
-def _from_moments(
-    model: Model, wv: WaveletVariance, coordinates: Coordinates
-) -> tuple[Process, ...]:
+def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
     """Estimates by the method of moments, with amplitudes of zero replaced by small ones."""
-    fit = fit_gmwm(model, wv)
-    level = float(np.sqrt(np.min(wv.variance)))
+    level = float(np.sqrt(np.min(fit.wv.variance)))
     fitted = list(fit.model.terms)
     # Gauss-Markov terms were put in order; any that has the kind and the given values will do.
     found = []
