@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 EXPERIMENTS = (
     "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
+    "selection",
     "weights2", "weights3", "weights4",
 )  # fmt: skip
 
@@ -53,8 +54,8 @@ def reproduce(
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
     the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
-    wavelets of the method of moments. Times are in seconds, rates in 1/s. Raw estimates
-    are kept in Parquet.
+    wavelets of the method of moments; selection counts how often the true model is chosen. Times
+    are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
 
     \b
     Example:
@@ -64,10 +65,10 @@ def reproduce(
     from gmwm.files import folder_to_fill
 
     processes = jobs or os.cpu_count() or 1
-    if experiment == "appendix-a":
-        _check_appendix({"--method": methods, "--resume": resume, "--cluster": cluster})
+    if experiment in ("appendix-a", "selection"):
+        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
         with folder_to_fill(output) as folder:
-            _appendix(folder, runs or 200, seed, processes)
+            _alone(experiment, folder, runs, seed, processes)
         return
     from gmwm.study.catalogue import SCENARIOS
     from gmwm.study.runs import run_scenario
@@ -95,10 +96,10 @@ def reproduce(
     click.echo("\n".join(f"wrote {path}" for path in written))
 
 
-def _check_appendix(options: Mapping[str, object]) -> None:
+def _check_alone(experiment: str, options: Mapping[str, object]) -> None:
     for name, given in options.items():
         if given:
-            raise InputError(f"appendix-a has no option {name}: leave it out")
+            raise InputError(f"{experiment} has no option {name}: leave it out")
 
 
 def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:
@@ -125,12 +126,16 @@ def _tables(scenario: Scenario, table: pa.Table, seed: int, folder: Path) -> lis
     return targets
 
 
-def _appendix(folder: Path, runs: int, seed: int, jobs: int) -> None:
+def _alone(experiment: str, folder: Path, runs: int | None, seed: int, jobs: int) -> None:
+    """An experiment that is a table of its own kind."""
     from gmwm.files import written
-    from gmwm.study.appendix import converge, text
+    from gmwm.study import appendix, choice
 
-    report = text(converge(runs, seed, jobs))
-    target = folder / "appendix-a.txt"
+    if experiment == "selection":
+        report = choice.text(choice.study(runs or 100, seed, jobs))
+    else:
+        report = appendix.text(appendix.converge(runs or 200, seed, jobs))
+    target = folder / f"{experiment}.txt"
     with written(target) as stream:
         stream.write(report + "\n")
     click.echo(f"{report}\n\nwrote {target}")
