@@ -96,8 +96,9 @@ def test_gain_of_coiflets_near_zero_is_what_their_first_moment_makes_it(name):
     filters = wavelet(name)
     r, taps = filters.vanishing_moments, filters.detail
     t = np.arange(taps.size) - 0.5 * (taps.size - 1)
+    pairs = zip(taps, t, strict=True)
     # H(f) = (-2 pi i f)^r sum h t^r / r! + ...
-    moment = float(mpmath.fsum(mpmath.mpf(h) * mpmath.mpf(x) ** r for h, x in zip(taps, t)))  # noqa: B905
+    moment = float(mpmath.fsum(mpmath.mpf(h) * mpmath.mpf(x) ** r for h, x in pairs))
     f = 1e-9
     expected = ((2 * np.pi * f) ** r * moment / float(mpmath.factorial(r))) ** 2
     assert filters.gain(1, np.array([f]))[0] == pytest.approx(expected, rel=1e-6)

@@ -15,7 +15,6 @@ _CLOSE = 1.5  # steps up to this many times the smallest are counted as one step
 _DIVISORS = range(1, 7)  # the smallest difference seen may be a few steps
 _OFF_LATTICE = 0.1  # rms distance from the lattice, in steps; numbers at random have 0.29
 _FEWEST = 8  # levels that prove a lattice by their places alone
-_EXACT = 1e-3  # rms distance at which a smaller divisor is not worth a look
 
 
 def step_size(values: FloatArray) -> float:

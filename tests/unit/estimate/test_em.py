@@ -221,7 +221,10 @@ def test_the_drawn_trace_rises():
 def test_the_trace_can_be_drawn():
     truth = WhiteNoise(0.5) + RandomWalk(0.1)
     fit = em(truth.opened(), truth.simulate(500, 1.0, seed=6))
-    assert fit.plot_trace() is not None
+    iterations = fit.plot_trace().lines[-1].get_xdata()
+    # All of them but the best, which misses nothing.
+    expected = 1 + np.flatnonzero(np.array(fit.trace) < max(fit.trace))
+    np.testing.assert_array_equal(iterations, expected)
     with pytest.raises(InputError, match="no iterations"):
         gmwm.fit(truth.opened(), truth.simulate(500, 1.0, seed=6), dt=1.0).plot_trace()
 
