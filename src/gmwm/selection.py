@@ -6,12 +6,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+from scipy.stats import chi2
+
 from gmwm import checks
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import Data, are_several, fit
 from gmwm.estimate.table import describe, wrapped
-from gmwm.process import Model, Process
+from gmwm.process import Model, Process, RateRamp
 from gmwm.ranking import MAX_GAUSS_MARKOV, Candidate, Choices, rank, rank_key
 from gmwm.variance.analysis import as_wavelet_variance
 from gmwm.variance.pooled import PooledVariance
@@ -21,6 +24,8 @@ __all__ = ["Selection", "describe", "select"]
 
 _TIE = 2.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
+_CONTEST = 40.0  # of the criterion, up to which simpler candidates are heard
+_HEARD = 3
 _SHOWN = 12
 
 
@@ -76,6 +81,11 @@ class Selection:
             lines.append(f"  and {len(self.ranking) - _SHOWN} more")
         if len(ties) > 1:
             lines.append("= these tie: the data hardly tell them apart, the simplest is preferred")
+        if self.chosen not in ties:
+            lines += wrapped(
+                "it is simpler than the first, and as good under weights of its own",
+                first="> ", indent=2,
+            )  # fmt: skip
         return "\n".join(lines)
 
 
@@ -120,7 +130,10 @@ def select(
     straight line passes through any slow drift that is seen only once.
     Terms that come out as zero make a model equal to a smaller one, and it is left out of the
     ranking. Models within 2 of the best are a tie, in which the smaller one wins. Of the best
-    candidates the first one is chosen whose own fit finds all of its terms identifiable.
+    candidates the first one is chosen whose own fit finds all of its terms identifiable. The
+    mixture follows coarse levels that are low by chance and gives them small errors, so that a
+    random walk may look worse than a Gauss-Markov process of long correlation time: a simpler
+    candidate that is as good by its own fit, under the weights that it implies itself, is preferred.
     """
     if not isinstance(extra, Iterable):
         raise InputError(
@@ -138,7 +151,7 @@ def select(
     for candidate in _simplest_of_ties(ranking)[:_FITS]:
         fitted = _fitted(candidate.model, wv)
         if fitted.valid or not _term_is_idle(fitted):
-            return Selection(ranking, candidate, fitted)
+            return Selection(ranking, *_simplest_by_own_fit(ranking, candidate, fitted, wv))
         tried.append((candidate, fitted))
     return Selection(ranking, *tried[0])
 
@@ -153,6 +166,36 @@ def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
     tied = [item for item in ranking if rank_key(item) <= limit]
     tied.sort(key=lambda item: item.n_parameters)
     return tied + list(ranking[len(tied) :])
+
+
+def _simplest_by_own_fit(
+    ranking: Sequence[Candidate], best: Candidate, fitted: Fit, wv: WaveletVariance
+) -> tuple[Candidate, Fit]:
+    """A simpler candidate that is as good under the weights that it implies, or the best one."""
+    limit = rank_key(best) + _CONTEST
+    simpler = [
+        item
+        for item in ranking
+        if item.n_parameters < best.n_parameters
+        and rank_key(item) <= limit
+        and _has_ramp(item.model) == _has_ramp(best.model)
+    ]
+    for candidate in simpler[:_HEARD]:
+        other = _fitted(candidate.model, wv)
+        as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + _TIE
+        if as_good and other.discrepancy <= fitted.discrepancy and not _term_is_idle(other):
+            return candidate, other
+    return best, fitted
+
+
+def _own_criterion(candidate: Candidate, fitted: Fit) -> float:
+    """The criterion with the chi-square of the candidate's own fit."""
+    statistic = float(chi2.isf(fitted.p_value, fitted.dof)) if fitted.dof > 0 else 0.0
+    return candidate.criterion - candidate.chi_square + (statistic if fitted.p_value else np.inf)
+
+
+def _has_ramp(model: Model) -> bool:
+    return any(isinstance(term, RateRamp) for term in model.terms)
 
 
 def _term_is_idle(fitted: Fit) -> bool:
