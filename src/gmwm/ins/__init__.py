@@ -1,0 +1,1 @@
+"""Inertial navigation: trajectories, emulated IMUs, strapdown mechanization."""

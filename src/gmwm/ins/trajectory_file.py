@@ -1,0 +1,236 @@
+"""Trajectories logged in a delimited text: time, position and attitude, one row an epoch."""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.names import TIME, meaning
+from gmwm.readers.table import label
+
+_ANGLES = ("latitude", "longitude", "roll", "pitch", "yaw")
+_WORDS = {
+    word: quantity
+    for quantity, words in {
+        "latitude": "latitude lat",
+        "longitude": "longitude lon long lng",
+        "height": "height altitude alt h hgt",
+        "roll": "roll bank",
+        "pitch": "pitch",
+        "yaw": "yaw heading hdg azimuth",
+    }.items()
+    for word in words.split()
+}
+_UNITS = {
+    word: unit
+    for unit, words in {
+        "rad": "rad rads radian radians",
+        "deg": "deg degs degree degrees °",
+        "m": "m meter meters metre metres",
+        "ft": "ft feet",
+    }.items()
+    for word in words.split()
+}
+_FACTORS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "ft": 0.3048}
+_NOT_THE_VALUE = frozenset(
+    {"std", "sigma", "var", "cov", "err", "error", "rate", "ref", "acc", "accuracy", "dot"}
+)
+_WORD = re.compile(r"°|[A-Z]?[a-z]+|[A-Z]+")
+_UNEVEN = 0.1  # of the sampling interval: at 20 m/s and 100 Hz, 2 cm
+_LARGEST_ANGLE = 1e4  # rad; a log that counts turns stays far below
+
+
+@dataclass(frozen=True)
+class Log:
+    """What a file says.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval, s.
+    lla : (n + 1, 3) ndarray
+        Latitude, longitude, rad, and height, m.
+    rpy : (n + 1, 3) ndarray
+        Roll, pitch and yaw, rad.
+    """
+
+    dt: float
+    lla: FloatArray
+    rpy: FloatArray
+
+
+def read_log(path: Path) -> Log:
+    """Read a log of a trajectory.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    InputError
+        If a column is missing, a value is missing or impossible, or the clock is not even.
+    """
+    table = _open(path)
+    columns = _columns(table)
+    found = table.load(list(columns.values()))
+    values = {name: found[column] for name, column in columns.items()}
+    for name, column in columns.items():
+        _check_complete(table, column, values[name])
+    dt = _interval(table, columns[TIME], values[TIME])
+    factors = _factors(table, columns, values["latitude"])
+    scaled = {name: factor * values[name] for name, factor in factors.items()}
+    _check_angles(table, columns, scaled)
+    return Log(
+        dt,
+        np.stack([scaled[name] for name in ("latitude", "longitude", "height")], axis=-1),
+        np.stack([scaled[name] for name in ("roll", "pitch", "yaw")], axis=-1),
+    )
+
+
+def _open(path: Path) -> CsvTable:
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):  # ValueError: a null character in the name
+        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path} is a directory: name a file in it")
+    return CsvTable.open(path)
+
+
+def _words(name: str) -> list[str]:
+    return [word.lower() for word in _WORD.findall(name)]
+
+
+def _quantity(name: str) -> str | None:
+    """Time, latitude, ... or ``None`` if the column is something else."""
+    if meaning(name).role == TIME:
+        return TIME
+    words = _words(name)
+    if words and words[-1] in _UNITS:
+        words.pop()
+    if not words or not _NOT_THE_VALUE.isdisjoint(words):
+        return None
+    return _WORDS.get(words[-1])
+
+
+def _unit(name: str) -> str | None:
+    words = _words(name)
+    return _UNITS.get(words[-1]) if words else None
+
+
+def _columns(table: CsvTable) -> dict[str, int]:
+    """The column of each quantity."""
+    columns: dict[str, int] = {}
+    for column, name in enumerate(table.names):
+        quantity = _quantity(name)
+        if quantity in columns:
+            raise InputError(
+                f"{table.source}: columns {label(table.names, columns[quantity])} and "
+                f"{label(table.names, column)} both look like the {quantity}: rename one of them"
+            )
+        if quantity is not None:
+            columns[quantity] = column
+    missing = [name for name in (TIME, *_ANGLES, "height") if name not in columns]
+    if missing:
+        raise InputError(
+            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
+            "like time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
+        )
+    return columns
+
+
+def _check_complete(table: CsvTable, column: int, values: FloatArray) -> None:
+    bad = np.flatnonzero(np.isnan(values))
+    if bad.size:
+        raise InputError(
+            f"{_place(table, column, int(bad[0]))}: no value: fill the gap, or use the part of "
+            "the file before or after it"
+        )
+
+
+def _interval(table: CsvTable, column: int, stamps: FloatArray) -> float:
+    """Sampling interval of time stamps that are evenly spaced, s."""
+    n = stamps.size - 1
+    if n < 1:
+        raise InputError(f"{table.source} has a single row: give two epochs or more")
+    steps = np.diff(stamps)
+    bad = np.flatnonzero(steps <= 0.0)
+    if bad.size:
+        row = int(bad[0]) + 1
+        what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
+        raise InputError(
+            f"{_place(table, column, row)}: time stamp {stamps[row]:.15g} {what}: take such rows "
+            "out"
+        )
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual)
+    dt = float(stamps[-1] - stamps[0]) / n
+    late = np.flatnonzero(np.abs(stamps - stamps[0] - dt * np.arange(n + 1)) > _UNEVEN * dt)
+    if gaps.size or late.size:
+        row = int(gaps[0]) + 1 if gaps.size else int(late[0])
+        raise InputError(
+            f"{_place(table, column, row)}: time stamp {stamps[row]:.15g} is off the even spacing "
+            f"of {usual:.6g}: resample the log to even steps, or use the part before or after"
+        )
+    return dt * (meaning(table.names[column]).seconds or 1.0)
+
+
+def _factors(table: CsvTable, columns: Mapping[str, int], latitude: FloatArray) -> dict[str, float]:
+    """What each quantity is to be multiplied by to come to rad or m."""
+    units = {name: _unit(table.names[columns[name]]) for name in (*_ANGLES, "height")}
+    common = units["latitude"]
+    if common is None and np.any(np.abs(latitude) > 0.5 * np.pi):
+        common = "deg"
+    factors = {}
+    for name in _ANGLES:
+        unit = units[name] or common
+        if unit is None:
+            raise InputError(
+                f"{table.source}, column {label(table.names, columns[name])}: are its angles in "
+                f"rad or deg? name it {name}_rad or {name}_deg"
+            )
+        if unit not in ("rad", "deg"):
+            raise InputError(
+                f"{table.source}, column {label(table.names, columns[name])}: {unit} is no unit "
+                f"of an angle: name it {name}_rad or {name}_deg"
+            )
+        factors[name] = _FACTORS[unit]
+    unit = units["height"] or "m"
+    if unit not in ("m", "ft"):
+        raise InputError(
+            f"{table.source}, column {label(table.names, columns['height'])}: {unit} is no unit "
+            "of a height: name it height_m"
+        )
+    return {**factors, "height": _FACTORS[unit]}
+
+
+def _check_angles(
+    table: CsvTable, columns: Mapping[str, int], angles: Mapping[str, FloatArray]
+) -> None:
+    """Refuse what no latitude or pitch can be: most often a wrong unit in the header."""
+    quarter = 0.5 * np.pi * (1.0 + 1e-9)
+    limits = {name: _LARGEST_ANGLE for name in _ANGLES} | {"latitude": quarter, "pitch": quarter}
+    for name, limit in limits.items():
+        bad = np.flatnonzero(np.abs(angles[name]) > limit)
+        if bad.size:
+            raise InputError(
+                f"{_place(table, columns[name], int(bad[0]))}: a {name} of "
+                f"{np.degrees(angles[name][bad[0]]):.6g} deg: check the unit in the header"
+            )
+
+
+def _place(table: CsvTable, column: int, row: int) -> str:
+    return f"{table.source}, column {label(table.names, column)}, {table.where(row)}"
