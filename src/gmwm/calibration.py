@@ -11,6 +11,8 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
+from gmwm.diagnosis import Finding
+from gmwm.doubt import wider_ranges
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import fit
@@ -18,14 +20,16 @@ from gmwm.estimate.stored import fit_from_dict
 from gmwm.files import written
 from gmwm.process import Model, Process
 from gmwm.recording import Channel, Recording
-from gmwm.remedies import REMEDIES, remedied
-from gmwm.selection import select
+from gmwm.remedies import REMEDIES, remedied, told_of_terms
+from gmwm.selection import Selection, describe, select
 from gmwm.variance.analysis import MIN_SAMPLES, wavelet_variance
 
 SCHEMA = "gmwm.calibration"
 SCHEMA_VERSION = 1
 
 _SAME_RATE = 1e-3
+_TOLD = ("warning", "bad")
+_TOLD_OTHERWISE = ("reader", "gap", "dead", "infinite", "length")
 
 Progress = Callable[[str], None]
 """Called with the name of each channel when it is done."""
@@ -48,7 +52,11 @@ class Calibration:
     n : int
         Samples per channel, of all recordings.
     notes : tuple of str
-        What the reader noticed.
+        What the reader noticed, and how many samples were left out.
+    findings : tuple of Finding
+        What was found in the recording, worst first in each channel, with what was done about it;
+        of kind "choice", which models describe a channel equally well. Empty if it was not
+        examined.
     """
 
     fits: dict[str, Fit]
@@ -57,6 +65,7 @@ class Calibration:
     rate: float
     n: int
     notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def __getitem__(self, name: str) -> Fit:
         if name not in self.fits:
@@ -80,6 +89,15 @@ class Calibration:
         """Whether every channel has a valid fit."""
         return not self.skipped and all(fit.valid for fit in self.fits.values())
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Findings that spoil the estimates or may, and that neither notes nor skips tell."""
+        return tuple(
+            str(found if found.channel else replace(found, channel="recording"))
+            for found in self.findings
+            if found.severity in _TOLD and found.kind not in _TOLD_OTHERWISE
+        )
+
     def __str__(self) -> str:
         blocks = [str(fit) for fit in self.fits.values()]
         blocks += [f"{name}: skipped, {why}" for name, why in self.skipped.items()]
@@ -96,6 +114,7 @@ class Calibration:
             "rate_hz": self.rate,
             "n": self.n,
             "notes": list(self.notes),
+            "findings": [finding.to_dict() for finding in self.findings],
             "skipped": self.skipped,
             "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
         }
@@ -125,6 +144,7 @@ class Calibration:
                 rate=float(content["rate_hz"]),
                 n=int(content["n"]),
                 notes=tuple(content["notes"]),
+                findings=tuple(map(Finding.from_dict, content.get("findings", ()))),
             )
         except InputError as error:
             raise InputError(
@@ -184,8 +204,9 @@ def calibrate(
     """Error model of every channel of a static recording, or of several of one sensor.
 
     The recording is examined first: samples of knocks and spikes are left out, periodic lines and
-    resonances are terms that a selected model may have; notes tell what was found. A channel that
-    is constant, or of which more than half of the samples are missing, is skipped.
+    resonances are terms that a selected model may have, and the wavelet variances of a channel
+    with outliers all over the record are robust; the findings tell what was found and done. A
+    channel that is constant, or of which more than half of the samples are missing, is skipped.
 
     Parameters
     ----------
@@ -195,7 +216,8 @@ def calibrate(
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
     remedies : collection of str, optional
-        Some of "events", "lines" and "resonances"; none leaves the recording as it is, unexamined.
+        Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
+        unexamined.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter take in turns; -1 is one per core.
@@ -225,10 +247,20 @@ def calibrate(
         if each.n < MIN_SAMPLES:
             raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
 
-    def one(name: str) -> Fit | InputError:
+    offered = {
+        name: next((e.extra[name] for e in treated if e.extra.get(name)), ()) for name in alive
+    }
+    robust = frozenset[str]().union(*(each.robust for each in treated))
+
+    def one(name: str) -> tuple[Fit, tuple[Finding, ...]] | InputError:
         try:
-            extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
-            return _channel_fit(alive[name], _model_of(name, model), extra)
+            parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
+            data = parts[0] if len(parts) == 1 else parts
+            given_model = _model_of(name, model)
+            if given_model is not None:
+                return fit(given_model, data), ()
+            selection = select(data, extra=offered[name])
+            return selection.fit, _doubt(name, selection)
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -241,10 +273,20 @@ def calibrate(
         name: str(error) for name, error in found.items() if isinstance(error, InputError)
     }
     source = ", ".join(each.source for each in recordings)
-    fits = {name: fitted for name, fitted in found.items() if isinstance(fitted, Fit)}
+    done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
+    fits = {name: fitted for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values()))}")
     several = len(recordings) > 1
+    findings = told_of_terms(
+        [
+            replace(finding, recording=each.recording.source) if several else finding
+            for each in treated
+            for finding in each.findings
+        ],
+        {name: fitted.model for name, fitted in fits.items()},
+        offered if model is None else {},
+    )
     return Calibration(
         fits=fits,
         skipped=skipped,
@@ -256,6 +298,7 @@ def calibrate(
             for each in recordings
             for note in each.notes
         ),
+        findings=(*findings, *(finding for _, doubts in done.values() for finding in doubts)),
     )
 
 
@@ -316,9 +359,13 @@ def _model_of(
     return model[name]
 
 
-def _channel_fit(
-    channels: Sequence[Channel], model: Process | Model | None, extra: Sequence[Process]
-) -> Fit:
-    parts = [wavelet_variance(channel) for channel in channels]
-    data = parts[0] if len(parts) == 1 else parts
-    return select(data, extra=extra).fit if model is None else fit(model, data)
+def _doubt(name: str, selection: Selection) -> tuple[Finding, ...]:
+    """Which models tie, and the parameters of which that leaves less known."""
+    if not selection.rivals:
+        return ()
+    models = [describe(fitted.model) for fitted in (selection.fit, *selection.rivals)]
+    text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
+    wider = wider_ranges(selection.fit, selection.ranges())
+    if wider:
+        text += f". If none of them is ruled out: {', '.join(wider)}"
+    return (Finding(name, "choice", "note", text, "the first is used"),)

@@ -50,11 +50,11 @@ def cli() -> None:
 @_output_option("gmwm-out")
 @reading_options
 @click.option("--leave", "left", multiple=True,
-              type=click.Choice(["events", "lines", "resonances", "all"]),
+              type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
               metavar="WHAT",
-              help="Leave events, lines, resonances or all as they are: samples of knocks are "
-                   "masked otherwise, lines and resonances are terms that a model may have; "
-                   "repeat.")  # fmt: skip
+              help="Leave events, lines, resonances, outliers or all as they are: samples of "
+                   "knocks are masked otherwise, lines and resonances are terms that a model may "
+                   "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
     files: tuple[Path, ...],
@@ -229,7 +229,7 @@ def _show(result: Calibration) -> None:
         highlight=False,
     )
     _print_whole(console, _table(result))
-    for note in result.notes:
+    for note in (*result.notes, *result.warnings):
         console.print(f"- {note}", highlight=False)
     for name, why in result.skipped.items():
         console.print(f"- {name} skipped: {why}", highlight=False)

@@ -216,6 +216,52 @@ def trace(values: FloatArray, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def residuals(
+    tau: FloatArray,
+    residual: FloatArray,
+    misfit: FloatArray,
+    *,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """Standardised residuals as stems with the band of two standard errors; returns the axes.
+
+    Parameters
+    ----------
+    tau : (J,) ndarray
+        Averaging times, s.
+    residual : (J,) ndarray
+        In standard errors; NaN where there is none.
+    misfit : (J,) ndarray
+        Relative difference of the deviations, told in per cent at each stem.
+    title : str, optional
+    ax : matplotlib.axes.Axes, optional
+    """
+    import matplotlib.pyplot as plt
+
+    if ax is None:
+        _, ax = plt.subplots(figsize=(7.0, 3.2), layout="constrained")
+    shown = np.isfinite(residual)
+    ax.axhspan(-2.0, 2.0, color="#e8eef4", zorder=0)
+    ax.axhline(0.0, color=SUM_COLOUR, linewidth=0.8, zorder=1)
+    ax.vlines(tau[shown], 0.0, residual[shown], color=COMPONENT_COLOURS[0], linewidth=1.6)
+    ax.plot(tau[shown], residual[shown], "o", color=COMPONENT_COLOURS[0], markersize=4.5)
+    for time, height, share in zip(tau[shown], residual[shown], misfit[shown], strict=True):
+        ax.annotate(
+            f"{100.0 * share:+.2g}", (time, height), xytext=(0.0, 5.0 if height >= 0.0 else -5.0),
+            textcoords="offset points", ha="center", va="bottom" if height >= 0.0 else "top",
+            fontsize="x-small", color=DATA_COLOUR,
+        )  # fmt: skip
+    largest = max(float(np.max(np.abs(residual[shown]), initial=0.0)), 2.5)
+    ax.set_ylim(-1.25 * largest, 1.25 * largest)
+    ax.set_xscale("log")
+    ax.set_xlabel("averaging time [s]")
+    ax.set_ylabel("residual [standard errors]")
+    ax.set_title(f"{title}: misfit of the deviation in %" if title else "misfit in %",
+                 fontsize="medium")  # fmt: skip
+    return ax
+
+
 def deviation_range(shown: FloatArray) -> tuple[float, float]:
     """Limits of the deviation axis that show these and hide components far below them."""
     shown = shown[shown > 0.0]

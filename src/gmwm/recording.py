@@ -88,11 +88,15 @@ class Recording:
         Where it came from, for messages and reports.
     notes : tuple of str
         What the reader noticed, one sentence each.
+    jitter : float or None
+        Standard deviation of the steps of its time stamps, as a share of the sampling interval;
+        None if it has none.
     """
 
     channels: tuple[Channel, ...]
     source: str = ""
     notes: tuple[str, ...] = field(default=())
+    jitter: float | None = None
 
     @classmethod
     def from_arrays(

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from gmwm.diagnosis import Finding, Health, health
 from gmwm.errors import InputError
-from gmwm.process import Process, Resonance, Sinusoid
+from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.recording import Recording
 
-REMEDIES = ("events", "lines", "resonances")
-"""Samples of knocks and spikes are masked; lines and resonances are terms that a model may have."""
+REMEDIES = ("events", "lines", "resonances", "outliers")
+"""Samples of knocks and spikes are masked; lines and resonances are terms that a model may have;
+the wavelet variances of channels with outliers all over the record are robust."""
 
 _MOST_TERMS = 2  # a channel; each doubles the number of candidate models
-_TOLD = ("warning", "bad")
-_KNOWN_BEFORE = (
-    "reader",
-    "gap",
-    "dead",
-    "infinite",
-    "length",
-)  # the calibration tells these itself
+_SAME_FREQUENCY = 0.02  # of a line in several recordings of one sensor
+_ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
 
 
 @dataclass(frozen=True)
@@ -31,17 +26,26 @@ class Remedied:
     Attributes
     ----------
     recording : Recording
-        Without the samples of knocks and spikes, with a note on each finding.
+        Without the samples of knocks and spikes, with a note on how many these were.
     extra : dict
         Channel name -> terms that its model may have, strongest first.
+    robust : frozenset of str
+        Channels whose wavelet variances are to be robust.
+    findings : tuple of Finding
+        What was found, with what is done about it here as ``action``.
     """
 
     recording: Recording
     extra: dict[str, tuple[Process, ...]]
+    robust: frozenset[str] = field(default=frozenset())
+    findings: tuple[Finding, ...] = ()
 
 
 def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedied:
     """Examine a recording and do something about what is found.
+
+    Nothing is masked in a channel with outliers all over the record: what masks leave of it has
+    no long averaging times.
 
     Parameters
     ----------
@@ -60,25 +64,36 @@ def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedi
     if not chosen:
         return Remedied(recording, {})
     found = health(recording)
-    result = found.masked(recording) if "events" in chosen else recording
-    notes = tuple(
-        _told(finding, chosen)
-        for finding in found.findings
-        if finding.severity in _TOLD and finding.kind not in _KNOWN_BEFORE
+    robust = frozenset(
+        name for name in recording.names if "outliers" in chosen and found.outliers(name) > 0.0
     )
-    told = replace(
-        result, notes=(*result.notes, *(note for note in notes if note not in result.notes))
+    masked = found.masked(recording, but=robust) if "events" in chosen else recording
+    return Remedied(
+        masked,
+        {channel.name: _terms(found, channel.name, chosen) for channel in recording},
+        robust,
+        tuple(
+            replace(finding, action=_done(finding, chosen, finding.channel in robust))
+            for finding in found.findings
+        ),
     )
-    return Remedied(told, {c.name: _terms(found, c.name, chosen) for c in recording})
 
 
-def _told(finding: Finding, chosen: Collection[str]) -> str:
-    """What was found and what is done about it here, which is not what is advised elsewhere."""
-    done = {
-        "event": "left out" if "events" in chosen else "",
-        "line": "the strongest are terms that the model may have" if "lines" in chosen else "",
-    }.get(finding.kind, finding.action)
-    return f"{finding.channel or 'recording'}: {finding.sentence}" + (f" ({done})" if done else "")
+def _done(finding: Finding, chosen: Collection[str], is_robust: bool) -> str:
+    """What is done about a finding here, which is not what is advised elsewhere."""
+    if finding.kind == "event":
+        if is_robust:
+            return "kept: the robust wavelet variances bound their influence"
+        samples = f"{finding.values['samples']:,.0f} samples"
+        return f"left out, {samples}" if "events" in chosen else "kept, as was asked"
+    if finding.kind == "outliers":
+        done = "robust wavelet variances bound their influence; standard errors are 1.3 times as"
+        return f"{done} large" if is_robust else "counted in full, as was asked"
+    if finding.kind in ("dead", "infinite"):
+        return "the channel is skipped"
+    if finding.kind in _ADVICE:
+        return f"left as it is; {finding.action}"
+    return finding.action
 
 
 def _terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
@@ -93,3 +108,45 @@ def _terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Proces
         # A resonance costs more of the fit than the weaker lines do.
         terms = broad[:1] + terms + broad[1:]
     return tuple(terms[:_MOST_TERMS])
+
+
+def told_of_terms(
+    findings: Sequence[Finding],
+    models: Mapping[str, Model],
+    offered: Mapping[str, Sequence[Process]],
+) -> tuple[Finding, ...]:
+    """Findings with what became of the lines and resonances among them.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    models : mapping of str to Model
+        The model of each channel that has one.
+    offered : mapping of str to sequence of Process
+        Channel name -> terms that its model might have had.
+    """
+    return tuple(
+        replace(
+            finding,
+            action=_became(finding, models[finding.channel], offered.get(finding.channel, ())),
+        )
+        if finding.kind in ("line", "resonance") and finding.channel in models
+        else finding
+        for finding in findings
+    )
+
+
+def _became(finding: Finding, model: Model, offered: Sequence[Process]) -> str:
+    if _holds(model.terms, finding):
+        return "a term of the model"
+    if _holds(offered, finding):
+        return "tried as a term of the model, which does not need it"
+    return "not tried as a term of the model"
+
+
+def _holds(terms: Sequence[Process], finding: Finding) -> bool:
+    """Whether one of the terms is the line or resonance that was found."""
+    kind = Sinusoid if finding.kind == "line" else Resonance
+    found = finding.values["frequency"]
+    frequencies = [term.values["frequency"] for term in terms if isinstance(term, kind)]
+    return any(f is not None and abs(f / found - 1.0) < _SAME_FREQUENCY for f in frequencies)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 from scipy.stats import chi2
 
 from gmwm import checks
+from gmwm.doubt import ranges
 from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import Data, are_several, fit
@@ -27,6 +29,7 @@ _FITS = 5  # candidates that are fitted in full before the best one is taken as 
 _CONTEST = 40.0  # of the criterion, up to which simpler candidates are heard
 _HEARD = 3
 _SHOWN = 12
+_RIVALS = 5  # that are fitted to tell what a tie leaves in doubt
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,41 @@ class Selection:
         """Candidates within 2 of the best criterion, which the data hardly tell apart."""
         limit = rank_key(self.ranking[0]) + _TIE
         return tuple(item for item in self.ranking if rank_key(item) <= limit)
+
+    @cached_property
+    def rivals(self) -> tuple[Fit, ...]:
+        """Fits of the other candidates that tie, but for those with a term that is idle.
+
+        These are as good as the model without the term.
+        """
+        others = [item for item in self.ties if item is not self.chosen][:_RIVALS]
+        fits = [_fitted(item.model, self.fit.wv) for item in others]
+        return tuple(fit for fit in fits if not _term_is_idle(fit))
+
+    def ranges(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """What is known of each parameter where several models tie: all of their intervals.
+
+        A parameter of the chosen model is found in another by its name, those of Gauss-Markov
+        terms by the nearest correlation time, one to one. Where the other model does without the
+        term, the range of its amplitude begins at zero. At most five rivals are fitted, the best.
+
+        Parameters
+        ----------
+        level : float, optional
+            Of the intervals that the ranges are made of.
+
+        Returns
+        -------
+        dict
+            Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model;
+            `Fit.interval` where nothing ties.
+
+        Raises
+        ------
+        InputError
+            If ``level`` is not between 0 and 1.
+        """
+        return ranges(self.fit, self.rivals, checks.share("level", level, 0.95))
 
     def __iter__(self) -> Iterator[Candidate]:
         return iter(self.ranking)
@@ -133,7 +171,8 @@ def select(
     candidates the first one is chosen whose own fit finds all of its terms identifiable. The
     mixture follows coarse levels that are low by chance and gives them small errors, so that a
     random walk may look worse than a Gauss-Markov process of long correlation time: a simpler
-    candidate that is as good by its own fit, under the weights that it implies itself, is preferred.
+    candidate that is as good by its own fit, under the weights that it implies itself, is
+    preferred.
     """
     if not isinstance(extra, Iterable):
         raise InputError(

@@ -9,9 +9,10 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.diagnosis.arrays import BoolArray
+from gmwm.diagnosis.contamination import contamination, contamination_finding
 from gmwm.diagnosis.drift import drift_finding, variance_finding
 from gmwm.diagnosis.events import event_finding, find_events
-from gmwm.diagnosis.findings import ChannelHealth, Finding, Health, worst_first
+from gmwm.diagnosis.findings import ChannelHealth, Finding, Health, Severity, worst_first
 from gmwm.diagnosis.innovations import FEWEST, Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_findings
 from gmwm.diagnosis.pairs import crosstalk_findings, temperature_findings
@@ -26,6 +27,7 @@ Progress = Callable[[str], None]
 """Called with the name of each channel when it is done."""
 
 _LONG_ENOUGH = 3600.0  # s: slow errors of inertial sensors have correlation times of minutes
+_JITTER, _LARGE_JITTER = 0.1, 0.3  # of a sampling interval, rms
 _SAID_OTHERWISE = "samples missing"
 _SEVERE = ("warning", "bad")
 
@@ -42,9 +44,10 @@ class _Examined:
 def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """Find what is wrong with a static recording, or needs a term of its own in the model.
 
-    Gaps, dead and stuck channels, saturation, spikes and knocks, rounding, periodic lines,
-    resonances, drift, changes of the noise, dependence on temperature and between channels. Each
-    kind of finding is made in at most about one of a thousand channels of clean Gaussian noise.
+    Gaps, dead and stuck channels, saturation, spikes and knocks, outliers spread over the record,
+    rounding, periodic lines, resonances, drift, changes of the noise, an uneven clock, dependence
+    on temperature and between channels. Each kind of finding is made in at most about one of a
+    thousand channels of clean Gaussian noise.
 
     Parameters
     ----------
@@ -68,7 +71,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     >>> found.masked(rec)["gyro_x"].is_complete
     False
     """
-    whole = [_length(recording), *_reader_findings(recording)]
+    whole = [_length(recording), *_reader_findings(recording), *_clock(recording)]
     examined: dict[str, _Examined] = {}
     for channel in recording:
         examined[channel.name] = _examined(channel)
@@ -117,6 +120,17 @@ def _reader_findings(recording: Recording) -> list[Finding]:
     return findings
 
 
+def _clock(recording: Recording) -> list[Finding]:
+    """Time stamps that come unevenly; small jitter is told by the reader's note alone."""
+    jitter = recording.jitter
+    if jitter is None or jitter < _JITTER:
+        return []
+    severity: Severity = "warning" if jitter > _LARGE_JITTER else "note"
+    text = f"the steps of the time stamps vary by {100.0 * jitter:.2g} % rms"
+    action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
+    return [Finding("", "clock", severity, text, action, {"jitter": jitter})]
+
+
 def _clean(name: str) -> Finding:
     text = "nothing found that spoils the estimates"
     return Finding(name, "clean", "good", text, "", {})
@@ -143,6 +157,7 @@ def _examined(channel: Channel) -> _Examined:
             ChannelHealth(lsb=step), None,
         )  # fmt: skip
     events = find_events(errors)
+    outliers = contamination(errors, events)
     usable = errors.known.copy()
     quiet = values.copy()
     for start, stop in events:
@@ -152,6 +167,7 @@ def _examined(channel: Channel) -> _Examined:
         stuck_finding(name, unit, dt, values, step, errors),
         saturation_finding(name, unit, present, step),
         event_finding(name, unit, dt, values, events, errors.level),
+        contamination_finding(name, outliers),
         rounding_finding(name, unit, step, errors.level),
         variance_finding(name, unit, dt, errors, usable, step),
         drift_finding(name, unit, dt, quiet),
@@ -167,6 +183,7 @@ def _examined(channel: Channel) -> _Examined:
         resonances=tuple((bump.frequency, bump.damping) for bump in bumps),
         events=events,
         lsb=step,
+        outliers=outliers,
     )
     return _Examined(findings, facts, _standardized(errors, usable))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -33,8 +33,9 @@ class Finding:
     channel : str
         Name of the channel; empty if it concerns the whole recording.
     kind : str
-        "length", "reader", "gap", "dead", "infinite", "stuck", "saturation", "event", "rounding",
-        "line", "resonance", "drift", "variance", "temperature", "crosstalk" or "clean".
+        "length", "reader", "clock", "gap", "dead", "infinite", "stuck", "saturation", "event",
+        "outliers", "rounding", "line", "resonance", "drift", "variance", "temperature",
+        "crosstalk" or "clean"; of a calibration also "choice", on its model.
     severity : {"good", "note", "warning", "bad"}
         "note": nothing is to be done; "warning": estimates may be off; "bad": the channel should
         not be used as it is.
@@ -44,6 +45,8 @@ class Finding:
         What is done about it, or should be.
     values : dict
         The numbers, in SI units.
+    recording : str
+        Its source, where there are several recordings.
     """
 
     channel: str
@@ -52,9 +55,10 @@ class Finding:
     sentence: str
     action: str = ""
     values: Mapping[str, float] = field(default_factory=dict)
+    recording: str = ""
 
     def __str__(self) -> str:
-        place = f"{self.channel}: " if self.channel else ""
+        place = "".join(f"{part}: " for part in (self.recording, self.channel) if part)
         return f"{place}{self.sentence}" + (f" ({self.action})" if self.action else "")
 
     def to_dict(self) -> dict[str, Any]:
@@ -65,8 +69,29 @@ class Finding:
             "severity": self.severity,
             "sentence": self.sentence,
             "action": self.action,
-            "values": dict(self.values),
+            "values": {k: v if np.isfinite(v) else None for k, v in self.values.items()},
+            **({"recording": self.recording} if self.recording else {}),
         }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Finding:
+        """Inverse of `to_dict`.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If the content is no finding.
+        """
+        if content["severity"] not in SEVERITIES:
+            raise ValueError(f"severity = {content['severity']!r}")
+        texts = {name: str(content[name]) for name in ("channel", "kind", "sentence", "action")}
+        values = {k: float("nan") if v is None else float(v) for k, v in content["values"].items()}
+        return cls(
+            **texts,
+            severity=content["severity"],
+            values=values,
+            recording=str(content.get("recording", "")),
+        )
 
 
 @dataclass(frozen=True)
@@ -83,12 +108,16 @@ class ChannelHealth:
         First sample and the one after the last of each spike or knock.
     lsb : float
         Step of the samples, u; 0 if none was found.
+    outliers : float
+        Share of the samples that are outliers spread over the record; 0 if they are no more than
+        noise and some knocks explain.
     """
 
     lines: tuple[tuple[float, float], ...] = ()
     resonances: tuple[tuple[float, float], ...] = ()
     events: tuple[tuple[int, int], ...] = ()
     lsb: float = 0.0
+    outliers: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -144,13 +173,19 @@ class Health:
         """Step of the samples, u; 0 if none was found."""
         return self._channel(channel).lsb
 
-    def masked(self, recording: Recording) -> Recording:
+    def outliers(self, channel: str) -> float:
+        """Share of outliers spread over the record, which ask for robust wavelet variances."""
+        return self._channel(channel).outliers
+
+    def masked(self, recording: Recording, but: Collection[str] = ()) -> Recording:
         """The recording with the samples of all events missing.
 
         Parameters
         ----------
         recording : Recording
             That which was examined.
+        but : collection of str, optional
+            Channels that stay as they are.
 
         Returns
         -------
@@ -170,7 +205,7 @@ class Health:
         channels, notes = [], []
         for channel in recording:
             events = self.events(channel.name)
-            if events:
+            if events and channel.name not in but:
                 values = np.array(channel.values, dtype=float)
                 for start, stop in events:
                     values[start:stop] = np.nan
@@ -212,6 +247,7 @@ class Health:
                     "resonances": [list(resonance) for resonance in channel.resonances],
                     "events": [list(event) for event in channel.events],
                     "lsb": channel.lsb,
+                    "outliers": channel.outliers,
                 }
                 for name, channel in self.channels.items()
             },

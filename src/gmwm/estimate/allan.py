@@ -17,9 +17,10 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.fit import Fit, Region, slope_name
+from gmwm.estimate.fit import Fit
 from gmwm.estimate.profile import weight_root
 from gmwm.estimate.ramp import ols_slope
+from gmwm.estimate.region import Region, slope_name
 from gmwm.estimate.remarks import worst_misfit
 from gmwm.process import (
     BiasInstability,

@@ -18,8 +18,8 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.goodness import FittedMoments
 from gmwm.estimate.methods import fit as fit_series
-from gmwm.estimate.moments import Moments
 from gmwm.estimate.profile import Profile
 from gmwm.estimate.scales import Scales
 from gmwm.estimate.start import search
@@ -151,13 +151,9 @@ class _Problem:
 
     @classmethod
     def of(cls, fit: Fit) -> _Problem:
-        noise = Model(tuple(t for t in fit.model.terms if not _is_ramp(t)))
-        scales = Scales.of(fit.wv)
-        moments = Moments.of(fit.wv, _opened(fit), scales).under(noise)
-        implied = scales.curve(noise)
-        covariance = moments.covariance(noise) + np.diag((fit.discrepancy * implied) ** 2)
-        root = Weights.of(fit.omega, fit.wv).root(covariance)
-        return cls(scales, moments.target, implied, covariance, root)
+        at = FittedMoments.of(fit)
+        root = Weights.of(fit.omega, fit.wv).root(at.covariance)
+        return cls(at.scales, at.target, at.implied, at.covariance, root)
 
     def targets(self, runs: int, rng: np.random.Generator) -> FloatArray:
         """Wavelet variances under the fit, (runs, J)."""
@@ -174,10 +170,6 @@ def _check(fit: Fit, runs: int) -> int:
     if fit.method != "gmwm":
         raise InputError(f"a fit by {fit.method!r} has no weights to simulate: take method 'gmwm'")
     return checks.whole("runs", runs, 2)
-
-
-def _is_ramp(process: Process) -> bool:
-    return any(p.role == "slope" for p in process.parameters)
 
 
 def _opened(fit: Fit) -> Model:

@@ -16,6 +16,7 @@ from gmwm.estimate.moments import Moments
 from gmwm.estimate.profile import weight_root
 from gmwm.estimate.ramp import Slope
 from gmwm.estimate.remarks import (
+    NO_TEST,
     bound_remarks,
     merged_remarks,
     undetermined_remarks,
@@ -24,10 +25,6 @@ from gmwm.estimate.remarks import (
 from gmwm.estimate.uncertainty import SIGNIFICANT, in_model_order, quantile_above_zero
 from gmwm.process import Model, Process, RateRamp
 from gmwm.variance.wavelet import WaveletVariance
-
-_BRIDGED = (
-    "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by lines"
-)
 
 
 def conclude(
@@ -101,7 +98,7 @@ def conclude(
         coordinates.model, noise, slope, wv, len(present)
     )
     if is_bridged:
-        p_value, poor, misfits = float("nan"), False, [_BRIDGED]
+        p_value, poor, misfits = float("nan"), False, [NO_TEST]
     return Fit(
         model=model,
         wv=wv,

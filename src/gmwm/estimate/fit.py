@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +13,12 @@ from scipy.stats import norm
 from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.goodness import Goodness
 from gmwm.estimate.interval import confidence_interval
+from gmwm.estimate.region import Region, slope_name
 from gmwm.estimate.scales import Scales
-from gmwm.estimate.table import HEAD, describe, parameter_row, wrapped
+from gmwm.estimate.table import HEAD, describe, parameter_row, parameter_rows, wrapped
 from gmwm.process import Model
-from gmwm.units import field_units, si_parameter_unit
 from gmwm.variance.wavelet import WaveletVariance
 
 if TYPE_CHECKING:
@@ -33,34 +34,6 @@ METHOD_NAMES = {
     "whittle": "debiased Whittle likelihood",
 }
 """Methods as they are named in tables."""
-
-
-@dataclass(frozen=True)
-class Region:
-    """A straight part of the log-log Allan plot from which a parameter was read.
-
-    Attributes
-    ----------
-    key : str
-        The parameter.
-    slope : float
-        Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
-    tau_min, tau_max : float
-        First and last averaging time of the region, s.
-    coefficient : float
-        Of the line ``coefficient * tau^slope``, u/s^slope.
-    """
-
-    key: str
-    slope: float
-    tau_min: float
-    tau_max: float
-    coefficient: float
-
-
-def slope_name(slope: float) -> str:
-    """A slope of the Allan deviation as people write it: -1, -1/2, 0, +1/2, +1."""
-    return f"{'+' if slope > 0.0 else ''}{Fraction(slope)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +153,40 @@ class Fit:
                 )  # fmt: skip
         return result
 
+    def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:
+        """Length of record that would give each parameter a relative standard error.
+
+        Errors go with the root of the length. That is too hopeful where a discrepancy was granted
+        to the model, which no length removes.
+
+        Parameters
+        ----------
+        relative_error : float, optional
+
+        Returns
+        -------
+        dict
+            Key -> seconds, of all recordings together, for every estimated parameter but the slope
+            of a ramp; infinite for an amplitude that is not significantly above zero.
+
+        Raises
+        ------
+        InputError
+            If ``relative_error`` is not a positive number.
+        """
+        aim = checks.positive("relative_error", relative_error, "give a positive number, e.g. 0.1")
+        duration, params, errors = self.wv.n_all * self.wv.dt, self.params, self.stderr
+        lengths = {}
+        for item in self.model.parameters:
+            key = item.key
+            if key in self.upper_bounds:
+                lengths[key] = float("inf")
+            elif key in errors and item.parameter.role != "slope":
+                size = abs(params[key])
+                relative = errors[key] / size if size > 0.0 else float("inf")
+                lengths[key] = duration * (relative / aim) ** 2
+        return lengths
+
     # -- curves -----------------------------------------------------------------------------------
 
     @property
@@ -193,6 +200,11 @@ class Fit:
         scales = Scales.of(self.wv)
         curves = [scales.curve(term) for term in self.model.terms]
         return dict(zip(self.model.term_labels(), curves, strict=True))
+
+    @cached_property
+    def goodness(self) -> Goodness:
+        """How well the model describes the data at each averaging time."""
+        return Goodness.of(self)
 
     def deviation_interval(
         self, tau: FloatArray, level: float = 0.95
@@ -237,33 +249,7 @@ class Fit:
         ``field`` is a list of (value, lower, upper, unit); ``kind`` is "estimated", "given" or
         "bound".
         """
-        params, errors, intervals = self.params, self.stderr, self.interval()
-        result = []
-        for item in self.model.parameters:
-            key, unit = item.key, item.parameter.unit
-            low, high = intervals.get(key, (params[key], params[key]))
-            kind = (
-                "bound" if key in self.upper_bounds else "estimated" if key in errors else "given"
-            )
-            if kind == "given" and self.model.terms[item.term].values.get("sigma") == 0.0:
-                kind = "undefined"
-            result.append(
-                {
-                    "key": key,
-                    "meaning": item.parameter.meaning,
-                    "kind": kind,
-                    "value": params[key],
-                    "stderr": errors.get(key),
-                    "lower": low,
-                    "upper": high,
-                    "unit": si_parameter_unit(unit, self.wv.quantity),
-                    "field": [
-                        (params[key] * f.per_si, low * f.per_si, high * f.per_si, f.unit)
-                        for f in field_units(unit, self.wv.quantity)
-                    ],
-                }
-            )
-        return result
+        return parameter_rows(self)
 
     def __str__(self) -> str:
         lines = wrapped(f"{self.wv.name or 'series'}: {describe(self.model)}", indent=2)
@@ -275,7 +261,9 @@ class Fit:
         if np.isfinite(self.log_likelihood):
             lines.append(f"log-likelihood {self.log_likelihood:.8g}")
             fitness = f"of the wavelet variances: {fitness}"
-        lines += [fitness, "valid" if self.valid else "NOT VALID"]
+        lines += wrapped(fitness, indent=2)
+        lines += wrapped(self.goodness.sentence, indent=2)
+        lines.append("valid" if self.valid else "NOT VALID")
         for remark in self.remarks:
             lines += wrapped(remark, first="- ", indent=2)
         return "\n".join(lines)

@@ -16,10 +16,17 @@ from gmwm.process import GaussMarkov, Model
 from gmwm.process.base import Shape
 from gmwm.variance.wavelet import WaveletVariance
 
+WELL_KNOWN_DOF = 30.0
+"""Degrees of freedom of a level above which it is known well: to 13 % of the deviation."""
+
+NO_TEST = (
+    "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by lines"
+)
+"""Remark on a fit whose wavelet variance is not that of the data."""
+
 _SHAPE_EDGE = 0.05  # in z, from the limit of the search
 _MERGED_SIGMA = 1.96  # standard errors of the difference of two log correlation times
-_POOR_DEVIATION = 0.10  # of the Allan deviation, at levels with this many degrees of freedom:
-_POOR_DOF = 30.0
+_POOR_DEVIATION = 0.10  # of the Allan deviation, at well-known levels
 _IDLE_P = 0.01
 _CONFOUNDED, _LOOSE = 0.999, 0.1  # correlation, relative standard error
 
@@ -172,7 +179,7 @@ def worst_misfit(
     ``variance`` (J,) are the statistical variances of ``target``, u^4. The time is zero where no
     level is known well.
     """
-    known = 2.0 * target**2 / np.maximum(variance, 1e-300) > _POOR_DOF
+    known = 2.0 * target**2 / np.maximum(variance, 1e-300) > WELL_KNOWN_DOF
     if not np.any(known):
         return 0.0, 0.0, False
     ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)

@@ -10,8 +10,9 @@ import numpy as np
 
 from gmwm import checks
 from gmwm.errors import InputError
-from gmwm.estimate.fit import METHOD_NAMES, Fit, Region
+from gmwm.estimate.fit import METHOD_NAMES, Fit
 from gmwm.estimate.joint import JointFit
+from gmwm.estimate.region import Region
 from gmwm.process import model_from_list
 from gmwm.variance.pooled import PooledVariance
 from gmwm.variance.wavelet import WaveletVariance

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gmwm.process import Model
+from gmwm.units import field_units, si_parameter_unit
+
+if TYPE_CHECKING:
+    from gmwm.estimate.fit import Fit
 
 WIDTH = 80
 
@@ -44,3 +48,32 @@ def parameter_row(row: Mapping[str, Any]) -> str:
     # A long name takes the blanks before its value.
     name = f"{row['key']} "
     return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {said:<22} {row['unit']}"
+
+
+def parameter_rows(fit: Fit) -> list[dict[str, Any]]:
+    """One dict a parameter; see `gmwm.Fit.rows`."""
+    params, errors, intervals = fit.params, fit.stderr, fit.interval()
+    result = []
+    for item in fit.model.parameters:
+        key, unit = item.key, item.parameter.unit
+        low, high = intervals.get(key, (params[key], params[key]))
+        kind = "bound" if key in fit.upper_bounds else "estimated" if key in errors else "given"
+        if kind == "given" and fit.model.terms[item.term].values.get("sigma") == 0.0:
+            kind = "undefined"
+        result.append(
+            {
+                "key": key,
+                "meaning": item.parameter.meaning,
+                "kind": kind,
+                "value": params[key],
+                "stderr": errors.get(key),
+                "lower": low,
+                "upper": high,
+                "unit": si_parameter_unit(unit, fit.wv.quantity),
+                "field": [
+                    (params[key] * f.per_si, low * f.per_si, high * f.per_si, f.unit)
+                    for f in field_units(unit, fit.wv.quantity)
+                ],
+            }
+        )
+    return result

@@ -36,11 +36,14 @@ class Timing:
         Where rows are missing.
     notes : tuple of str
         On the clock: its rate, its unit, its jitter, its jumps; one sentence each.
+    jitter : float
+        Standard deviation of the steps, as a share of a step.
     """
 
     rate: float
     jumps: Jumps
     notes: tuple[str, ...]
+    jitter: float
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class Clock:
             f"{' as far as the steps tell' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)."
         )
-        return Timing(rate, jumps, (note, *self._notes_of_jumps(jumps, seconds)))
+        return Timing(rate, jumps, (note, *self._notes_of_jumps(jumps, seconds)), jitter / step)
 
     def _check_complete(self) -> None:
         bad = np.flatnonzero(np.isnan(self.stamps))

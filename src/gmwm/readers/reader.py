@@ -6,6 +6,7 @@ import math
 import os
 import stat
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,9 +16,8 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
-from gmwm.readers.clock import Clock, agree
+from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.jumps import Jumps
 from gmwm.readers.names import meaning
 from gmwm.readers.roles import Columns, Reference, Roles, assign_roles
 from gmwm.readers.table import FEWEST, Table, label
@@ -81,17 +81,18 @@ def read(
 
     arrays = table.load(roles.columns)
     _check_size(table, roles, arrays)
-    used_rate, jumps, clock_notes = _timing(table, roles.time, arrays, stated)
-    if jumps is not None:
+    used_rate, timing, clock_notes = _timing(table, roles.time, arrays, stated)
+    if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
-        arrays = {column: jumps.spread(arrays.pop(column)) for column in list(arrays)}
-    return Recording.from_arrays(
+        arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
+    recording = Recording.from_arrays(
         {name: arrays[index] for name, index in roles.channels.items()},
         rate=used_rate,
         units=unit_of,
         source=table.source,
         notes=(*table.notes, *roles.notes, *unit_notes, *clock_notes),
     )
+    return replace(recording, jitter=timing.jitter) if timing is not None else recording
 
 
 def _open(path: Path) -> Table:
@@ -143,7 +144,7 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
 
 def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
-) -> tuple[float, Jumps | None, tuple[str, ...]]:
+) -> tuple[float, Timing | None, tuple[str, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return _required_rate(table, stated), None, ()
@@ -156,6 +157,6 @@ def _timing(
     )
     timing = clock.timing(stated)
     if stated is None:
-        return timing.rate, timing.jumps, timing.notes
+        return timing.rate, timing, timing.notes
     used = f"The rate stated, {stated:g} Hz, is used."
-    return stated, timing.jumps, (*timing.notes, used)
+    return stated, timing, (*timing.notes, used)

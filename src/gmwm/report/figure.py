@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from gmwm._typing import FloatArray
 from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.estimate.fit import Fit
 from gmwm.plot import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
 from gmwm.units import field_units
 
 _GRID = "#dddddd"
+_BESIDE = 1.7  # ratio of averaging times that is left free at both ends
 _LAYOUT: dict[str, Any] = {
     "margin": {"l": 75, "r": 15, "t": 36, "b": 50},
     "height": 420,
@@ -74,12 +76,71 @@ def deviation_figure(fitted: Fit) -> dict[str, Any]:
     low, high = deviation_range(np.concatenate([total, value]))
     layout = {
         **_LAYOUT,
-        "xaxis": _axis("averaging time [s]"),
+        "xaxis": _times(wv.tau),
         "yaxis": {
             **_axis(f"Allan deviation [{unit}]"),
             "range": [float(np.log10(low)), float(np.log10(high))],
         },
         "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 1, "xanchor": "right", "y": 1},
+    }
+    return {"data": traces, "layout": layout, "config": _CONFIG}
+
+
+def residual_figure(fitted: Fit) -> dict[str, Any]:
+    """Standardised residuals by averaging time, with the misfit of the deviation on hover.
+
+    Returns
+    -------
+    dict
+        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
+    """
+    at = fitted.goodness
+    shown = np.flatnonzero(np.isfinite(at.residual) & np.isfinite(at.misfit))
+    tau, height = at.tau[shown].tolist(), at.residual[shown].tolist()
+    stems: dict[str, list[float | None]] = {"x": [], "y": []}
+    for time, value in zip(tau, height, strict=True):
+        stems["x"] += [time, time, None]
+        stems["y"] += [0.0, value, None]
+    colour = COMPONENT_COLOURS[0]
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            **stems,
+            "line": {"color": colour, "width": 2},
+            "hoverinfo": "skip",
+        },
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "x": tau,
+            "y": height,
+            "marker": {"color": colour, "size": 7},
+            "customdata": [
+                [100.0 * misfit, dof]
+                for misfit, dof in zip(at.misfit[shown], at.dof[shown], strict=True)
+            ],
+            "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
+            "%{y:+.2f} standard errors, %{customdata[1]:.3g} degrees of freedom<extra></extra>",
+        },
+    ]
+    band = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": -2, "y1": 2}
+    largest = max([2.5, *map(abs, height)])
+    layout = {
+        **_LAYOUT,
+        "margin": {"l": 75, "r": 15, "t": 8, "b": 42},
+        "height": 190,
+        "showlegend": False,
+        "shapes": [{**band, "fillcolor": "#e8eef4", "line": {"width": 0}, "layer": "below"}],
+        "xaxis": _times(at.tau),
+        "yaxis": {
+            "title": {"text": "residual [sigma]"},
+            "range": [-1.15 * largest, 1.15 * largest],
+            "gridcolor": _GRID,
+            "linecolor": "#888888",
+            "mirror": True,
+            "zerolinecolor": SUM_COLOUR,
+        },
     }
     return {"data": traces, "layout": layout, "config": _CONFIG}
 
@@ -119,7 +180,7 @@ def growth_figure(
 
 def _line(
     tau: list[float],
-    value: np.typing.NDArray[np.float64],
+    value: FloatArray,
     label: str,
     colour: str,
     dash: str,
@@ -134,6 +195,12 @@ def _line(
         "line": {"color": colour, "dash": dash, "width": width},
         "hovertemplate": "%{y:.4g} at %{x:.4g} s",
     }
+
+
+def _times(tau: FloatArray) -> dict[str, Any]:
+    """The axis of averaging times, the same for all figures of a channel."""
+    ends = np.log10([tau[0] / _BESIDE, tau[-1] * _BESIDE])
+    return {**_axis("averaging time [s]"), "range": ends.tolist()}
 
 
 def _axis(title: str) -> dict[str, Any]:

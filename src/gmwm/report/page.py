@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,17 @@ import gmwm
 from gmwm.calibration import Calibration
 from gmwm.estimate.fit import Fit
 from gmwm.files import written
-from gmwm.report.figure import deviation_figure
+from gmwm.report.figure import deviation_figure, residual_figure
+from gmwm.report.health import choice, health
 from gmwm.report.navigation import navigation
 from gmwm.selection import describe
 from gmwm.summary import floor, sentence, white_density
 from gmwm.units import field_units
+
+_DAY, _YEAR = 86400.0, 365.25 * 86400.0
+_DAYS, _YEARS = 5.0, 2.0  # from which on durations are told so
+_AIM = 0.1  # relative standard error
+_MANY_YEARS = 100.0
 
 
 def write_report(calibration: Calibration, path: str | os.PathLike[str]) -> Path:
@@ -54,14 +61,19 @@ def page(calibration: Calibration) -> str:
         calibration=calibration,
         version=gmwm.__version__,
         length=duration_text(calibration.duration),
-        channels=[_channel(name, fit) for name, fit in calibration.fits.items()],
+        health=health(calibration),
+        channels=[_channel(name, fit, calibration) for name, fit in calibration.fits.items()],
         navigation=navigation(calibration),
         plotly_js=get_plotlyjs(),
     )
 
 
 def duration_text(seconds: float) -> str:
-    """A duration as people say it: ``2 h 46 min``, ``35 min``, ``40 s``."""
+    """A duration as people say it: ``40 s``, ``35 min``, ``2 h 46 min``, ``12 days``."""
+    if seconds >= _YEARS * _YEAR:
+        return f"{seconds / _YEAR:.2g} years"
+    if seconds >= _DAYS * _DAY:
+        return f"{seconds / _DAY:.3g} days"
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60.0)
@@ -82,8 +94,9 @@ def _in_field_unit(value: float, parameter_unit: str, fit: Fit) -> str:
     return f"{number(value * units[0].per_si)} {units[0].unit}"
 
 
-def _channel(name: str, fit: Fit) -> dict[str, Any]:
+def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
     low = floor(fit)
+    lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
     return {
         "name": name,
         "fit": fit,
@@ -92,11 +105,17 @@ def _channel(name: str, fit: Fit) -> dict[str, Any]:
         "floor": _in_field_unit(low.deviation, "u", fit),
         "floor_tau": number(low.tau),
         "sentence": sentence(fit),
-        "rows": [_row(row) for row in fit.rows()],
-        # "</" would end the script element, also within a string.
-        "figure": json.dumps(deviation_figure(fit), allow_nan=False).replace("</", "<\\/"),
+        "choice": [str(replace(found, channel="")) for found in choice(calibration, name)],
+        "rows": [_row(row, lengths.get(row["key"]), duration) for row in fit.rows()],
+        "figure": _script(deviation_figure(fit)),
+        "residuals": _script(residual_figure(fit)),
         "fitness": _fitness(fit),
     }
+
+
+def _script(figure: dict[str, Any]) -> str:
+    # "</" would end the script element, also within a string.
+    return json.dumps(figure, allow_nan=False).replace("</", "<\\/")
 
 
 def _fitness(fit: Fit) -> str:
@@ -105,10 +124,23 @@ def _fitness(fit: Fit) -> str:
         text += f", p = {fit.p_value:.2g}"
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
-    return text
+    return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
-def _row(row: dict[str, Any]) -> dict[str, Any]:
+def needed(seconds: float | None, duration: float) -> str:
+    """Length of record that a parameter needs, in words; empty if nothing is to be said."""
+    if seconds is None:
+        return ""
+    if seconds <= duration:
+        return "long enough"
+    if seconds == float("inf"):
+        return "not identified"
+    if seconds > _MANY_YEARS * _YEAR:
+        return "centuries"
+    return f"needs {duration_text(seconds)}"
+
+
+def _row(row: dict[str, Any], length: float | None, duration: float) -> dict[str, Any]:
     """A parameter for the table: SI, then each of the field's units."""
 
     def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
@@ -121,4 +153,13 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
 
     cells = [cell(row["value"], row["lower"], row["upper"], row["unit"])]
     cells += [cell(*field) for field in row["field"]]
-    return {"key": row["key"], "meaning": row["meaning"], "cells": cells}
+    error = ""
+    if row["kind"] == "estimated" and row["value"]:
+        error = f"{100.0 * row['stderr'] / abs(row['value']):.2g} %"
+    return {
+        "key": row["key"],
+        "meaning": row["meaning"],
+        "cells": cells,
+        "error": error,
+        "needed": needed(length, duration),
+    }
