@@ -14,6 +14,7 @@ from gmwm import __version__
 from gmwm.arguments import read_recording, reading_options
 from gmwm.errors import InputError
 from gmwm.health_command import health
+from gmwm.navigate_command import navigate
 from gmwm.study.command import reproduce
 
 if TYPE_CHECKING:
@@ -160,6 +161,7 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
 
 
 cli.add_command(health)
+cli.add_command(navigate)
 cli.add_command(reproduce)
 
 

@@ -29,6 +29,7 @@ KINDS = {
 
 _OF_GNSS = ("position", "velocity")
 _STANDSTILL = 1e-3  # m/s
+_SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Fixes:
         s since the first epoch, rising.
     value : (E, 3) ndarray
         Latitude, longitude, height (rad, m); velocity to the north, east, down (m/s); height (m)
-        in the first column; nothing for a standstill.
+        in the first column; zero for a standstill, or how much a simulated one shakes.
     sd : (E, 3) ndarray
         Standard deviations to the north, east and down, m or m/s; a component of zero is not used.
     """
@@ -119,7 +120,7 @@ class Fixes:
             return offset(self.value, by)
         if self.kind == "height":
             return self.value + np.where(np.arange(3) == 0, by, 0.0)
-        return self.value + by if self.kind == "velocity" else self.value
+        return self.value + by
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +178,9 @@ class Aiding:
             if fixes.kind in _OF_GNSS:
                 out = np.zeros(fixes.time.size, dtype=bool)
                 for outage in outages:
-                    out |= (fixes.time > outage.start) & (fixes.time < outage.end)
+                    out |= (fixes.time > outage.start + _SAME_TIME) & (
+                        fixes.time < outage.end - _SAME_TIME
+                    )
                 fixes = fixes.part(~out)
             result.append(fixes)
         return replace(self, fixes=tuple(result))
@@ -304,7 +307,8 @@ def _three(name: str, values: Any) -> FloatArray:
 
 
 def _deviations(given: float | Sequence[float], count: int) -> FloatArray:
-    each = _three("standard deviation", np.broadcast_to(np.asarray(given, dtype=float), 3))
+    each = checks.real_numbers(given, "standard deviation")
+    each = _three("standard deviation", np.full(3, each) if each.ndim == 0 else each)
     if np.any(each <= 0.0):
         raise InputError(f"standard deviation = {checks.shown(given)}: give positive numbers")
     return np.tile(each, (count, 1))

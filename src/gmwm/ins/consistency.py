@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import beta, chi2, norm, t
 
 from gmwm._typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.ins.monte_carlo import GROUPS, Runs
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
@@ -54,7 +55,9 @@ class Coverage:
     level : float
     share : float
     lower, upper : float
-        Binomial interval of 95 % of the share (Clopper & Pearson 1934, *Biometrika* 26).
+        Interval of 95 % of the share: binomial at one epoch (Clopper & Pearson 1934, *Biometrika*
+        26, 404-413), and over a time with as many draws as the scatter between the runs is worth
+        (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
     """
 
     level: float
@@ -134,8 +137,18 @@ def over_time(runs: Runs, start: float = 0.0, end: float = np.inf) -> Consistenc
     runs : Runs
     start, end : float, optional
         s.
+
+    Raises
+    ------
+    InputError
+        If no errors were kept in that time.
     """
     epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
+    if not epochs.size:
+        raise InputError(
+            f"no errors were kept from {start:g} s to {end:g} s: give a longer time, within "
+            f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
+        )
     alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
     nees, coverage, rms, score = {}, {}, {}, {}
     for i, (name, part) in enumerate(GROUPS.items()):
@@ -146,11 +159,11 @@ def over_time(runs: Runs, start: float = 0.0, end: float = np.inf) -> Consistenc
         coverage[name] = _covered_by_run(standard)
         rms[name] = _rms(standard)
         score[name] = _score(squares, runs.log_det[alive][:, epochs, i], size)
-    sensors = runs.sensor_nees[alive][:, epochs]
-    if np.any(np.isfinite(sensors)):
-        size = int(np.sum(np.all(runs.sensor_sd[alive][:, epochs] > 0.0, axis=(0, 1))))
-        nees["sensors"] = mean_ratio(np.mean(sensors, axis=1) / size)
-        standard = _standard_sensors(runs, alive, epochs)
+    settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
+    if np.any(alive) and settled.size:
+        size = int(np.sum(np.all(runs.sensor_sd[alive][:, settled] > 0.0, axis=(0, 1))))
+        nees["sensors"] = mean_ratio(np.mean(runs.sensor_nees[alive][:, settled], axis=1) / size)
+        standard = _standard_sensors(runs, alive, settled)
         coverage["sensors"], rms["sensors"] = _covered_by_run(standard), _rms(standard)
     return Consistency(nees, coverage, rms, score)
 
@@ -175,8 +188,10 @@ def innovation_test(runs: Runs) -> InnovationTest:
     """Innovations of all runs: their size and their whiteness."""
     total, count = np.nansum(runs.nis, axis=0)
     scores = runs.whiteness[np.isfinite(runs.whiteness)]
-    together = np.sum(scores) / np.sqrt(max(scores.size, 1))
-    return InnovationTest(_ratio(total, count), float(2.0 * norm.sf(abs(together))))
+    p_value = float("nan")
+    if scores.size:
+        p_value = float(2.0 * norm.sf(abs(np.sum(scores)) / np.sqrt(scores.size)))
+    return InnovationTest(_ratio(total, count), p_value)
 
 
 def chi_square_ratio(squares: FloatArray, size: int) -> Ratio:
@@ -192,36 +207,52 @@ def mean_ratio(values: FloatArray) -> Ratio:
         return Ratio(mean, float("nan"), float("nan"), float("nan"))
     error = float(np.std(values, ddof=1)) / np.sqrt(runs)
     width = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1)) * error
-    p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else 0.0
+    p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
     return Ratio(mean, 1.0 - width, 1.0 + width, p_value)
 
 
 def covered(standard: FloatArray) -> tuple[Coverage, ...]:
-    """Coverage of standardised errors (R, d); the components of a run count as one draw each."""
+    """Coverage of standardised errors (R, d).
+
+    The components of a run are correlated, so that a run counts as one draw.
+    """
     size = standard.shape[0]
+    shares = _shares(standard[:, None])
     return tuple(
-        _coverage(level, float(np.mean(np.abs(standard) < norm.ppf(0.5 + 0.5 * level))), size)
-        for level in LEVELS
+        _coverage(level, share, size) for level, share in zip(LEVELS, _means(shares), strict=True)
+    )
+
+
+def _shares(standard: FloatArray) -> FloatArray:
+    """Share of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
+    bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
+    return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds], axis=1)
+
+
+def _means(shares: FloatArray) -> list[float]:
+    return (
+        [float(each) for each in np.mean(shares, axis=0)] if len(shares) else [np.nan] * len(LEVELS)
     )
 
 
 def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
+    runs, shares = len(standard), _shares(standard)
     result = []
-    runs = standard.shape[0]
-    for level in LEVELS:
-        shares = np.mean(np.abs(standard) < norm.ppf(0.5 + 0.5 * level), axis=(1, 2))
-        mean = float(np.mean(shares)) if runs else float("nan")
-        width = float("nan")
-        if runs > 1:
-            quantile = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1))
-            width = quantile * float(np.std(shares, ddof=1)) / np.sqrt(runs)
-        result.append(Coverage(level, mean, max(mean - width, 0.0), min(mean + width, 1.0)))
+    for level, mean, each in zip(LEVELS, _means(shares), shares.T, strict=True):
+        draws = float(runs)
+        error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
+        if error > 0.0:
+            few, many = t.ppf(0.5 + 0.5 * _CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
+            draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
+        result.append(_coverage(level, mean, draws))
     return tuple(result)
 
 
-def _coverage(level: float, share: float, size: int) -> Coverage:
+def _coverage(level: float, share: float, size: float) -> Coverage:
     """With its binomial interval."""
+    if not size > 0.0:
+        return Coverage(level, float("nan"), float("nan"), float("nan"))
     hits, tail = share * size, 0.5 * (1.0 - _CONFIDENCE)
     lower = float(beta.ppf(tail, hits, size - hits + 1.0)) if hits > 0.0 else 0.0
     upper = float(beta.ppf(1.0 - tail, hits + 1.0, size - hits)) if hits < size else 1.0

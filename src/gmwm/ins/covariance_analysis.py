@@ -114,16 +114,22 @@ class Course:
         asked = scenario.aiding.without(scenario.outages).events(trajectory.dt, trajectory.n).epoch
         epoch = _steps(np.union1d(asked, outputs.epoch), trajectory.n, stride)
         samples = np.diff(epoch, prepend=0)
-        middle = epoch - samples + samples // 2
+        # The middle of an odd number of samples lies between two epochs.
+        early = epoch - samples + samples // 2
+        late = early + samples % 2
+
+        def middle(values: FloatArray) -> FloatArray:
+            return np.ascontiguousarray(0.5 * (values[early] + values[late]))
+
         rate = imu.rotation[np.maximum(epoch - 1, 0)] / trajectory.dt
         return cls(
             scenario=scenario,
             outputs=outputs,
             epoch=epoch,
             samples=samples,
-            mid_matrix=matrix_from_rpy(trajectory.rpy[middle]),
-            mid_v=np.ascontiguousarray(trajectory.velocity[middle]),
-            mid_lla=np.ascontiguousarray(trajectory.lla[middle]),
+            mid_matrix=middle(matrix_from_rpy(trajectory.rpy)),
+            mid_v=middle(trajectory.velocity),
+            mid_lla=middle(trajectory.lla),
             end_matrix=matrix_from_rpy(trajectory.rpy[epoch]),
             end_v=np.ascontiguousarray(trajectory.velocity[epoch]),
             end_rate=rate,

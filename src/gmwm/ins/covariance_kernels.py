@@ -155,6 +155,9 @@ def carry(
     """
     n = P.shape[0]
     m = n - 9
+    paired = False
+    for i in range(m):
+        paired = paired or partner[i] != i
     for a in range(6):
         for j in range(n):
             S[a, j] = 0.0
@@ -165,23 +168,20 @@ def carry(
             for j in range(n):
                 S[a, j] += factor * P[9 + i, j]
     for i in range(9):
+        # Sums of fixed length are unrolled, and the loop about them is vectorised.
         for j in range(n):
-            T[i, j] = 0.0
-        for k in range(9):
-            factor = A[i, k]
-            if factor != 0.0:
-                for j in range(n):
-                    T[i, j] += factor * P[k, j]
-        for a in range(6):
-            factor = B[i, a]
-            for j in range(n):
-                T[i, j] += factor * S[a, j]
-    for i in range(9):
+            total = 0.0
+            for k in range(9):
+                total += A[i, k] * P[k, j]
+            for a in range(6):
+                total += B[i, a] * S[a, j]
+            T[i, j] = total
         for a in range(6):
             U[i, a] = B[i, a] * integral[a]
-        for k in range(m):
-            a = axis[k]
-            if a >= 0:
+    for k in range(m):
+        a = axis[k]
+        if a >= 0:
+            for i in range(9):
                 U[i, a] += T[i, 9 + k] * gain[k]
     # Sensor states among themselves: rows, then columns.
     for i in range(m):
@@ -199,9 +199,10 @@ def carry(
             row[j] = P[9 + i, 9 + j]
         for j in range(i, m):
             P[9 + i, 9 + j] = row[j] * phi[j]
-        for j in range(i, m):
-            if partner[j] != j:
-                P[9 + i, 9 + j] += row[partner[j]] * phi_off[j]
+        if paired:
+            for j in range(i, m):
+                if partner[j] != j:
+                    P[9 + i, 9 + j] += row[partner[j]] * phi_off[j]
         P[9 + i, 9 + i] += noise[i]
         if partner[i] > i:
             P[9 + i, 9 + partner[i]] += noise_off[i]
@@ -211,13 +212,15 @@ def carry(
     # Navigation errors with sensor states, and among themselves.
     for i in range(9):
         for j in range(m):
-            value = T[i, 9 + j] * phi[j]
-            if partner[j] != j:
-                value += T[i, 9 + partner[j]] * phi_off[j]
+            P[i, 9 + j] = T[i, 9 + j] * phi[j]
+        if paired:
+            for j in range(m):
+                if partner[j] != j:
+                    P[i, 9 + j] += T[i, 9 + partner[j]] * phi_off[j]
+        for j in range(m):
             if axis[j] >= 0:
-                value += B[i, axis[j]] * cross[j]
-            P[i, 9 + j] = value
-            P[9 + j, i] = value
+                P[i, 9 + j] += B[i, axis[j]] * cross[j]
+            P[9 + j, i] = P[i, 9 + j]
     for i in range(9):
         for j in range(i, 9):
             total = 0.0

@@ -113,7 +113,7 @@ def emulate(trajectory: Trajectory) -> Imu:
     Notes
     -----
     Groves (2013), *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*,
-    2nd ed.: velocity rate eq. 5.54, rates of Euler angles eq. 2.57.
+    2nd ed., ch. 2 (rates of Euler angles) and ch. 5 (rate of the velocity).
     """
     lla = unwrapped_longitudes(finite_numbers(trajectory.lla, "lla"))
     check_latitudes(lla, "lla")

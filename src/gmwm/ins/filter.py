@@ -20,7 +20,7 @@ from gmwm.ins.rotation import matrix_from_rpy
 from gmwm.ins.sensors import SensorModels
 from gmwm.ins.solution import Innovations, Solution
 from gmwm.ins.states import NO_AXIS, IntArray, SensorStates
-from gmwm.ins.trajectory import NavState
+from gmwm.ins.trajectory import NavState, check_latitudes
 
 _COVARIANCE_STEP = 0.1  # s
 
@@ -137,7 +137,13 @@ class Filter:
             Measurements.
         outputs : Outputs
             Epochs to be kept.
+
+        Raises
+        ------
+        InputError
+            If it starts closer than 1 deg to a pole.
         """
+        check_latitudes(initial.lla[None, :], "initial")
         table, m, kept = self.states, self.states.m, outputs.epoch.size
         C = matrix_from_rpy(initial.rpy)
         v, lla, x = initial.velocity.copy(), initial.lla.copy(), table.mean.copy()
@@ -198,11 +204,26 @@ class Outputs:
         return np.asarray(self.epoch * dt, dtype=float)
 
     @classmethod
-    def every(cls, interval: float, dt: float, n: int, before: Sequence[float] = ()) -> Outputs:
-        """Every ``interval`` (s) after the measurements, and at some times (s) before them."""
+    def every(
+        cls,
+        interval: float,
+        dt: float,
+        n: int,
+        before: Sequence[float] = (),
+        also: Sequence[float] | FloatArray = (),
+    ) -> Outputs:
+        """Every ``interval`` and ``also`` (s) after the measurements, ``before`` before them."""
         stride = max(round(checks.positive("interval", interval) / dt), 1)
-        after = np.arange(0, n + 1, stride)
-        early = np.clip(np.rint(np.asarray(before, dtype=float) / dt), 0, n).astype(np.int64)
+        extra = np.clip(np.rint(np.asarray(also, dtype=float) / dt), 0, n).astype(np.int64)
+        after = np.union1d(np.arange(0, n + 1, stride), extra)
+        times = checks.real_numbers(before, "before")
+        outside = ~((times >= -0.5 * dt) & (times <= (n + 0.5) * dt))
+        if np.any(outside):
+            raise InputError(
+                f"before = {times[np.argmax(outside)]:g} s: the IMU record goes from 0 to "
+                f"{n * dt:g} s; give times within it"
+            )
+        early = np.clip(np.rint(times / dt), 0, n).astype(np.int64)
         epoch = np.concatenate([after, early])
         flag = np.concatenate([np.zeros(after.size), np.ones(early.size)]).astype(np.int64)
         order = np.lexsort((-flag, epoch))

@@ -76,7 +76,7 @@ def residual(
     if kind == IS_HEIGHT:
         return lla[2] - value[0]
     if kind == IS_STANDSTILL:
-        return v[component]
+        return v[component] - value[component]
     if kind == IS_VELOCITY:
         x = rate[1] * lever[2] - rate[2] * lever[1]
         y = rate[2] * lever[0] - rate[0] * lever[2]
@@ -103,13 +103,13 @@ def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> Non
     lla[0] -= x[0] / (meridian + lla[2])
     lla[1] -= x[1] / ((transverse + lla[2]) * math.cos(lla[0]))
     lla[2] += x[2]
-    # The velocity error is u + v x phi.
-    a = x[3] + v[1] * x[8] - v[2] * x[7]
-    b = x[4] + v[2] * x[6] - v[0] * x[8]
-    c = x[5] + v[0] * x[7] - v[1] * x[6]
-    v[0] -= a
-    v[1] -= b
-    v[2] -= c
+    # The velocity less u is the true one, turned by the attitude error as the attitude is; to the
+    # second order, for a fast vehicle with a heading in doubt.
+    a, b, c = v[0] - x[3], v[1] - x[4], v[2] - x[5]
+    p, q, r = x[7] * c - x[8] * b, x[8] * a - x[6] * c, x[6] * b - x[7] * a
+    v[0] = a + p + 0.5 * (x[7] * r - x[8] * q)
+    v[1] = b + q + 0.5 * (x[8] * p - x[6] * r)
+    v[2] = c + r + 0.5 * (x[6] * q - x[7] * p)
     turn_navigation(C, -x[6], -x[7], -x[8])
     orthonormalise(C)
     for i in range(9):

@@ -8,7 +8,7 @@ and specific forces are continuous.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -25,7 +25,7 @@ from gmwm.ins.trajectory import Trajectory, check_latitudes, finite_numbers
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
 
-_LONGEST = 10_000_000  # epochs: 2 GB while the trajectory is built
+_LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Climb:
 
 
 def perform(
-    manoeuvres: Sequence[Manoeuvre],
+    manoeuvres: Iterable[Manoeuvre],
     *,
     start: Lla,
     heading: float = 0.0,
@@ -154,7 +154,8 @@ def perform(
 
     Parameters
     ----------
-    manoeuvres : sequence of Straight, Accelerate, Stop, Turn or Climb
+    manoeuvres : iterable of Straight, Accelerate, Stop, Turn or Climb
+        May go on forever if a duration is given.
     start : (3,) sequence
         Latitude, longitude, rad, and height, m.
     heading, speed : float, optional
@@ -186,18 +187,14 @@ def perform(
     """
     dt, ramp = sampling_interval(dt), positive("ramp", ramp)
     origin = _origin(start)
-    plans: list[Plan] = []
-    for manoeuvre in manoeuvres:
-        arriving = speed + sum(plan.speed.change for plan in plans if plan.speed is not None)
-        plans.append(manoeuvre.plan(max(arriving, 0.0), ramp))
-    total = sum(plan.duration for plan in plans)
-    if duration is not None:
-        total = positive("duration", duration)
-    n = math.floor(total / dt + 1e-6)
+    limit = dt * _LONGEST if duration is None else positive("duration", duration)
+    plans = _plans(manoeuvres, speed, ramp, min(limit, dt * _LONGEST))
+    n = math.floor(
+        (sum(plan.duration for plan in plans) if duration is None else limit) / dt + 1e-6
+    )
     if not 1 <= n <= _LONGEST:
         raise InputError(
-            f"manoeuvres that take {total:g} s in steps of {dt:g} s: give a list that takes one to "
-            f"{_LONGEST:,} steps"
+            f"a trajectory of {n:,} steps of {dt:g} s: let it have one to {_LONGEST:,} steps"
         )
     course = _course(plans, 0.5 * dt * np.arange(2 * n + 1, dtype=float), speed, heading)
     lla = np.empty((n + 1, 3))
@@ -227,9 +224,24 @@ def _origin(start: Lla) -> FloatArray:
     return origin
 
 
-def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: float) -> _Course:
+def _plans(manoeuvres: Iterable[Manoeuvre], speed: float, ramp: float, limit: float) -> list[Plan]:
+    """What is done until some time, s, or until nothing more is to be done."""
     if not is_number(speed) or speed < 0.0:
         raise InputError(f"speed = {shown(speed)}: give a speed, zero or more")
+    plans: list[Plan] = []
+    elapsed = 0.0
+    for manoeuvre in manoeuvres:
+        plan = manoeuvre.plan(speed, ramp)
+        plans.append(plan)
+        elapsed += plan.duration
+        if plan.speed is not None:
+            speed = max(speed + plan.speed.change, 0.0)
+        if elapsed > limit:
+            break
+    return plans
+
+
+def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: float) -> _Course:
     if not is_number(heading):
         raise InputError(f"heading = {shown(heading)}: give a number in rad")
     course = _Course(*(np.zeros(time.size) for _ in range(6)))

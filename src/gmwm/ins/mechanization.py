@@ -72,9 +72,10 @@ def step(
 
     Notes
     -----
-    Savage (1998), J. Guid. Control Dyn. 21: coning from Part 1, eq. 30 (with the interval before
-    instead of subintervals), rotation and sculling from Part 2, eqs. 36, 44 and 56; frame rotation,
-    Coriolis and gravity at the middle of the interval as in Groves (2013), sec. 5.4 and 5.5.
+    Savage (1998), Strapdown inertial navigation integration algorithm design, J. Guid. Control
+    Dyn. 21: coning from Part 1, rotation and sculling of the velocity from Part 2, both with the
+    interval before instead of subintervals. Rotation of the frame, Coriolis and gravity are those
+    at the middle of the interval (Groves 2013, ch. 5); the position follows the trapezoidal rule.
     """
     # Rotation vector of the body.
     rx = ax + (ay_before * az - az_before * ay) / 12.0

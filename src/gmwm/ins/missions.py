@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import cycle, islice
-from typing import TypeVar
+from collections.abc import Iterator
+from itertools import cycle
 
 from scipy.optimize import brentq
 
@@ -26,8 +25,6 @@ from gmwm.ins.routes import displacement
 from gmwm.ins.trajectory import Trajectory
 
 _RAMP = 2.0  # s, of the helicopter's turns
-_Item = TypeVar("_Item")
-
 _START = (math.radians(46.52), math.radians(6.57), 400.0)
 
 
@@ -70,15 +67,16 @@ def helicopter_mapping(
     away, overshoot = _turn_to_next_strip(speed, spacing, rate)
     # A turn ends farther out than it began by the overshoot, and so does every other strip.
     length = strip + max(overshoot, 0.0)
-    manoeuvres: list[Manoeuvre] = [Straight(30.0), Climb(150.0, 4.0), Accelerate(speed, 1.5)]
-    for side in _until(duration, length / speed, (1.0, -1.0)):
-        manoeuvres += [
-            Straight(length / speed),
-            Turn(-side * away, rate),
-            Turn(side * (math.pi + away), rate),
-        ]
+
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield from (Straight(30.0), Climb(150.0, 4.0), Accelerate(speed, 1.5))
+        for side in cycle((1.0, -1.0)):
+            yield Straight(length / speed)
+            yield Turn(-side * away, rate)
+            yield Turn(side * (math.pi + away), rate)
+
     return perform(
-        manoeuvres,
+        manoeuvres(),
         start=start,
         heading=heading,
         dt=dt,
@@ -124,12 +122,15 @@ def car_drive(
     heading : float, optional
         rad.
     """
-    manoeuvres: list[Manoeuvre] = [Stop(20.0)]
-    for side in _until(duration, 300.0, (1.0, -1.0)):
-        manoeuvres += _streets(side)
-        manoeuvres += _open_road(side)
+
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield Stop(20.0)
+        for side in cycle((1.0, -1.0)):
+            yield from _streets(side)
+            yield from _open_road(side)
+
     return perform(
-        manoeuvres, start=start, heading=heading, dt=dt, ramp=1.0, flat=True, duration=duration
+        manoeuvres(), start=start, heading=heading, dt=dt, ramp=1.0, flat=True, duration=duration
     )
 
 
@@ -187,18 +188,14 @@ def fixed_wing_loiter(
         If an argument is not positive.
     """
     rate = positive("speed", speed) / positive("radius", radius)
-    circle = 2.0 * math.pi / rate
-    manoeuvres: list[Manoeuvre] = [Straight(20.0), Climb(60.0, 2.0)]
-    for side, rise in _until(duration, 3.0 * circle, ((1.0, 20.0), (-1.0, -20.0))):
-        manoeuvres += [
-            Turn(side * 6.5 * math.pi, rate),
-            Straight(15.0),
-            Climb(rise, 1.5),
-        ]
-    return perform(manoeuvres, start=start, heading=heading, speed=speed, dt=dt, duration=duration)
 
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield from (Straight(20.0), Climb(60.0, 2.0))
+        for side in cycle((1.0, -1.0)):
+            yield Turn(side * 6.5 * math.pi, rate)
+            yield Straight(15.0)
+            yield Climb(side * 20.0, 1.5)
 
-def _until(duration: float, least: float, items: Sequence[_Item]) -> list[_Item]:
-    """The items in turn, as many as may be needed for a duration."""
-    rounds = math.ceil(positive("duration", duration) / least)
-    return list(islice(cycle(items), rounds))
+    return perform(
+        manoeuvres(), start=start, heading=heading, speed=speed, dt=dt, duration=duration
+    )

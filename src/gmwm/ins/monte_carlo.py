@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -33,6 +34,8 @@ GROUPS = {
 
 _CHUNK = 10  # runs that a worker does, and a file holds, at a time
 _MOST_EPOCHS = 300
+_SAME_TIME = 1e-6  # s
+_IN_OUTAGE = 1.0  # s
 
 
 class ErrorSource(Protocol):
@@ -93,8 +96,15 @@ class Scenario:
     interval: float = 0.0
 
     def __post_init__(self) -> None:
+        dt = self.trajectory.dt
         for outage in self.outages:
-            if outage.end > self.trajectory.duration:
+            epoch = outage.end / dt
+            if abs(epoch - round(epoch)) * dt > _SAME_TIME:
+                raise InputError(
+                    f"the outage from {outage.start:g} s ends at {outage.end:.9g} s, between two "
+                    f"epochs of the trajectory: give multiples of its {dt:g} s"
+                )
+            if round(epoch) > self.trajectory.n:
                 raise InputError(
                     f"the outage from {outage.start:g} s to {outage.end:g} s goes beyond the end "
                     f"of the trajectory at {self.trajectory.duration:g} s: begin it earlier"
@@ -107,9 +117,14 @@ class Scenario:
         return self.interval or float(max(np.ceil(least), self.trajectory.dt))
 
     def outputs(self) -> Outputs:
-        """Epochs that are kept: evenly spaced, and the ends of the outages before the first fix."""
+        """Epochs that are kept.
+
+        Evenly spaced, every second of an outage, and its end before the first fix.
+        """
+        dt, n = self.trajectory.dt, self.trajectory.n
+        within = [np.arange(o.start, o.end, max(_IN_OUTAGE, dt)) for o in self.outages]
         ends = [outage.end for outage in self.outages]
-        return Outputs.every(self.kept_interval, self.trajectory.dt, self.trajectory.n, ends)
+        return Outputs.every(self.kept_interval, dt, n, ends, also=np.concatenate([[], *within]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,14 +146,14 @@ class Runs:
         Logarithm of the determinant of the predicted covariance of the `GROUPS`.
     sensor_error, sensor_sd : (R, K, 6) ndarray
         Estimate less truth of the sensors' errors, without their white noise; NaN where the truth
-        is not known.
+        is not known, as at the very last epoch, which no sample follows.
     sensor_nees : (R, K) ndarray
-        Of all six.
+        Of all sensors that have states; NaN as long as one of them is known without error.
     nis : (R, 2) ndarray
         Sum of the normalised innovations squared of a run, and how many components it sums.
     whiteness : (R,) ndarray
-        Autocorrelation of the standardised innovations from one fix to the next, times the root of
-        their number: standard normal if they are white.
+        Autocorrelation of the standardised innovations from one fix to the next in its standard
+        error: standard normal if they are white, whatever their size.
     """
 
     time: FloatArray
@@ -171,7 +186,7 @@ class Runs:
         InputError
             If it was not kept.
         """
-        found = np.flatnonzero((np.abs(self.time - time) < 1e-6) & (self.before == before))
+        found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
         if found.size == 0:
             raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
         return int(found[0])
@@ -242,13 +257,13 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If there is no filter, no run, or the folder holds another study.
+        If there is no filter, no run, the seed is negative, or the folder holds another study.
     """
     from joblib import Parallel, delayed
 
     if not filters:
         raise InputError("there is no filter: give one at least")
-    runs = checks.whole("runs", runs, 1)
+    runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
     imu = emulate(scenario.trajectory)
     notes: tuple[str, ...] = ()
     if source.available is not None and source.available < runs:
@@ -260,9 +275,10 @@ def monte_carlo(
     task = _Task(scenario, source, dict(filters), imu, seed)
     store = _Store.of(folder, task, runs)
     starts = range(0, runs, _CHUNK)
-    missing = [start for start in starts if not store.has(start)]
+    found = {start: store.get(start) for start in starts}
+    chunks = {start: chunk for start, chunk in found.items() if chunk is not None}
+    missing = [start for start in starts if start not in chunks]
     done = runs - sum(min(_CHUNK, runs - start) for start in missing)
-    chunks: dict[int, _Chunk] = {}
     work = (delayed(_chunk)(task, start, min(start + _CHUNK, runs)) for start in missing)
     for start, chunk in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
         chunks[start] = chunk
@@ -270,7 +286,7 @@ def monte_carlo(
         done += len(next(iter(chunk.values())).error)
         if progress is not None:
             progress(done)
-    parts = [chunks[start] if start in chunks else store.get(start) for start in starts]
+    parts = [chunks[start] for start in starts]
     return MonteCarlo(
         filters={name: _joined([part[name] for part in parts]) for name in filters},
         outages=scenario.outages,
@@ -358,9 +374,10 @@ def _judged(
     sensor_error = np.full((done, 6), np.nan)
     sensor_nees = np.full(done, np.nan)
     if errors.slow is not None:
-        # The states of an epoch are those of the sample that follows it.
-        at = np.minimum(outputs.epoch[:done], len(errors.slow) - 1)
-        sensor_error = solution.sensor_errors - errors.slow[at]
+        # The states of an epoch are those of the sample that follows it; the last one has none.
+        at = outputs.epoch[:done]
+        known = at < len(errors.slow)
+        sensor_error[known] = solution.sensor_errors[known] - errors.slow[at[known]]
         sensor_nees = _normalised(sensor_error, solution.sensor_covariance)[0]
     standard = solution.innovations.standard
     seen = standard[np.isfinite(standard)]
@@ -385,18 +402,23 @@ def _judged(
 def _normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Squares of errors (K, d) in units of their covariance (K, d, d), and its log determinant.
 
-    Only what has a variance counts: a sensor without states has no error that is estimated.
+    Only what has a variance at some epoch counts: a sensor without states has no error that is
+    estimated. NaN where one that counts has none yet, as a random walk that starts at zero.
     """
-    alive = np.all(np.diagonal(covariance, axis1=1, axis2=2) > 0.0, axis=0)
-    if not np.any(alive) or not error.size:
-        return np.full(len(error), np.nan), np.full(len(error), np.nan)
-    error, covariance = error[:, alive], covariance[:, alive][:, :, alive]
-    solved = np.linalg.solve(covariance, error[..., None])[..., 0]
-    return np.sum(error * solved, axis=1), np.linalg.slogdet(covariance)[1]
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    alive = np.any(variance > 0.0, axis=0)
+    squares, log_det = np.full((2, len(error)), np.nan)
+    settled = np.all(variance[:, alive] > 0.0, axis=1)
+    if np.any(alive) and np.any(settled):
+        error, covariance = error[settled][:, alive], covariance[settled][:, alive][:, :, alive]
+        solved = np.linalg.solve(covariance, error[..., None])[..., 0]
+        squares[settled] = np.sum(error * solved, axis=1)
+        log_det[settled] = np.linalg.slogdet(covariance)[1]
+    return squares, log_det
 
 
 def _lag_one(solution: Solution) -> float:
-    """Autocorrelation of innovations from fix to fix, in its standard errors if they are white."""
+    """Autocorrelation of innovations from fix to fix, in its standard error if they are white."""
     products = []
     innovations = solution.innovations
     for kind in np.unique(innovations.kind):
@@ -404,7 +426,8 @@ def _lag_one(solution: Solution) -> float:
         products.append((of_kind[1:] * of_kind[:-1]).ravel())
     together = np.concatenate(products) if products else np.zeros(0)
     together = together[np.isfinite(together)]
-    return float(np.sum(together) / np.sqrt(together.size)) if together.size else float("nan")
+    scale = np.sqrt(np.sum(together**2))
+    return float(np.sum(together) / scale) if scale > 0.0 else float("nan")
 
 
 def _joined(parts: Sequence[Runs]) -> Runs:
@@ -433,7 +456,7 @@ class _Store:
                     raise InputError(f"{folder} holds the runs of another study: give a new folder")
             else:
                 mark.write_text(json.dumps(wanted), encoding="utf-8")
-        except (OSError, json.JSONDecodeError) as error:
+        except (OSError, json.JSONDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"{folder}: cannot be used ({error}): give another folder") from None
         return cls(folder, runs)
 
@@ -441,10 +464,6 @@ class _Store:
         if self.folder is None:
             return None
         return self.folder / f"runs-{start}-{min(start + _CHUNK, self.runs)}.npz"
-
-    def has(self, start: int) -> bool:
-        path = self.path(start)
-        return path is not None and path.exists()
 
     def put(self, start: int, chunk: _Chunk) -> None:
         path = self.path(start)
@@ -459,29 +478,46 @@ class _Store:
         np.savez(partial, **arrays)
         partial.replace(path)
 
-    def get(self, start: int) -> _Chunk:
+    def get(self, start: int) -> _Chunk | None:
+        """A finished chunk; ``None`` if there is none, or its file is damaged."""
         path = self.path(start)
-        assert path is not None
-        with np.load(path) as content:
-            names = dict.fromkeys(key.rpartition("/")[0] for key in content.files)
-            return {
-                name: Runs(**{each.name: content[f"{name}/{each.name}"] for each in fields(Runs)})
-                for name in names
-            }
+        if path is None or not path.exists():
+            return None
+        try:
+            with path.open("rb") as file, np.load(file) as content:
+                names = dict.fromkeys(key.rpartition("/")[0] for key in content.files)
+                return {
+                    name: Runs(
+                        **{each.name: content[f"{name}/{each.name}"] for each in fields(Runs)}
+                    )
+                    for name in names
+                }
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+            return None
 
 
 def _fingerprint(task: _Task) -> str:
     """Of everything that the runs depend on."""
     scenario = task.scenario
     digest = hashlib.sha256()
-    for text in (repr(task.filters), repr(task.source), str(task.seed), repr(scenario.outages),
-                 repr(scenario.initial_sd), repr((scenario.step, scenario.interval)),
-                 repr(scenario.aiding.coloured_tau)):  # fmt: skip
-        digest.update(text.encode())
-    arrays = [scenario.trajectory.lla, scenario.trajectory.rpy, scenario.aiding.lever_arm,
-              scenario.aiding.coloured_sd]  # fmt: skip
-    for fixes in scenario.aiding.fixes:
+    truth, aiding = scenario.trajectory, scenario.aiding
+    filters = [(name, _exactly(models)) for name, models in task.filters.items()]
+    source = task.source
+    drawn = _exactly(source.models) if isinstance(source, Simulated) else repr(source)
+    for part in (filters, drawn, task.seed, scenario.outages, scenario.initial_sd, scenario.step,
+                 scenario.interval, aiding.coloured_tau, truth.dt):  # fmt: skip
+        digest.update(repr(part).encode())
+    arrays = [truth.lla, truth.velocity, truth.rpy, aiding.lever_arm, aiding.coloured_sd]
+    for fixes in aiding.fixes:
+        digest.update(fixes.kind.encode())
         arrays += [fixes.time, fixes.value, fixes.sd]
     for array in arrays:
+        digest.update(repr(np.shape(array)).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
+
+
+def _exactly(models: SensorModels) -> str:
+    """Models with all digits, which their own text has not."""
+    values = [list(model.params.values()) for model in models.models.values()]
+    return repr((models, values))

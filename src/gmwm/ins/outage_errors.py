@@ -113,10 +113,19 @@ def difference(
     quantity : str
         One of `QUANTITIES`.
     seed : int, optional
+
+    Raises
+    ------
+    InputError
+        If the runs are not the same, or in none of them both filters reached the end.
     """
     checks.choice("quantity", quantity, list(QUANTITIES))
     a, b = first[quantity], second[quantity]
+    if a.size != b.size:
+        raise InputError(f"{a.size} and {b.size} runs cannot be paired: give those of one study")
     alive = np.isfinite(a) & np.isfinite(b)
+    if not np.any(alive):
+        raise InputError("one or the other filter diverged in every run: check their sensor models")
     a, b = a[alive], b[alive]
     rng = np.random.default_rng(seed)
     index = rng.integers(a.size, size=(_DRAWS, a.size))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.sensors import AXES, SensorErrors
@@ -41,14 +43,18 @@ class Recorded:
     def of(cls, recordings: Recording | Sequence[Recording], duration: float) -> Recorded:
         """Cut recordings into stretches of ``duration`` (s).
 
-        Samples that are missing are taken over from the one before.
+        Samples that are missing are taken over from the one before, and before the first one from
+        that.
 
         Raises
         ------
         InputError
-            If an axis is missing, the rates differ, or no recording is long enough.
+            If there is no recording, an axis is missing, the rates differ, or none is long enough.
         """
         given = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        if not given:
+            raise InputError("recordings: there is none: give one at least")
+        checks.positive("duration", duration, "give seconds above zero")
         stretches: list[FloatArray] = []
         slow: list[FloatArray] = []
         for recording in given:
@@ -59,7 +65,7 @@ class Recorded:
                 )
             errors = _errors(recording)
             slow.append(_averaged(errors, recording.dt))
-            n = round(duration / recording.dt)
+            n = max(round(duration / recording.dt), 1)
             stretches += [errors[i : i + n] for i in range(0, len(errors) - n + 1, n)]
         source = ", ".join(each.source for each in given)
         if not stretches:
@@ -78,9 +84,14 @@ class Recorded:
         return len(self.stretches)
 
     def __repr__(self) -> str:
-        shape = self.stretches[0].shape[0]
-        sums = [float(np.sum(np.abs(each))) for each in self.stretches]
-        return f"Recorded({self.source!r}, {len(self.stretches)} x {shape}, {sums})"
+        size = self.stretches[0].shape[0]
+        digest = hashlib.sha256()
+        for each in self.stretches:
+            digest.update(np.ascontiguousarray(each).tobytes())
+        return (
+            f"Recorded({self.source!r}, {len(self.stretches)} x {size}, dt={self.dt!r}, "
+            f"sha256={digest.hexdigest()})"
+        )
 
     def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """The stretch of a run.
@@ -100,7 +111,7 @@ class Recorded:
 
 
 def _errors(recording: Recording) -> FloatArray:
-    """Samples of all six sensors less their mean, gaps filled with the value before."""
+    """Samples of all six sensors less their mean, without gaps."""
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
@@ -113,8 +124,9 @@ def _errors(recording: Recording) -> FloatArray:
         if np.all(holes):
             raise InputError(f"{recording.source}: {axis} has no samples: leave the recording out")
         if np.any(holes):
-            last = np.maximum.accumulate(np.where(holes, 0, np.arange(values.size)))
-            values = np.where(holes, np.nan_to_num(values)[last], values)
+            first = int(np.argmin(holes))
+            last = np.maximum.accumulate(np.where(holes, first, np.arange(values.size)))
+            values = values[last]
         columns.append(values - np.mean(values))
     return np.column_stack(columns)
 

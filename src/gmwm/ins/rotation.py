@@ -91,7 +91,7 @@ def turn_body(C: FloatArray, x: float, y: float, z: float) -> None:
 def rotate(C: FloatArray, x: float, y: float, z: float, sine: float, cosine: float) -> None:
     """Turn the body by a rotation vector of which the `rotation_coefficients` are known.
 
-    Rodrigues' formula, e.g. Groves (2013), eq. 5.73.
+    Rodrigues' formula, e.g. Groves (2013), ch. 5.
     """
     for i in range(3):
         a, b, c = C[i, 0], C[i, 1], C[i, 2]

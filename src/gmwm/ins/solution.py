@@ -42,8 +42,13 @@ class Innovations:
 
     @property
     def nis(self) -> FloatArray:
-        """Normalised innovation squared of each measurement, (E,)."""
-        return np.asarray(np.nansum(self.standard**2, axis=1))
+        """Normalised innovation squared of each measurement, (E,); NaN where it was not reached.
+
+        Of as many degrees of freedom as the measurement has components in use.
+        """
+        squares = self.standard**2
+        reached = np.any(np.isfinite(squares), axis=1)
+        return np.where(reached, np.nansum(squares, axis=1), np.nan)
 
 
 @dataclass(frozen=True, eq=False)

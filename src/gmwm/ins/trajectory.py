@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.checks import positive, real_numbers, sampling_interval, shown
+from gmwm.checks import is_number, positive, real_numbers, sampling_interval, shown
 from gmwm.errors import InputError
 from gmwm.ins.splines import (
     smoothed,
@@ -176,11 +176,12 @@ class Trajectory:
         InputError
             If they are not in order or outside the trajectory.
         """
-        first, last = round(start / self.dt), round(end / self.dt)
+        inside = is_number(start) and is_number(end)
+        first, last = (round(start / self.dt), round(end / self.dt)) if inside else (0, 0)
         if not 0 <= first < last <= self.n:
             raise InputError(
-                f"segment from {start:g} s to {end:g} s: give two times in order, within 0 to "
-                f"{self.duration:g} s"
+                f"segment from {shown(start)} s to {shown(end)} s: give two times in order, "
+                f"within 0 to {self.duration:g} s"
             )
         part = slice(first, last + 1)
         return Trajectory(self.dt, self.lla[part], self.velocity[part], self.rpy[part])

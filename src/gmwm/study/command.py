@@ -11,19 +11,24 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gmwm.arguments import read_recording, reading_options
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from gmwm.recording import Recording
     from gmwm.study.runs import Progress
     from gmwm.study.scenario import Scenario
 
 EXPERIMENTS = (
     "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
-    "selection",
+    "fig5", "fig6", "fig7", "fig8", "fig9", "selection",
     "weights2", "weights3", "weights4",
 )  # fmt: skip
+
+
+NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
 
 
 @click.command()
@@ -38,6 +43,11 @@ EXPERIMENTS = (
 @click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
 @click.option("--cluster", metavar="ADDRESS",
               help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
+@click.option("--recording", "recordings", multiple=True, type=click.Path(path_type=Path),
+              metavar="FILE",
+              help="fig5 to fig9: a real static recording in place of a simulated one; the first "
+                   "is calibrated, the others are navigated with; repeat.")  # fmt: skip
+@reading_options
 def reproduce(
     experiment: str,
     output: Path,
@@ -47,6 +57,12 @@ def reproduce(
     methods: tuple[str, ...],
     resume: bool,
     cluster: str | None,
+    recordings: tuple[Path, ...],
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
 ) -> None:
     """Repeat an experiment of Stebler et al. (2012), or our own harder one.
 
@@ -54,17 +70,30 @@ def reproduce(
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
     the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
-    wavelets of the method of moments; selection counts how often the true model is chosen. Times
-    are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
+    wavelets of the method of moments; selection counts how often the true model is chosen. fig5
+    and fig6 show one gyro with lines and with the fitted model; fig7 and fig8 navigate a
+    helicopter, fig9 a car, with GNSS outages, by filters that believe different calibrations.
+    Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
 
     \b
     Example:
       gmwm reproduce table2 --runs 200 -o study
       gmwm reproduce fig2 --runs 200 -o study --resume
+      gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 --gyro-unit deg/s
     """
     from gmwm.files import folder_to_fill
 
     processes = jobs or os.cpu_count() or 1
+    if experiment in NAVIGATION:
+        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
+        given = [
+            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
+            for file in recordings
+        ]
+        with folder_to_fill(output) as folder:
+            _navigation(experiment, folder, runs, seed, processes, given)
+        return
+    _check_alone(experiment, {"--recording": recordings})
     if experiment in ("appendix-a", "selection"):
         _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
         with folder_to_fill(output) as folder:
@@ -139,6 +168,26 @@ def _alone(experiment: str, folder: Path, runs: int | None, seed: int, jobs: int
     with written(target) as stream:
         stream.write(report + "\n")
     click.echo(f"{report}\n\nwrote {target}")
+
+
+def _navigation(
+    experiment: str,
+    folder: Path,
+    runs: int | None,
+    seed: int,
+    jobs: int,
+    recordings: list[Recording],
+) -> None:
+    """Figures 5 to 9."""
+    from gmwm.study.navigation import reproduce_figure
+
+    with _progress(experiment) as progress:
+        text, paths = reproduce_figure(
+            experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
+            progress=lambda done: progress(done, runs or done),
+        )  # fmt: skip
+    click.echo(text)
+    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
 
 
 @contextmanager

@@ -1,0 +1,285 @@
+"""The result of a validation by navigating: tables, figures, sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gmwm._typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.consistency import (
+    Consistency,
+    InnovationTest,
+    at_epoch,
+    innovation_test,
+    over_time,
+)
+from gmwm.ins.earth import ned_difference
+from gmwm.ins.experiment import Experiment
+from gmwm.ins.monte_carlo import MonteCarlo, Runs, monte_carlo
+from gmwm.ins.outage_errors import (
+    QUANTITIES,
+    Difference,
+    Spread,
+    difference,
+    pooled_sizes,
+    spread,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SETTLED = 0.25  # share of the trajectory after which the filter with GNSS is judged
+_MARGIN = 30.0  # s shown before and after an outage
+_GROUPS = ("position", "velocity", "attitude", "sensors")
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """How filters with different sensor models navigated.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    study : MonteCarlo
+    """
+
+    experiment: Experiment
+    study: MonteCarlo
+
+    @classmethod
+    def of(
+        cls,
+        experiment: Experiment,
+        *,
+        jobs: int = 1,
+        folder: Path | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Validation:
+        """Do the runs of an experiment; see `gmwm.ins.monte_carlo.monte_carlo`."""
+        study = monte_carlo(
+            experiment.scenario, experiment.source, experiment.filters, experiment.runs,
+            experiment.seed, jobs=jobs, folder=folder, progress=progress,
+        )  # fmt: skip
+        return cls(experiment, study)
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the filters; the others are compared with the first."""
+        return tuple(self.study.filters)
+
+    def spreads(self, name: str) -> list[dict[str, Spread]]:
+        """Errors of a filter before the first fix after each outage."""
+        return [spread(self.study[name], outage.end) for outage in self.study.outages]
+
+    def at_ends(self, name: str) -> list[Consistency]:
+        """Consistency of a filter before the first fix after each outage."""
+        runs = self.study[name]
+        return [at_epoch(runs, runs.index(outage.end)) for outage in self.study.outages]
+
+    def with_gnss(self, name: str) -> Consistency:
+        """Consistency of a filter while GNSS is on, once it has settled."""
+        duration = self.study.truth.duration
+        first = min((outage.start for outage in self.study.outages), default=duration)
+        start = min(_SETTLED * duration, 0.5 * first)
+        return over_time(self.study[name], start, first)
+
+    def innovations(self, name: str) -> InnovationTest:
+        """Innovations of a filter over the whole record."""
+        return innovation_test(self.study[name])
+
+    def against_first(self, name: str, quantity: str) -> Difference:
+        """A filter's errors after all outages against those of the first one, run by run."""
+        first, other = (pooled_sizes(self.study, each) for each in (self.names[0], name))
+        return difference(other, first, quantity, self.experiment.seed)
+
+    # -- words ------------------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        width = max(len(name) for name in self.names)
+        width = max(width, len("filter"))
+        blocks = [self._head()]
+        for i, outage in enumerate(self.study.outages):
+            blocks.append(
+                [
+                    f"Errors after {outage.duration:g} s without GNSS, at {outage.end:g} s, before "
+                    "the first fix",
+                    *self._error_rows(i, width),
+                ]
+            )
+        blocks.append(["NEES per degree of freedom, 1 if the filter knows how good it is; * out of "
+                       "its band", *self._nees_rows(width)])  # fmt: skip
+        if self.study.outages:
+            blocks.append(["Share of position errors within predicted intervals at the ends of "
+                           "outages", *self._coverage_rows(width)])  # fmt: skip
+        blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
+                       *self._innovation_rows(width)])  # fmt: skip
+        if self.study.outages and len(self.names) > 1:
+            blocks.append(
+                [
+                    f"Horizontal error against {self.names[0]}: ratio of RMS, difference of the "
+                    "means [m]",
+                    *self._difference_rows(width),
+                ]
+            )
+        return "\n\n".join("\n".join(block) for block in blocks)
+
+    def _head(self) -> list[str]:
+        truth, runs = self.study.truth, self.study[self.names[0]].runs
+        lines = [
+            f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} runs, "
+            f"seed {self.experiment.seed}"
+        ]
+        lines += [f"- {note}" for note in self.study.notes]
+        for name in self.names:
+            if self.study[name].diverged:
+                lines.append(f"- {name} diverged in {self.study[name].diverged} of {runs} runs")
+        return lines
+
+    def _error_rows(self, outage: int, width: int) -> list[str]:
+        rows = [f"{'':{width}} {'':10} {'mean':>9} {'RMS':>9} {'median':>9} {'95 %':>9} "
+                f"{'predicted':>10}"]  # fmt: skip
+        found = {name: self.spreads(name)[outage] for name in self.names}
+        for quantity, unit in QUANTITIES.items():
+            for i, name in enumerate(self.names):
+                s = found[name][quantity]
+                label = f"{quantity[:10]}" if i == 0 else f"  [{unit}]" if i == 1 else ""
+                rows.append(
+                    f"{name:{width}} {label:10} {s.mean:>9.4g} {s.rms:>9.4g} {s.median:>9.4g} "
+                    f"{s.p95:>9.4g} {s.predicted:>10.4g}"
+                )
+        return rows
+
+    def _nees_rows(self, width: int) -> list[str]:
+        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{g:>12}" for g in _GROUPS)]
+        for name in self.names:
+            cases = [("GNSS on", self.with_gnss(name))]
+            cases += [
+                (f"at {outage.end:g} s", each)
+                for outage, each in zip(self.study.outages, self.at_ends(name), strict=True)
+            ]
+            for label, consistency in cases:
+                cells = [_starred(consistency, group) for group in _GROUPS]
+                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
+        return rows
+
+    def _coverage_rows(self, width: int) -> list[str]:
+        rows = []
+        for name in self.names:
+            for outage, found in zip(self.study.outages, self.at_ends(name), strict=True):
+                cells = [
+                    f"{100.0 * c.level:g} %: {100.0 * c.share:5.1f} %" + (" " if c.within else "*")
+                    for c in found.coverage["position"]
+                ]
+                rows.append(f"{name:{width}} at {outage.end:<7g} " + "  ".join(cells))
+        return rows
+
+    def _innovation_rows(self, width: int) -> list[str]:
+        rows = []
+        for name in self.names:
+            test = self.innovations(name)
+            mark = " " if test.nis.within else "*"
+            rows.append(
+                f"{name:{width}} {test.nis.value:>8.4f}{mark} (band {test.nis.lower:.4f} .. "
+                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
+            )
+        return rows
+
+    def _difference_rows(self, width: int) -> list[str]:
+        rows = []
+        for name in self.names[1:]:
+            d = self.against_first(name, "horizontal")
+            verdict = "" if d.significant else "  no difference"
+            rows.append(
+                f"{name:{width}} {d.ratio:.3f} ({d.ratio_lower:.3f} .. {d.ratio_upper:.3f})  "
+                f"{d.value:+.4g} ({d.lower:+.4g} .. {d.upper:+.4g}){verdict}"
+            )
+        return rows
+
+    # -- figures ----------------------------------------------------------------------------------
+
+    def plot_track(self) -> Figure:
+        """The track with its outages and each filter's first run (Figure 7 of the paper)."""
+        from gmwm import navigation_plot
+
+        truth, start = self.study.truth, self.study.truth.lla[0]
+        whole = ned_difference(truth.lla[:: max(round(1.0 / truth.dt), 1)], start)
+        parts, solutions = [], {name: [] for name in self.names}  # type: ignore[var-annotated]
+        for outage in self.study.outages:
+            first, last = round(outage.start / truth.dt), round(outage.end / truth.dt)
+            every = max(round(0.1 / truth.dt), 1)
+            part = truth.lla[np.append(np.arange(first, last, every), last)]
+            parts.append(ned_difference(part, start)[:, 1::-1])
+            for name in self.names:
+                solution = self.study.example[name]
+                inside = (solution.time >= outage.start) & (solution.time <= outage.end)
+                inside &= solution.before | (solution.time < outage.end)
+                path = ned_difference(solution.lla[inside], start)
+                solutions[name].append(path[:, 1::-1])
+        return navigation_plot.track(whole[:, 1::-1], parts, solutions)
+
+    def plot_errors(self, outage: int = 0) -> Figure:
+        """True errors of the first run about an outage, with what was predicted (Figure 8).
+
+        Raises
+        ------
+        InputError
+            If there is no such outage.
+        """
+        from gmwm import navigation_plot
+
+        span = self._outage(outage)
+        panels = {}
+        for name in self.names:
+            solution = self.study.example[name]
+            shown = (solution.time >= span.start - _MARGIN) & (solution.time <= span.end + _MARGIN)
+            order = [1, 0, 2]  # east, north, down
+            error = solution.errors(self.study.truth)[shown][:, order]
+            error[:, 2] *= -1.0
+            panels[name] = (solution.time[shown], error, solution.sd[shown][:, order])
+        return navigation_plot.errors(panels, [(span.start, span.end)])
+
+    def plot_growth(self) -> Figure:
+        """Planimetric and altimetric errors during the outages over all runs (Figure 9)."""
+        from gmwm import navigation_plot
+
+        panels: dict[str, Any] = {}
+        for outage in self.study.outages:
+            label = f"outage of {outage.duration:g} s at {outage.start:g} s"
+            panels[label] = {
+                name: _growth(self.study[name], outage.start, outage.end) for name in self.names
+            }
+        if not panels:
+            raise InputError("the experiment has no outage: there is nothing to draw")
+        return navigation_plot.growth(panels)
+
+    def _outage(self, index: int) -> Any:
+        if not 0 <= index < len(self.study.outages):
+            raise InputError(
+                f"outage = {index}: the experiment has {len(self.study.outages)} of them"
+            )
+        return self.study.outages[index]
+
+
+def _growth(runs: Runs, start: float, end: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times since the start, and horizontal and vertical RMS, true and predicted."""
+    shown = (runs.time >= start) & (runs.time <= end) & (runs.before | (runs.time < end))
+
+    def rms(values: FloatArray) -> FloatArray:
+        squares = np.nanmean(values[:, shown, :3] ** 2, axis=0)
+        return np.sqrt(np.stack([squares[:, 0] + squares[:, 1], squares[:, 2]], axis=1))
+
+    return runs.time[shown] - start, rms(runs.error), rms(runs.sd)
+
+
+def _starred(consistency: Consistency, group: str) -> str:
+    if group not in consistency.nees:
+        return "-"
+    ratio = consistency.nees[group]
+    return f"{ratio.value:.3g}" + (" " if ratio.within else "*")

@@ -1,0 +1,253 @@
+"""The paper's experiment: does the better sensor model navigate better (its Figures 5 to 9)?
+
+A static recording is calibrated three ways, by lines in the Allan plot (AV), by hand until the
+filter works (KF-tuned, the paper's Table V) and by GMWM; filters that believe each of them navigate
+on the same errors along a helicopter's mapping flight and a car's drive. Errors are drawn from the
+paper's Table VI, or taken from real recordings: one is calibrated, the others are navigated with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gmwm.calibration import Calibration, calibrate
+from gmwm.errors import InputError
+from gmwm.estimate.fit import Fit
+from gmwm.estimate.methods import fit
+from gmwm.files import moved_into_place, written
+from gmwm.ins.aiding import Outage, gnss
+from gmwm.ins.experiment import Experiment
+from gmwm.ins.missions import car_drive, helicopter_mapping
+from gmwm.ins.model_text import sensor_models
+from gmwm.ins.monte_carlo import Scenario, Simulated
+from gmwm.ins.recorded import Recorded
+from gmwm.ins.sensors import AXES, SensorModels
+from gmwm.ins.validation import Validation
+from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
+from gmwm.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TABLE_5 = sensor_models(
+    {
+        "gyro": {"N": "720 deg/h/sqrt(Hz)", "GM": [["180 deg/h", 1000.0]]},
+        "accel": {"N": "100000 ug/sqrt(Hz)", "GM": [["40000 ug", 100.0]]},
+    },
+    "Table V",
+)
+"""What the paper's filter was tuned to by hand."""
+
+TABLE_6 = sensor_models(
+    {
+        "gyro": {
+            "N": "140 deg/h/sqrt(Hz)",
+            "GM": [["113 deg/h", 2000.0], ["65 deg/h", 20.0], ["206 deg/h", 0.1]],
+        },
+        "accel": {"N": "140 ug/sqrt(Hz)", "GM": [["5 ug", 25.0], ["13 ug", 500.0]]},
+    },
+    "Table VI",
+)
+"""What the paper's GMWM found in an XSens MTi-G, read as plain standard deviations."""
+
+FIGURES = ("fig5", "fig6", "fig7", "fig8", "fig9")
+
+_HOURS, _RATE = 4.5, 100.0
+_SHOWN = "gyro_x"  # of the Allan plots
+_RUNS = 100
+_PEAK, _PEAK_AT = 0.618, 1.89  # Allan deviation of a Gauss-Markov process: height, place
+_TEN = 10.0  # the folk rule
+_HELICOPTER = (Outage(600.0, 60.0), Outage(1100.0, 60.0), Outage(1500.0, 60.0))
+_CAR = (Outage(500.0, 60.0), Outage(900.0, 60.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A static recording, calibrated by lines and by GMWM.
+
+    Attributes
+    ----------
+    lines : dict
+        Axis -> fit by ``method="allan"``.
+    gmwm : Calibration
+    """
+
+    lines: dict[str, Fit]
+    gmwm: Calibration
+
+    @classmethod
+    def of(cls, recording: Recording, done: Callable[[str], None] | None = None) -> Calibrated:
+        """Calibrate a recording both ways."""
+        calibration = calibrate(recording, progress=done)
+        kind = WhiteNoise() + BiasInstability() + RandomWalk()
+        lines = {
+            axis: fit(kind, calibration[axis].wv, method="allan")
+            for axis in AXES
+            if axis in calibration.fits
+        }
+        return cls(lines, calibration)
+
+    def line_models(self) -> SensorModels:
+        """What lines in the Allan plot give a filter: white noise, and what slow error they show.
+
+        A random walk where there is a line of slope +1/2; otherwise a Gauss-Markov process as high
+        as the floor and in its place, where there is one.
+        """
+        return SensorModels.of({axis: _from_lines(each) for axis, each in self.lines.items()})
+
+
+def _from_lines(fitted: Fit) -> Model:
+    regions = {region.key: region for region in fitted.regions}
+    if "N" not in regions:
+        raise InputError(f"{fitted.wv.name}: the Allan plot has no line of slope -1/2")
+    terms: list[Process] = [WhiteNoise(fitted.params["N"])]
+    if "K" in regions:
+        terms.append(RandomWalk(fitted.params["K"]))
+    elif "B" in regions:
+        floor = regions["B"]
+        centre = float(np.sqrt(floor.tau_min * floor.tau_max))
+        terms.append(GaussMarkov(floor.coefficient / _PEAK, centre / _PEAK_AT))
+    return Model(tuple(terms))
+
+
+def static_recording(seed: int) -> Recording:
+    """4.5 hours at 100 Hz of an IMU like that of Table VI."""
+    n = round(_HOURS * 3600.0 * _RATE)
+    errors = TABLE_6.simulate(n, 1.0 / _RATE, np.random.default_rng([seed, 6])).total
+    channels = {axis: errors[:, i] for i, axis in enumerate(AXES)}
+    return Recording.from_arrays(channels, _RATE, {"gyro": "rad/s", "accel": "m/s^2"})
+
+
+def experiment(
+    vehicle: str,
+    calibrated: Calibrated,
+    runs: int,
+    seed: int,
+    recordings: Sequence[Recording] = (),
+) -> Experiment:
+    """Filters that believe different calibrations, on a helicopter or in a car.
+
+    Parameters
+    ----------
+    vehicle : {"helicopter", "car"}
+    calibrated : Calibrated
+    runs, seed : int
+    recordings : sequence of Recording, optional
+        Whose errors are navigated with; by default those of Table VI are drawn.
+    """
+    trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
+    outages = _HELICOPTER if vehicle == "helicopter" else _CAR
+    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=(0.1, 0.1, 0.15)), outages)
+    lines = calibrated.line_models()
+    filters = {"GMWM": SensorModels.of(calibrated.gmwm), "AV": lines}
+    if recordings:
+        source = Recorded.of(recordings, trajectory.duration)
+        filters["AV x 10"] = _times(lines, _TEN)
+        # A recording that is entered anywhere has a slow error from the first sample on.
+        filters = {
+            name: SensorModels(models.models, _bias(models, source))
+            for name, models in filters.items()
+        }
+        title = f"{vehicle}, errors of {source.source}"
+        return Experiment(scenario, source, filters, None, runs, seed, title)
+    filters |= {"KF-tuned": TABLE_5, "truth": TABLE_6}
+    title = f"{vehicle}, errors of Table VI"
+    return Experiment(scenario, Simulated(TABLE_6), filters, TABLE_6, runs, seed, title)
+
+
+def _bias(models: SensorModels, source: Recorded) -> dict[str, float]:
+    """Standard deviation of a constant, where the model has no stationary slow term."""
+    walks = {
+        axis: any(isinstance(term, RandomWalk) for term in model.terms)
+        for axis, model in models.models.items()
+    }
+    return {axis: source.bias_sd[axis] if walks[axis] else 0.0 for axis in AXES}
+
+
+def _times(models: SensorModels, factor: float) -> SensorModels:
+    """All amplitudes times a factor."""
+    return SensorModels(
+        {
+            axis: model.with_params(
+                {
+                    item.key: float(item.value or 0.0) * factor
+                    for item in model.parameters
+                    if item.parameter.name in ("N", "K", "sigma")
+                }
+            )
+            for axis, model in models.models.items()
+        }
+    )
+
+
+def reproduce_figure(
+    figure: str,
+    folder: Path,
+    *,
+    runs: int | None,
+    seed: int,
+    jobs: int,
+    recordings: Sequence[Recording] = (),
+    progress: Callable[[int], None] | None = None,
+) -> tuple[str, list[Path]]:
+    """Draw one of the paper's Figures 5 to 9.
+
+    Parameters
+    ----------
+    figure : str
+        One of `FIGURES`.
+    folder : Path
+        Where figures and tables go.
+    runs : int or None
+    seed, jobs : int
+    recordings : sequence of Recording, optional
+        The first is calibrated, the others are navigated with.
+    progress : callable, optional
+        Called with the number of runs done.
+
+    Returns
+    -------
+    text, paths
+        What to print, and the files that were written.
+    """
+    first = recordings[0] if recordings else static_recording(seed)
+    calibrated = Calibrated.of(first)
+    if figure in ("fig5", "fig6"):
+        shown = calibrated.lines[_SHOWN] if figure == "fig5" else calibrated.gmwm[_SHOWN]
+        drawn = shown.plot().get_figure()
+        assert drawn is not None
+        return str(shown), _saved(drawn, folder / figure)  # type: ignore[arg-type]
+    if recordings and len(recordings) < 2:
+        raise InputError("give two recordings or more: one to calibrate, others to navigate with")
+    vehicle = "car" if figure == "fig9" else "helicopter"
+    validation = Validation.of(
+        experiment(vehicle, calibrated, runs or _RUNS, seed, recordings[1:]),
+        jobs=jobs,
+        progress=progress,
+    )
+    draw: dict[str, Callable[[], Figure]] = {
+        "fig7": validation.plot_track,
+        "fig8": validation.plot_errors,
+        "fig9": validation.plot_growth,
+    }
+    text = str(validation)
+    target = folder / f"{figure}.txt"
+    with written(target) as stream:
+        stream.write(text + "\n")
+    return text, [target, *_saved(draw[figure](), folder / figure)]
+
+
+def _saved(figure: Figure, stem: Path) -> list[Path]:
+    import matplotlib.pyplot as plt
+
+    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    for path in paths:
+        with moved_into_place(path) as temporary:
+            figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+    plt.close(figure)
+    return paths
