@@ -14,6 +14,7 @@ from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.design import Design
 from gmwm.estimate.discrepancy import chi_square
+from gmwm.estimate.fit import Fit
 from gmwm.estimate.profile import Point, Profile, weight_root
 from gmwm.estimate.ramp import Slope, bias_of_detrending, gls_slope
 from gmwm.estimate.scales import Scales
@@ -38,6 +39,7 @@ _STRICTNESS = 1.5  # c of Hannan & Quinn; consistent above 1
 _RAMP_MARGIN = 6.0  # a straight line passes through any slow drift that is seen only once
 _RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
 _RAMP_ROUNDS = 3
+_SMALLEST_P = 1e-300
 _FITS = 5  # candidates without a ramp whose own noise prices the slope
 
 
@@ -207,6 +209,18 @@ def _without_ramp(
             )
         )
     return result
+
+
+def candidate_of(fitted: Fit) -> Candidate:
+    """What a fit under its own weights says of its model.
+
+    Candidates of such fits are less comparable than those of `rank`, whose weights are common.
+    """
+    p, dof = len(fitted.keys), fitted.dof
+    # Of a p-value below the smallest number there is only a lower bound.
+    statistic = float(chi2.isf(max(fitted.p_value, _SMALLEST_P), dof)) if dof > 0 else 0.0
+    criterion = statistic + _penalty(fitted.wv.n) * p
+    return Candidate(fitted.model.opened(), criterion, fitted.objective, statistic, p, dof)
 
 
 def rank_key(candidate: Candidate) -> float:

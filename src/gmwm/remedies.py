@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from gmwm._typing import FloatArray
 from gmwm.diagnosis import Finding, Health, health
 from gmwm.errors import InputError
 from gmwm.process import Model, Process, Resonance, Sinusoid
-from gmwm.recording import Recording
+from gmwm.recording import Channel, Recording
 
 REMEDIES = ("events", "lines", "resonances", "outliers")
 """Samples of knocks and spikes are masked; lines and resonances are terms that a model may have;
 the wavelet variances of channels with outliers all over the record are robust."""
 
+_TORN = 32  # times the longest run that masks leave
 _MOST_TERMS = 2  # a channel; each doubles the number of candidate models
 _SAME_FREQUENCY = 0.02  # of a line in several recordings of one sensor
 _ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
@@ -44,8 +48,8 @@ class Remedied:
 def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedied:
     """Examine a recording and do something about what is found.
 
-    Nothing is masked in a channel with outliers all over the record: what masks leave of it has
-    no long averaging times.
+    Nothing is masked in a channel with so many outliers all over the record that masks would leave
+    no run of 1/32 of it, and with that none of its long averaging times.
 
     Parameters
     ----------
@@ -67,25 +71,41 @@ def remedied(recording: Recording, chosen: Collection[str] = REMEDIES) -> Remedi
     robust = frozenset(
         name for name in recording.names if "outliers" in chosen and found.outliers(name) > 0.0
     )
-    masked = found.masked(recording, but=robust) if "events" in chosen else recording
+    masked, kept = recording, frozenset(recording.names)
+    if "events" in chosen:
+        masked = found.masked(recording)
+        kept = frozenset(name for name in robust if _is_torn(recording[name], masked[name]))
+        masked = found.masked(recording, but=kept) if kept else masked
+    done = [_done(each, each.channel in robust, each.channel in kept) for each in found.findings]
     return Remedied(
         masked,
         {channel.name: _terms(found, channel.name, chosen) for channel in recording},
         robust,
         tuple(
-            replace(finding, action=_done(finding, chosen, finding.channel in robust))
-            for finding in found.findings
+            replace(finding, action=action)
+            for finding, action in zip(found.findings, done, strict=True)
         ),
     )
 
 
-def _done(finding: Finding, chosen: Collection[str], is_robust: bool) -> str:
+def _is_torn(whole: Channel, masked: Channel) -> bool:
+    """Whether masks leave no run that is long beside the longest there was."""
+    return _longest_run(masked.values) * _TORN < _longest_run(whole.values)
+
+
+def _longest_run(values: FloatArray) -> int:
+    """Number of samples in the longest run without a missing one."""
+    gaps = np.flatnonzero(np.isnan(np.concatenate([[np.nan], values, [np.nan]])))
+    return int(np.max(np.diff(gaps))) - 1
+
+
+def _done(finding: Finding, is_robust: bool, is_kept: bool) -> str:
     """What is done about a finding here, which is not what is advised elsewhere."""
     if finding.kind == "event":
-        if is_robust:
+        if is_robust and is_kept:
             return "kept: the robust wavelet variances bound their influence"
         samples = f"{finding.values['samples']:,.0f} samples"
-        return f"left out, {samples}" if "events" in chosen else "kept, as was asked"
+        return "kept, as was asked" if is_kept else f"left out, {samples}"
     if finding.kind == "outliers":
         done = "robust wavelet variances bound their influence; standard errors are 1.3 times as"
         return f"{done} large" if is_robust else "counted in full, as was asked"

@@ -16,14 +16,15 @@ from gmwm.errors import InputError
 from gmwm.estimate.fit import Fit
 from gmwm.estimate.methods import Data, are_several, fit
 from gmwm.estimate.table import describe, wrapped
-from gmwm.process import Model, Process, RateRamp
-from gmwm.ranking import MAX_GAUSS_MARKOV, Candidate, Choices, rank, rank_key
+from gmwm.process import GaussMarkov, Model, Process, RateRamp, WhiteNoise
+from gmwm.ranking import MAX_GAUSS_MARKOV, Candidate, Choices, candidate_of, rank, rank_key
 from gmwm.variance.analysis import as_wavelet_variance
 from gmwm.variance.pooled import PooledVariance
 from gmwm.variance.wavelet import WaveletVariance
 
 __all__ = ["Selection", "describe", "select"]
 
+RULES = ("criterion", "merge")
 _TIE = 2.0
 _FITS = 5  # candidates that are fitted in full before the best one is taken as it is
 _CONTEST = 40.0  # of the criterion, up to which simpler candidates are heard
@@ -133,6 +134,7 @@ def select(
     *,
     max_gauss_markov: int = MAX_GAUSS_MARKOV,
     extra: Sequence[Process] = (),
+    rule: str = "criterion",
 ) -> Selection:
     """Rank the candidate models of a series and fit the best one.
 
@@ -147,6 +149,10 @@ def select(
     extra : sequence of Process, optional
         Further terms that a model may have, of given shape and open amplitude, such as
         ``Sinusoid(frequency=0.565)`` or ``BiasInstability()``.
+    rule : {"criterion", "merge"}, optional
+        "merge" is the way of Stebler et al. (2012): white noise (and ``extra``) with as many
+        Gauss-Markov processes as allowed, one less while two do not differ significantly or one is
+        idle. The ranking then holds the models on that way, each under its own weights.
 
     Returns
     -------
@@ -155,7 +161,7 @@ def select(
     Raises
     ------
     InputError
-        If the data cannot be used, or an extra term has an open shape.
+        If the data cannot be used, an extra term has an open shape, or the rule is unknown.
 
     Notes
     -----
@@ -168,11 +174,11 @@ def select(
     straight line passes through any slow drift that is seen only once.
     Terms that come out as zero make a model equal to a smaller one, and it is left out of the
     ranking. Models within 2 of the best are a tie, in which the smaller one wins. Of the best
-    candidates the first one is chosen whose own fit finds all of its terms identifiable. The
-    mixture follows coarse levels that are low by chance and gives them small errors, so that a
-    random walk may look worse than a Gauss-Markov process of long correlation time: a simpler
-    candidate that is as good by its own fit, under the weights that it implies itself, is
-    preferred.
+    candidates the first one is chosen whose own fit finds all of its terms identifiable and misses
+    no averaging time by far (`gmwm.estimate.goodness.Goodness.is_excluded`). The mixture follows
+    coarse levels that are low by chance and gives them small errors, so that a random walk may look
+    worse than a Gauss-Markov process of long correlation time: a simpler candidate that is as good
+    by its own fit, under the weights that it implies itself, is preferred.
     """
     if not isinstance(extra, Iterable):
         raise InputError(
@@ -185,14 +191,32 @@ def select(
         wv: WaveletVariance = PooledVariance.of(parts)
     else:
         wv = as_wavelet_variance(cast("Data", data), dt)
+    if checks.choice("rule", rule, RULES) == "merge":
+        return _by_merging(wv, choices)
     ranking = tuple(rank(wv, choices))
     tried = []
     for candidate in _simplest_of_ties(ranking)[:_FITS]:
         fitted = _fitted(candidate.model, wv)
-        if fitted.valid or not _term_is_idle(fitted):
+        if fitted.valid or not (_term_is_idle(fitted) or fitted.goodness.is_excluded):
             return Selection(ranking, *_simplest_by_own_fit(ranking, candidate, fitted, wv))
         tried.append((candidate, fitted))
-    return Selection(ranking, *tried[0])
+    # A term too many does less harm than a level that is missed.
+    best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
+    return Selection(ranking, *best)
+
+
+def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
+    """As many Gauss-Markov processes as allowed, one less while two are alike or one is idle."""
+    base = (WhiteNoise(), *choices.extra)
+    fits: list[Fit] = []
+    for g in range(choices.max_gauss_markov, -1, -1):
+        if g and len(base) + 2 * g >= wv.tau.size:
+            continue
+        fits.append(_fitted(Model((*base, *(GaussMarkov() for _ in range(g)))), wv))
+        if not _gauss_markov_is_idle(fits[-1]):
+            break
+    ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
+    return Selection(ranking, ranking[0], fits[-1])
 
 
 def _fitted(model: Model, wv: WaveletVariance) -> Fit:
@@ -222,7 +246,8 @@ def _simplest_by_own_fit(
     for candidate in simpler[:_HEARD]:
         other = _fitted(candidate.model, wv)
         as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + _TIE
-        if as_good and other.discrepancy <= fitted.discrepancy and not _term_is_idle(other):
+        as_good = as_good and other.discrepancy <= fitted.discrepancy
+        if as_good and not (_term_is_idle(other) or other.goodness.is_excluded):
             return candidate, other
     return best, fitted
 
@@ -235,6 +260,16 @@ def _own_criterion(candidate: Candidate, fitted: Fit) -> float:
 
 def _has_ramp(model: Model) -> bool:
     return any(isinstance(term, RateRamp) for term in model.terms)
+
+
+def _gauss_markov_is_idle(fitted: Fit) -> bool:
+    """Whether two Gauss-Markov terms are alike, or one is not supported by the data."""
+    model = fitted.model
+    terms = {i for i, term in enumerate(model.terms) if isinstance(term, GaussMarkov)}
+    if any(i.term in terms and i.key in fitted.upper_bounds for i in model.parameters):
+        return True
+    words = ("use one less", f"a {GaussMarkov().title()} term")
+    return any(word in remark for remark in fitted.remarks for word in words)
 
 
 def _term_is_idle(fitted: Fit) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from gmwm import (
 )
 
 DT = 0.01
+DATA = Path(__file__).parents[3] / "shared" / "data"
 GYRO = WhiteNoise(4e-4) + RandomWalk(2e-4)
 ACCEL = WhiteNoise(1e-3)
 
@@ -469,9 +471,92 @@ def test_what_is_wrong_is_told_and_taken_care_of():
     line = calibration["accel_x"].params
     assert line["sinusoid_frequency"] == pytest.approx(0.7, abs=1e-3)
     assert line["sinusoid_amplitude"] == pytest.approx(0.01, rel=0.1)
-    told = " ".join(calibration.notes)
-    assert "periodic line at 0.7" in told
-    assert "knock" in told
+    told = " ".join(calibration.warnings)
+    assert "accel_x: a periodic line at 0.7" in told
+    assert "(a term of the model)" in told
+    assert "gyro_x: a spike or knock" in told
+    assert f"(left out, {40_000 - calibration['gyro_x'].wv.runs.present} samples)" in told
+    assert all("samples of spikes or knocks left out" in note for note in calibration.notes)
+
+
+def test_findings_survive_the_file_and_old_files_have_none(tmp_path):
+    calibration = gmwm.calibrate(noisy_recording(), WhiteNoise())
+    assert {found.kind for found in calibration.findings} >= {"event", "line", "length"}
+    line = next(found for found in calibration.findings if found.kind == "line")
+    assert line.action == "not tried as a term of the model"  # which was given
+    path = calibration.save(tmp_path / "cal.json")
+    assert gmwm.load(path).findings == calibration.findings
+    assert gmwm.load(path).warnings == calibration.warnings
+    content = json.loads(path.read_text())
+    del content["findings"]
+    path.write_text(json.dumps(content))
+    assert gmwm.load(path).findings == ()
+    content["findings"] = [{"kind": "line"}]
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="the calibration is damaged"):
+        gmwm.load(path)
+
+
+def test_findings_of_several_recordings_say_which():
+    first, second = noisy_recording(), noisy_recording()
+    both = [replace(first, source="a.csv"), replace(second, source="b.csv")]
+    found = gmwm.calibrate(both, WhiteNoise()).findings
+    assert {one.recording for one in found} == {"a.csv", "b.csv"}
+    assert str(found[0]).startswith("a.csv: ")
+
+
+def contaminated(share, size, n=60_000, seed=3):
+    """White noise of which some samples have a standard deviation ``size`` times as large."""
+    rng = np.random.default_rng(seed)
+    noise = WhiteNoise(1e-3).simulate(n, 0.01, rng)
+    return noise * np.where(rng.random(n) < share, size, 1.0)
+
+
+def as_recording(values):
+    return gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "rad/s"})
+
+
+@pytest.mark.parametrize(("share", "size"), [(0.01, 4.0), (0.01, 30.0), (0.03, 10.0)])
+def test_outliers_all_over_the_record_make_the_variances_robust(share, size):
+    recording = as_recording(contaminated(share, size))
+    calibration = gmwm.calibrate(recording, WhiteNoise())
+    fit = calibration["gyro_x"]
+    assert fit.wv.efficiency < 1.0
+    assert fit.wv.runs.longest * 32 >= 60_000  # masks must leave long averaging times
+    if share * size > 0.2:
+        assert fit.wv.present is None
+    (told,) = [found for found in calibration.findings if found.kind == "outliers"]
+    assert told.action.startswith("robust wavelet variances bound their influence")
+    assert any("outliers spread over the record" in line for line in calibration.warnings)
+    plain = gmwm.calibrate(recording, WhiteNoise(), remedies=["lines", "resonances"])["gyro_x"]
+    assert plain.wv.efficiency == 1.0
+    truth = 0.5 * 1e-3**2 / 0.01  # Haar wavelet variance of the noise at the first level
+    # The mean square is too high by share (size^2 - 1) of the variance; the biweight, which does
+    # not see the samples far out, by much less.
+    raised = plain.wv.variance[0] / truth - 1.0
+    assert raised > 0.5 * share * (size**2 - 1.0)
+    assert abs(fit.wv.variance[0] / truth - 1.0) < 0.3 * raised
+
+
+@pytest.mark.parametrize("step", [0.0, 0.5, 1.0, 2.0])
+def test_clean_and_rounded_noise_stays_as_it_is(step):
+    values = WhiteNoise(1e-3).simulate(60_000, 0.01, 8)
+    if step:
+        values = step * 0.01 * np.rint(values / (step * 0.01))
+    calibration = gmwm.calibrate(as_recording(values), WhiteNoise())
+    assert calibration["gyro_x"].wv.efficiency == 1.0
+    assert "outliers" not in {found.kind for found in calibration.findings}
+
+
+def test_a_real_recording_with_outliers():
+    path = DATA / "mtig" / "mtig_contaminated_gyro_x.csv.gz"
+    if not path.exists():
+        pytest.skip("the recordings are not part of the package")
+    recording = gmwm.read(path, rate=100, units={"gyro": "rad/s"})
+    calibration = gmwm.calibrate(recording, WhiteNoise() + RandomWalk())
+    assert calibration["gyro_x"].wv.efficiency < 1.0
+    plain = gmwm.wavelet_variance(recording["gyro_x"]).variance[0]
+    assert calibration["gyro_x"].wv.variance[0] < 0.97 * plain
 
 
 def test_remedies_can_be_left_out():
@@ -479,5 +564,5 @@ def test_remedies_can_be_left_out():
     assert calibration.notes == ()
     assert calibration["gyro_x"].wv.present is None
     assert "sinusoid_amplitude" not in calibration["accel_x"].params
-    with pytest.raises(gmwm.InputError, match="there are events, lines, resonances"):
+    with pytest.raises(gmwm.InputError, match="there are events, lines, resonances, outliers"):
         gmwm.calibrate(noisy_recording(), remedies=["magic"])

@@ -121,3 +121,41 @@ def test_no_random_walk_is_invented():
         held += fit.interval()["K"][0] == 0.0
     # 5 % of the bounds may fail: at least 16 of 20 hold in all but 0.3 % of cases.
     assert held >= 16
+
+
+@pytest.mark.parametrize(
+    ("truth", "count"),
+    [
+        (WhiteNoise(1.0), 0),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 50.0), 1),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0), 2),
+    ],
+)
+def test_merging_ends_at_the_true_number(truth, count):
+    truth = gmwm.process.as_model(truth)
+    found = []
+    for seed in range(3):
+        selection = gmwm.select(truth.simulate(20_000, 1.0, seed), dt=1.0, rule="merge")
+        found.append(sum(isinstance(term, GaussMarkov) for term in selection.model.terms))
+        assert selection.chosen is selection[0]
+        assert selection.chosen.model == selection.model.opened()
+        assert max(map(len, str(selection).splitlines())) <= 80
+    assert found.count(count) >= 2, found
+
+
+def test_merging_stops_where_it_must():
+    x = np.random.default_rng(1).normal(size=60)
+    selection = gmwm.select(x, dt=1.0, rule="merge", max_gauss_markov=2)
+    assert all(len(item.model.terms) <= 3 for item in selection)
+    # White noise that is not there is no reason to leave Gauss-Markov processes out.
+    slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 50_000, 1.0, 2)
+    kept = gmwm.select(slow, dt=1.0, rule="merge").model
+    assert sum(isinstance(term, GaussMarkov) for term in kept.terms) == 1
+    with pytest.raises(gmwm.InputError, match="rule = 'magic': known are criterion, merge"):
+        gmwm.select(x, dt=1.0, rule="magic")
+
+
+def test_bias_instability_as_a_candidate():
+    truth = WhiteNoise(1.0) + gmwm.BiasInstability(0.5)
+    selection = gmwm.select(truth.simulate(100_000, 1.0, 2), dt=1.0, extra=[gmwm.BiasInstability()])
+    assert "bias instability" in describe(selection.ranking[0].model)

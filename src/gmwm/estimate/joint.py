@@ -137,7 +137,10 @@ def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, fl
         logged = np.array([key in positive for key in keys])
         scale = np.where(logged, values, 1.0)
         order = [fit.keys.index(key) for key in keys]
-        matrices.append(fit.covariance[np.ix_(order, order)] / np.outer(scale, scale))
+        matrix = fit.covariance[np.ix_(order, order)] / np.outer(scale, scale)
+        if np.linalg.matrix_rank(matrix, hermitian=True) < len(keys):
+            continue
+        matrices.append(matrix)
         points.append(np.where(logged, np.log(np.where(logged, values, 1.0)), values))
     if len(points) < 2 or not keys:
         return float("nan"), {}

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 import gmwm
 from gmwm.files import written
-from gmwm.ins.consistency import Consistency
+from gmwm.ins.consistency import Consistency, Ratio
 from gmwm.ins.outage_errors import QUANTITIES
 from gmwm.ins.validation import Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_TELLING = 2.0  # width of a band of NEES beyond which it tells nothing
 _GROUPS = ("position", "velocity", "attitude", "sensors")
 
 
@@ -46,8 +50,9 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         rate=f"{1.0 / study.truth.dt:g}",
         runs=study[validation.names[0]].runs,
         seed=experiment.seed,
-        notes=study.notes,
+        notes=(*study.notes, *validation.divergences),
         names=validation.names,
+        reached=validation.reached,
         sentences=_sentences(validation),
         track=svg(validation.plot_track()),
         growth=svg(validation.plot_growth()) if outages else "",
@@ -67,8 +72,9 @@ def svg(figure: Figure) -> str:
     import matplotlib.pyplot as plt
 
     stream = io.StringIO()
-    # Without a date, the same study gives the same file.
-    figure.savefig(stream, format="svg", metadata={"Date": None})
+    # Without a date and with a salt of its own, the same study gives the same file.
+    with plt.rc_context({"svg.hashsalt": "gmwm"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
     plt.close(figure)
     text = stream.getvalue()
     return text[text.index("<svg") :]
@@ -78,7 +84,7 @@ def _outage(validation: Validation, index: int) -> dict[str, Any]:
     outage = validation.study.outages[index]
     rows = []
     for quantity, unit in QUANTITIES.items():
-        for name in validation.names:
+        for name in validation.reached:
             rows.append((f"{quantity} [{unit}]", name, validation.spreads(name)[index][quantity]))
     found = {name: validation.at_ends(name)[index] for name in validation.names}
     return {
@@ -95,42 +101,57 @@ def _cells(consistency: Consistency) -> list[tuple[str, bool]]:
     cells = []
     for group in _GROUPS:
         ratio = consistency.nees.get(group)
-        cells.append(("-", True) if ratio is None else (f"{ratio.value:.3g}", ratio.within))
+        if ratio is None or np.isnan(ratio.value):
+            cells.append(("-", True))
+        else:
+            cells.append((f"{ratio.value:.3g}", ratio.within or bool(np.isnan(ratio.lower))))
     return cells
 
 
 def _sentences(validation: Validation) -> list[str]:
     """What came out, filter by filter, against the first one."""
-    if not validation.study.outages:
-        return []
-    first, sentences = validation.names[0], []
-    for name in validation.names[1:]:
-        d = validation.against_first(name, "horizontal")
-        interval = f"95 % interval {d.ratio_lower:.3g} to {d.ratio_upper:.3g}"
-        if d.significant:
-            word = "larger" if d.value > 0.0 else "smaller"
-            sentences.append(
-                f"Without GNSS, the horizontal error with {name} is {word} than with {first}: "
-                f"{d.ratio:.3g} times the root mean square ({interval})."
-            )
-        else:
-            sentences.append(
-                f"Without GNSS, there is no difference to be seen between the horizontal errors "
-                f"with {name} and with {first}: {d.ratio:.3g} times the root mean square "
-                f"({interval})."
-            )
+    sentences = []
+    if validation.study.outages:
+        reached = validation.reached
+        first = validation.names[0]
+        if first in reached:
+            others = [name for name in reached if name != first]
+            sentences += [_compared(validation, name, first) for name in others]
+        for name in reached:
+            found = [each.nees["position"] for each in validation.at_ends(name)]
+            end = "the outage" if len(found) == 1 else "the outages"
+            sentences.append(f"At the end of {end}, {name} {_judged(found)}.")
     for name in validation.names:
-        ends = validation.at_ends(name)
-        values = [each.nees["position"].value for each in ends]
-        worst = max(values, key=lambda value: abs(value - 1.0))
-        fine = all(each.nees["position"].within for each in ends)
-        verdict = "knows how good its position is" if fine else (
-            "believes its position to be better than it is" if worst > 1.0
-            else "believes its position to be worse than it is"
-        )  # fmt: skip
-        sentences.append(
-            f"At the end of the outages, {name} {verdict} (NEES per degree of freedom "
-            + ", ".join(f"{value:.3g}" for value in values)
-            + ")."
-        )
+        found = [validation.with_gnss(name).nees["position"]]
+        if np.isfinite(found[0].value):
+            sentences.append(f"With GNSS, {name} {_judged(found)}.")
     return sentences
+
+
+def _compared(validation: Validation, name: str, first: str) -> str:
+    d = validation.against_first(name, "horizontal")
+    interval = f"95 % interval {d.ratio_lower:.3g} to {d.ratio_upper:.3g}"
+    if not d.significant:
+        return (
+            f"Without GNSS, there is no difference to be seen between the horizontal errors with "
+            f"{name} and with {first}: {d.ratio:.3g} times the root mean square ({interval})."
+        )
+    word = "larger" if d.value > 0.0 else "smaller"
+    return (
+        f"Without GNSS, the horizontal error with {name} is {word} than with {first}: "
+        f"{d.ratio:.3g} times the root mean square ({interval})."
+    )
+
+
+def _judged(found: Sequence[Ratio]) -> str:
+    """Whether a filter knows how good its position is, from its NEES at some times."""
+    worst = max(found, key=lambda ratio: abs(np.log(ratio.value)))
+    if not all(ratio.within or np.isnan(ratio.lower) for ratio in found):
+        better = "better" if worst.value > 1.0 else "worse"
+        verdict = f"believes its position to be {better} than it is"
+    elif not all(ratio.upper - ratio.lower < _TELLING for ratio in found):
+        verdict = "cannot be judged by so few runs"
+    else:
+        verdict = "knows how good its position is"
+    values = ", ".join(f"{ratio.value:.3g}" for ratio in found)
+    return f"{verdict} (NEES per degree of freedom {values})"

@@ -21,14 +21,16 @@ from gmwm import (
     SimulatedProcess,
     WhiteNoise,
 )
+from gmwm.diagnosis import Finding
 from gmwm.report import write_report
 from gmwm.report.figure import deviation_figure
 from gmwm.report.navigation import navigation
-from gmwm.report.page import duration_text, number, page
+from gmwm.report.page import duration_text, needed, number, page
 
 DT = 0.01
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 NAVIGATION = 'Plotly.newPlot("plot-navigation", '
+RESIDUALS = 'Plotly.newPlot("plot-residuals-'
 
 
 class Page(HTMLParser):
@@ -79,7 +81,15 @@ class Page(HTMLParser):
 
     def figures(self):
         """The channels' figures, as given to plotly, in strict JSON; see `navigation_figure`."""
-        return [self._figure(script) for script in self.scripts[1:] if NAVIGATION not in script]
+        others = (NAVIGATION, RESIDUALS)
+        return [
+            self._figure(script)
+            for script in self.scripts[1:]
+            if not any(words in script for words in others)
+        ]
+
+    def residual_figures(self):
+        return [self._figure(script) for script in self.scripts[1:] if RESIDUALS in script]
 
     def navigation_figure(self):
         (script,) = [script for script in self.scripts[1:] if NAVIGATION in script]
@@ -164,11 +174,11 @@ def test_plotly_is_inside(parsed):
 
 def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
-    assert headings == ["navigation", *calibration]
+    assert headings == ["health", "models", "navigation", *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
     assert links == [f"#{name}" for name in calibration]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
-    assert len(plots) == len(parsed.scripts) - 1 == len(calibration) + 1
+    assert len(plots) == len(parsed.scripts) - 1 == 2 * len(calibration) + 1
     assert len(set(plots)) == len(plots)
     for name, script in zip(plots, parsed.scripts[1:], strict=True):
         assert f'Plotly.newPlot("{name}", ' in script
@@ -181,7 +191,7 @@ def test_head_line(parsed):
 
 
 def test_notes_and_skipped_channels(parsed):
-    assert "Column 'temp' was not used." in parsed.text
+    assert "Column 'temp' was not used" in parsed.text
     assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
 
 
@@ -214,14 +224,14 @@ def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
         (accel["N"] * 60.0, "m/s/sqrt(h)"),
         (calibration["voltage"].params["N"], "u/sqrt(Hz)"),
     ):
-        rows = [row for row in parsed.cells if row[-1] == unit]
-        assert any(float(row[-3]) == pytest.approx(value, rel=1e-3) for row in rows), unit
+        rows = [row for row in parsed.cells if row[4:5] == [unit]]
+        assert any(float(row[2]) == pytest.approx(value, rel=1e-3) for row in rows), unit
 
 
 def test_interval_of_a_parameter(parsed, calibration):
     low, high = calibration["gyro_x"].interval()["N"]
-    (row,) = [row for row in parsed.cells if row[-1] == "rad/s/sqrt(Hz)"]
-    found = [float(text) for text in row[-2].split(" to ")]
+    (row,) = [row for row in parsed.cells if row[4:5] == ["rad/s/sqrt(Hz)"]]
+    found = [float(text) for text in row[3].split(" to ")]
     assert found == pytest.approx([low, high], rel=1e-3)
     assert row[0] == "N"
     assert row[1] == "white noise"
@@ -230,11 +240,11 @@ def test_interval_of_a_parameter(parsed, calibration):
 def test_upper_bounds_are_shown_as_such(parsed, calibration):
     bounds = calibration["accel_x"].upper_bounds
     assert bounds, "the fixture must have one"
-    shown = [row for row in parsed.cells if row[-2:-1] == ["upper bound, 95 %"]]
+    shown = [row for row in parsed.cells if row[3:4] == ["upper bound, 95 %"]]
     for key, bound in bounds.items():
         row = next(row for row in shown if row[0] == key)
-        assert row[-3].startswith("< ")
-        assert float(row[-3][2:]) == pytest.approx(bound, rel=1e-3)
+        assert row[2].startswith("< ")
+        assert float(row[2][2:]) == pytest.approx(bound, rel=1e-3)
 
 
 def test_fitness_is_told(parsed, calibration):
@@ -292,7 +302,7 @@ def test_the_growth_figure(parsed, calibration):
 def test_without_inertial_sensors_nothing_is_said_of_navigation(calibration):
     fits = {"voltage": calibration["voltage"]}
     shown = Page(page(replace(calibration, fits=fits)))
-    assert [a.get("id") for t, a in shown.elements if t == "h2"] == ["voltage"]
+    assert [a.get("id") for t, a in shown.elements if t == "h2"] == ["health", "models", "voltage"]
 
 
 def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
@@ -373,6 +383,94 @@ def test_a_level_that_says_nothing_leaves_the_figure_in_numbers(what):
     json.dumps(deviation_figure(fit), allow_nan=False)
 
 
+def test_residual_figures(parsed, calibration):
+    for fit, figure in zip(calibration.fits.values(), parsed.residual_figures(), strict=True):
+        at = fit.goodness
+        stems, points = figure["data"]
+        assert points["x"] == pytest.approx(at.tau)
+        assert points["y"] == pytest.approx(at.residual)
+        assert [row[0] for row in points["customdata"]] == pytest.approx(100.0 * at.misfit)
+        assert stems["y"][1::3] == points["y"]
+        low, high = figure["layout"]["yaxis"]["range"]
+        assert low < min(points["y"]) <= max(points["y"]) < high
+
+
+# -- health and length ----------------------------------------------------------------------------
+
+
+def finding(severity, sentence, channel="gyro_x", **more):
+    return Finding(channel, "drift", severity, sentence, f"done about {sentence}", **more)
+
+
+def test_health_is_first_and_worst_first(calibration):
+    findings = (
+        finding("good", "fine", ""),
+        finding("bad", "broken", "accel_x"),
+        finding("warning", "shaken"),
+        finding("note", "seen"),
+    )
+    shown = Page(page(replace(calibration, findings=findings)))
+    headings = [a.get("id") for t, a in shown.elements if t == "h2"]
+    assert headings[0] == "health"
+    assert "1 bad finding, 1 warning and 1 note." in shown.text
+    order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
+    assert order == sorted(order)
+    folded = shown.text.index("What was looked at and is fine")
+    assert order[2] < folded < order[3]
+    assert ["warning", "Shaken", "Done about shaken"] in shown.cells
+    assert "Column 'temp'" not in shown.text  # an examined recording tells it as a finding
+
+
+def test_findings_of_several_recordings_say_which(calibration):
+    findings = tuple(
+        finding("warning", f"moved {k} times", recording=f"run{k}.csv") for k in (1, 2)
+    )
+    shown = Page(page(replace(calibration, findings=findings)))
+    assert ["gyro_x, run1.csv"] in shown.cells
+    assert ["gyro_x, run2.csv"] in shown.cells
+    assert "2 warnings." in shown.text
+
+
+def test_what_was_not_examined_says_so(calibration):
+    shown = Page(page(replace(calibration, findings=())))
+    assert "was not examined" in shown.text
+    assert "Column 'temp' was not used." in shown.text
+    harmless = Page(page(replace(calibration, findings=(finding("good", "fine"),))))
+    assert "Nothing was found that spoils the estimates." in harmless.text
+
+
+def test_a_choice_in_doubt_is_told_with_the_channel(calibration):
+    tie = Finding("gyro_x", "choice", "note", "2 models describe the data equally well")
+    shown = Page(page(replace(calibration, findings=(tie,))))
+    assert shown.text.index("gyro_x: white noise") < shown.text.index("2 models describe")
+    assert shown.text.index("2 models describe") < shown.text.index("accel_x: white noise")
+
+
+def test_errors_and_lengths_are_in_the_table(parsed, calibration):
+    fit = calibration["gyro_x"]
+    (row,) = [row for row in parsed.cells if row[4:5] == ["rad/s/sqrt(Hz)"]]
+    assert row[5] == f"{100 * fit.stderr['N'] / fit.params['N']:.2g} %"
+    assert row[6] == "long enough"
+    bounded = next(row for row in parsed.cells if row[0] == "K" and row[2].startswith("<"))
+    assert bounded[5:] == ["", "not identified"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (None, ""),
+        (80.0, "long enough"),
+        (81.0, "needs 81 s"),
+        (7 * 86400.0, "needs 7 days"),
+        (3 * 365.25 * 86400.0, "needs 3 years"),
+        (1e12, "centuries"),
+        (float("inf"), "not identified"),
+    ],
+)
+def test_needed_length_in_words(seconds, words):
+    assert needed(seconds, 80.0) == words
+
+
 # -- safe -----------------------------------------------------------------------------------------
 
 
@@ -387,15 +485,20 @@ def test_names_are_text_not_markup(calibration):
         fits={HOSTILE: replace(gyro, remarks=(f"a {HOSTILE}",))},
         skipped={f"skip {HOSTILE}": f"why {HOSTILE}"},
         notes=(f"note {HOSTILE}",),
+        findings=(
+            Finding(HOSTILE, "line", "bad", f"found {HOSTILE}", f"done {HOSTILE}"),
+            Finding(HOSTILE, "choice", "note", f"tie {HOSTILE}"),
+        ),
     )
+    shown = Page(page(replace(hostile, findings=())))
+    assert f"note {HOSTILE}" in shown.text
     shown = Page(page(hostile))
-    assert len(shown.scripts) == 3
+    assert len(shown.scripts) == 4
     assert shown.count("b") == len(gyro.params)  # those of the table alone
-    for words in (f"models of {HOSTILE}", f"skip {HOSTILE}", f"why {HOSTILE}", f"note {HOSTILE}"):
-        assert words in shown.text
-    assert f"A {HOSTILE}." in shown.text
+    for words in ("models of", "skip", "why", "Found", "Done", "tie", "A"):
+        assert f"{words} {HOSTILE}" in shown.text
     headings = [attributes["id"] for tag, attributes in shown.elements if tag == "h2"]
-    assert headings == ["navigation", HOSTILE]
+    assert headings == ["health", "models", "navigation", HOSTILE]
     assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == HOSTILE
 
 
@@ -403,7 +506,7 @@ def test_units_are_text_not_markup(calibration):
     fit = calibration["voltage"]
     hostile = replace(fit, wv=replace(fit.wv, unit=HOSTILE))
     shown = Page(page(replace(calibration, fits={"voltage": hostile}, skipped={})))
-    assert len(shown.scripts) == 2
+    assert len(shown.scripts) == 3
     (figure,) = shown.figures()
     # Plotly knows a little markup of its own, which does no harm.
     assert "alert" in figure["layout"]["yaxis"]["title"]["text"]
