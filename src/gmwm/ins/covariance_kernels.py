@@ -183,22 +183,24 @@ def carry(
         if a >= 0:
             for i in range(9):
                 U[i, a] += T[i, 9 + k] * gain[k]
-    # Sensor states among themselves: rows, then columns.
+    # Sensor states among themselves: rows, then columns, of the upper half; partners are
+    # neighbours, so that what a pair needs below the diagonal is done with it.
     for i in range(m):
         p = partner[i]
         if p == i:
-            for j in range(m):
+            for j in range(i, m):
                 P[9 + i, 9 + j] *= phi[i]
         elif i < p:
-            for j in range(m):
+            for j in range(i, m):
                 a, b = P[9 + i, 9 + j], P[9 + p, 9 + j]
                 P[9 + i, 9 + j] = phi[i] * a + phi_off[i] * b
                 P[9 + p, 9 + j] = phi[p] * b + phi_off[p] * a
     for i in range(m):
-        for j in range(m):
-            row[j] = P[9 + i, 9 + j]
+        if paired:
+            for j in range(m):
+                row[j] = P[9 + i, 9 + j]
         for j in range(i, m):
-            P[9 + i, 9 + j] = row[j] * phi[j]
+            P[9 + i, 9 + j] *= phi[j]
         if paired:
             for j in range(i, m):
                 if partner[j] != j:

@@ -1,0 +1,63 @@
+"""Speed of the navigation filter: IMU samples per second of processor time, on one core.
+
+Run with ``python benchmarks/navigation.py``. A helicopter's flight of 30 minutes at 100 Hz with a
+GNSS position a second; every axis has white noise and two, three or five Gauss-Markov processes.
+The first call, which loads or compiles the kernels, is not counted.
+"""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+
+from gmwm import GaussMarkov, WhiteNoise
+from gmwm.ins.aiding import gnss
+from gmwm.ins.emulation import emulate
+from gmwm.ins.filter import Filter, InitialSd, Outputs
+from gmwm.ins.missions import helicopter_mapping
+from gmwm.ins.sensors import AXES, SensorModels
+
+TAUS = (0.5, 5.0, 30.0, 300.0, 1000.0)
+REPEATS = 5
+CASES = ((3, 2, 0.1), (3, 2, 0.01), (5, 5, 0.1), (5, 5, 0.01))
+"""Gauss-Markov processes of a gyro and of an accelerometer, step of the covariance (s)."""
+
+
+def _sensors(gyro: int, accel: int) -> SensorModels:
+    """Models with some Gauss-Markov processes on every axis."""
+    models = {}
+    for axis in AXES:
+        is_gyro = axis.startswith("gyro")
+        white, sigma = (5e-5, 2e-4) if is_gyro else (1e-3, 1e-3)
+        terms = [GaussMarkov(sigma, tau) for tau in TAUS[: gyro if is_gyro else accel]]
+        models[axis] = sum(terms, start=WhiteNoise(white))
+    return SensorModels.of(models)
+
+
+def main() -> None:
+    """Print the table."""
+    truth = helicopter_mapping()
+    imu = emulate(truth)
+    rng = np.random.default_rng(1)
+    aiding = gnss(truth)
+    events = aiding.noisy(rng).events(imu.dt, imu.n)
+    outputs = Outputs.every(1.0, imu.dt, imu.n)
+    print(f"{imu.n:,} samples, {events.epoch.size:,} fixes, best of {REPEATS}")
+    print(f"{'states':>6} {'step [s]':>9} {'samples':>8} {'time [s]':>9} {'million/s':>10}")
+    for gyro, accel, step in CASES:
+        sensors = _sensors(gyro, accel)
+        error = sensors.simulate(imu.n, imu.dt, rng).total
+        noisy = imu.with_errors(error[:, :3], error[:, 3:])
+        ready = Filter.of(sensors, aiding, imu.dt, step)
+        times = []
+        for _ in range(1 + REPEATS):
+            start = process_time()
+            ready.run(noisy, truth.state(0), InitialSd(), events, outputs)
+            times.append(process_time() - start)
+        best = min(times[1:])
+        print(f"{ready.size:6} {step:9g} {ready.stride:8} {best:9.3f} {imu.n / best / 1e6:10.2f}")
+
+
+if __name__ == "__main__":
+    main()
