@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta, chi2, norm, t
+from scipy.special import betaincinv
+from scipy.stats import chi2, norm, t
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
@@ -205,10 +206,10 @@ def mean_ratio(values: FloatArray) -> Ratio:
     mean = float(np.mean(values)) if runs else float("nan")
     if runs < 2:
         return Ratio(mean, float("nan"), float("nan"), float("nan"))
-    error = float(np.std(values, ddof=1)) / np.sqrt(runs)
+    error = float(np.std(values, ddof=1) / np.sqrt(runs))
     width = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1)) * error
     p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
-    return Ratio(mean, 1.0 - width, 1.0 + width, p_value)
+    return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
 
 def covered(standard: FloatArray) -> tuple[Coverage, ...]:
@@ -254,8 +255,8 @@ def _coverage(level: float, share: float, size: float) -> Coverage:
     if not size > 0.0:
         return Coverage(level, float("nan"), float("nan"), float("nan"))
     hits, tail = share * size, 0.5 * (1.0 - _CONFIDENCE)
-    lower = float(beta.ppf(tail, hits, size - hits + 1.0)) if hits > 0.0 else 0.0
-    upper = float(beta.ppf(1.0 - tail, hits + 1.0, size - hits)) if hits < size else 1.0
+    lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
+    upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
     return Coverage(level, share, lower, upper)
 
 
@@ -264,7 +265,7 @@ def _ratio(total: float, dof: float) -> Ratio:
         return Ratio(float("nan"), float("nan"), float("nan"), float("nan"))
     lower, upper = chi2.ppf([0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE], dof) / dof
     p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
-    return Ratio(total / dof, float(lower), float(upper), float(min(p_value, 1.0)))
+    return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
 
 
 def _standard_sensors(

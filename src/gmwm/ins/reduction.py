@@ -29,9 +29,10 @@ _JUDGED = slice(0, 6)  # position and velocity
 _WHITE_TAU = 1.0  # s, where white noise is read off an Allan plot
 _PEAK = 0.382  # Allan variance of a Gauss-Markov process at its peak, over its variance
 _SHORTEST = 0.1  # of the correlation time read off, in s
-_TOLERANCE = 1e-3
+_DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
+_SLOPE = 3e-3  # of the score over the logarithm of a factor, below which the search ends
 _INERTIA = 1e-3  # keeps a factor near 1 that does not matter
-_STEPS_PER_PARAMETER = 40
+_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -163,13 +164,8 @@ def reduce(
     found = minimize(
         cost,
         np.zeros(len(names)),
-        method="Nelder-Mead",
-        options={
-            "xatol": 0.02,
-            "fatol": _TOLERANCE,
-            "maxfev": _STEPS_PER_PARAMETER * len(names),
-            "initial_simplex": np.vstack([np.zeros(len(names)), 0.7 * np.eye(len(names))]),
-        },
+        method="BFGS",
+        options={"eps": _DIFFERENCE, "gtol": _SLOPE, "maxiter": _STEPS},
     )
     best = scaled(found.x)
     analyses = [course.analyse(truth, each) for each in (truth, start, best)]
