@@ -15,10 +15,11 @@ import numpy as np
 
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.covariance_analysis import covariance_analysis
+from gmwm.ins.analysis import covariance_analysis
 from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.monte_carlo import Scenario, Simulated, monte_carlo
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import SensorModels
+from gmwm.ins.trials import monte_carlo
 
 RUNS = 50
 REPEATS = 5

@@ -50,26 +50,30 @@ def read_recording(
     from gmwm.readers import read
 
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    return read(file, rate=rate, units=units, channels=_roles(channels), time=_time(time_column))
+    return read(
+        file, rate=rate, units=units, channels=roles(channels), time=time_reference(time_column)
+    )
 
 
 def _column(text: str) -> str | int:
     return int(text) if text.isascii() and text.isdigit() else text
 
 
-def _roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
-    roles = {}
+def roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
+    """Channel name -> column, of NAME=COLUMN."""
+    found: dict[str, str | int] = {}
     for pair in pairs:
         name, separator, column = pair.partition("=")
         if not (name and separator and column):
             raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
-        if name in roles:
+        if name in found:
             raise InputError(f"--channel {name}=... is given twice: a channel has one column")
-        roles[name] = _column(column)
-    return roles or None
+        found[name] = _column(column)
+    return found or None
 
 
-def _time(text: str | None) -> str | int | bool | None:
+def time_reference(text: str | None) -> str | int | bool | None:
+    """A column of time stamps; ``False`` for "none"."""
     if text is None:
         return None
     return False if text.lower() == "none" else _column(text)

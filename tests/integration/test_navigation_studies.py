@@ -11,12 +11,13 @@ from scipy.stats import binom
 
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.aiding import Outage, gnss
+from gmwm.ins.analysis import covariance_analysis
 from gmwm.ins.consistency import at_epoch, innovation_test, over_time
-from gmwm.ins.covariance_analysis import covariance_analysis
 from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.monte_carlo import Scenario, Simulated, monte_carlo
 from gmwm.ins.outage_errors import difference, sizes, spread
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import SensorModels
+from gmwm.ins.trials import monte_carlo
 
 TRUE = SensorModels.of(
     {

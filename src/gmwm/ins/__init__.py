@@ -14,7 +14,8 @@ Conventions, everywhere in this subpackage:
 A trajectory (`helicopter_mapping`, `perform`, `Trajectory.read`) gives error-free increments
 (`emulate`); errors are drawn from `SensorModels` or taken from a recording (`Recorded`); `navigate`
 filters them with `Aiding`; `monte_carlo` does so many times for several filters, `Validation` says
-what came out. `covariance_analysis` needs no runs, and `reduce` finds the best small model.
+what came out. `covariance_analysis` needs no runs, and `reduce` finds the best small model. Real
+data are read by `read_imu` and `read_fixes` (`Measured`); `Navigated` aligns and filters them.
 
 Names are loaded when they are first used.
 """
@@ -26,35 +27,47 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gmwm.ins.aiding import Aiding, Fixes, Outage, barometer, gnss, standstills
+    from gmwm.ins.analysis import Analysis, covariance_analysis
     from gmwm.ins.consistency import Consistency, at_epoch, innovation_test, over_time
-    from gmwm.ins.covariance_analysis import Analysis, covariance_analysis
     from gmwm.ins.emulation import Imu, emulate
     from gmwm.ins.experiment import Experiment, read_experiment
     from gmwm.ins.filter import InitialSd, navigate
+    from gmwm.ins.fix_file import read_fixes
+    from gmwm.ins.imu_file import read_imu
     from gmwm.ins.manoeuvres import Accelerate, Climb, Stop, Straight, Turn, perform
+    from gmwm.ins.measured import Measured
     from gmwm.ins.mechanization import integrate
     from gmwm.ins.missions import car_drive, fixed_wing_loiter, helicopter_mapping
-    from gmwm.ins.monte_carlo import MonteCarlo, Runs, Scenario, Simulated, monte_carlo
+    from gmwm.ins.navigated import Navigated
     from gmwm.ins.outage_errors import difference, spread
     from gmwm.ins.recorded import Recorded
     from gmwm.ins.reduction import Reduction, reduce
     from gmwm.ins.routes import through
+    from gmwm.ins.runs import Runs
+    from gmwm.ins.scenario import Scenario, Simulated
     from gmwm.ins.sensors import SensorErrors, SensorModels
     from gmwm.ins.solution import Innovations, Solution
     from gmwm.ins.trajectory import NavState, Trajectory
+    from gmwm.ins.trials import MonteCarlo, monte_carlo
     from gmwm.ins.validation import Validation
 
 _HOME = {
     **dict.fromkeys(("Aiding", "Fixes", "Outage", "barometer", "gnss", "standstills"), "aiding"),
     **dict.fromkeys(("Consistency", "at_epoch", "innovation_test", "over_time"), "consistency"),
-    **dict.fromkeys(("Analysis", "covariance_analysis"), "covariance_analysis"),
+    **dict.fromkeys(("Analysis", "covariance_analysis"), "analysis"),
     **dict.fromkeys(("Imu", "emulate"), "emulation"),
     **dict.fromkeys(("Experiment", "read_experiment"), "experiment"),
     **dict.fromkeys(("InitialSd", "navigate"), "filter"),
+    **dict.fromkeys(("read_fixes",), "fix_file"),
+    **dict.fromkeys(("read_imu",), "imu_file"),
+    **dict.fromkeys(("Measured",), "measured"),
+    **dict.fromkeys(("Navigated",), "navigated"),
     **dict.fromkeys(("Accelerate", "Climb", "Stop", "Straight", "Turn", "perform"), "manoeuvres"),
     **dict.fromkeys(("integrate",), "mechanization"),
     **dict.fromkeys(("car_drive", "fixed_wing_loiter", "helicopter_mapping"), "missions"),
-    **dict.fromkeys(("MonteCarlo", "Runs", "Scenario", "Simulated", "monte_carlo"), "monte_carlo"),
+    "Runs": "runs",
+    **dict.fromkeys(("Scenario", "Simulated"), "scenario"),
+    **dict.fromkeys(("MonteCarlo", "monte_carlo"), "trials"),
     **dict.fromkeys(("difference", "spread"), "outage_errors"),
     **dict.fromkeys(("Recorded",), "recorded"),
     **dict.fromkeys(("Reduction", "reduce"), "reduction"),
@@ -76,8 +89,10 @@ __all__ = [
     "Imu",
     "InitialSd",
     "Innovations",
+    "Measured",
     "MonteCarlo",
     "NavState",
+    "Navigated",
     "Outage",
     "Recorded",
     "Reduction",
@@ -108,6 +123,8 @@ __all__ = [
     "over_time",
     "perform",
     "read_experiment",
+    "read_fixes",
+    "read_imu",
     "reduce",
     "spread",
     "standstills",

@@ -14,7 +14,7 @@ from scipy.stats import chi2, norm, t
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.monte_carlo import GROUPS, Runs
+from gmwm.ins.runs import GROUPS, Runs
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
@@ -79,7 +79,7 @@ class Consistency:
     Attributes
     ----------
     nees : dict
-        Group of `gmwm.ins.monte_carlo.GROUPS`, or "sensors", -> NEES per degree of freedom.
+        Group of `gmwm.ins.runs.GROUPS`, or "sensors", -> NEES per degree of freedom.
     coverage : dict
         Group -> `Coverage` at each of `LEVELS`, of its components' errors.
     rms : dict

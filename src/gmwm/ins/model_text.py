@@ -56,12 +56,13 @@ def value(given: Any, si_unit: str, where: str) -> float:
             "or without for SI"
         )
     number, unit = match.groups()
-    if not unit:
-        return float(number)
     try:
-        return float(number) * factor(unit, si_unit)
+        found = float(number) * (factor(unit, si_unit) if unit else 1.0)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+    if not checks.is_number(found):
+        raise InputError(f"{where}: {checks.shown(given)} is too large: check it")
+    return found
 
 
 def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
@@ -95,7 +96,10 @@ def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
         terms = _terms(content, quantity, place)
         if not terms:
             raise InputError(f"{place}: there is no noise: give N at least")
-        models[name] = Model(tuple(terms))
+        try:
+            models[name] = Model(tuple(terms))
+        except InputError as error:
+            raise InputError(f"{place}: {error}") from None
         if _BIAS in content:
             bias_sd[name] = value(content[_BIAS], SI_UNIT[quantity], f"{place}, bias")
     try:
@@ -113,8 +117,9 @@ def _terms(content: Mapping[str, Any], quantity: str, where: str) -> list[Proces
             terms += _markov(given, quantity, f"{where}, {_MARKOV}")
         elif letter in _LETTERS:
             kind = _LETTERS[letter]
-            unit = si_parameter_unit(kind.parameters[0].unit, quantity)
-            terms.append(kind(value(given, unit, f"{where}, {letter}")))
+            unit = si_parameter_unit(kind.parameters[0].unit, quantity).replace(" s", "*s")
+            place = f"{where}, {letter}"
+            terms.append(_process(kind, place, value(given, unit, place)))
         else:
             raise InputError(
                 f"{where}: {checks.shown(letter)} is no term: write {', '.join(_LETTERS)}, "
@@ -131,6 +136,13 @@ def _markov(given: Any, quantity: str, where: str) -> list[Process]:
     ):
         raise InputError(f"{where}: {checks.shown(given)}: write [[sigma, tau], ...]")
     return [
-        GaussMarkov(value(sigma, SI_UNIT[quantity], where), value(tau, "s", where))
+        _process(GaussMarkov, where, value(sigma, SI_UNIT[quantity], where), value(tau, "s", where))
         for sigma, tau in pairs
     ]
+
+
+def _process(kind: type[Process], where: str, *parameters: float) -> Process:
+    try:
+        return kind(*parameters)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None

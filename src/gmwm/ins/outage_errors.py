@@ -10,7 +10,8 @@ import numpy as np
 from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.monte_carlo import MonteCarlo, Runs
+from gmwm.ins.runs import Runs
+from gmwm.ins.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
 """What is judged, with its unit."""

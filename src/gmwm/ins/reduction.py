@@ -14,9 +14,9 @@ from gmwm._typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.covariance_analysis import Analysis, Course
+from gmwm.ins.analysis import Analysis, Course
 from gmwm.ins.missions import fixed_wing_loiter
-from gmwm.ins.monte_carlo import Scenario
+from gmwm.ins.scenario import Scenario
 from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 

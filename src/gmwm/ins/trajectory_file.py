@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,38 +10,35 @@ import numpy as np
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins.log_columns import (
+    POSITION_WORDS,
+    angle_factor,
+    angle_unit,
+    check_angles,
+    check_rising,
+    is_time,
+    length_factor,
+    open_log,
+    place,
+    words_of,
+)
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import TIME, meaning
 from gmwm.readers.table import label
 
 _ANGLES = ("latitude", "longitude", "roll", "pitch", "yaw")
-_WORDS = {
+_WORDS = POSITION_WORDS | {
     word: quantity
     for quantity, words in {
-        "latitude": "latitude lat",
-        "longitude": "longitude lon long lng",
-        "height": "height altitude alt h hgt",
         "roll": "roll bank",
         "pitch": "pitch",
         "yaw": "yaw heading hdg azimuth",
     }.items()
     for word in words.split()
 }
-_UNITS = {
-    word: unit
-    for unit, words in {
-        "rad": "rad rads radian radians",
-        "deg": "deg degs degree degrees °",
-        "m": "m meter meters metre metres",
-        "ft": "ft feet",
-    }.items()
-    for word in words.split()
-}
-_FACTORS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "ft": 0.3048}
 _NOT_THE_VALUE = frozenset(
     {"std", "sigma", "var", "cov", "err", "error", "rate", "ref", "acc", "accuracy", "dot"}
 )
-_WORD = re.compile(r"°|[A-Z]?[a-z]+|[A-Z]+")
 _UNEVEN = 0.1  # of the sampling interval: at 20 m/s and 100 Hz, 2 cm
 _LARGEST_ANGLE = 1e4  # rad; a log that counts turns stays far below
 
@@ -83,7 +78,7 @@ def read_log(path: Path) -> Log:
     InputError
         If a column is missing, a value is missing or impossible, or the clock is not even.
     """
-    table = _open(path)
+    table = open_log(path)
     columns = _columns(table)
     found = table.load(list(columns.values()))
     values = {name: found[column] for name, column in columns.items()}
@@ -100,35 +95,14 @@ def read_log(path: Path) -> Log:
     )
 
 
-def _open(path: Path) -> CsvTable:
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError):  # ValueError: a null character in the name
-        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path} is a directory: name a file in it")
-    return CsvTable.open(path)
-
-
-def _words(name: str) -> list[str]:
-    return [word.lower() for word in _WORD.findall(name)]
-
-
 def _quantity(name: str) -> str | None:
     """Time, latitude, ... or ``None`` if the column is something else."""
-    if meaning(name).role == TIME:
+    if is_time(name):
         return TIME
-    words = _words(name)
-    if words and words[-1] in _UNITS:
-        words.pop()
+    words = words_of(name)
     if not words or not _NOT_THE_VALUE.isdisjoint(words):
         return None
     return _WORDS.get(words[-1])
-
-
-def _unit(name: str) -> str | None:
-    words = _words(name)
-    return _UNITS.get(words[-1]) if words else None
 
 
 def _columns(table: CsvTable) -> dict[str, int]:
@@ -156,7 +130,7 @@ def _check_complete(table: CsvTable, column: int, values: FloatArray) -> None:
     bad = np.flatnonzero(np.isnan(values))
     if bad.size:
         raise InputError(
-            f"{_place(table, column, int(bad[0]))}: no value: fill the gap, or use the part of "
+            f"{place(table, column, int(bad[0]))}: no value: fill the gap, or use the part of "
             "the file before or after it"
         )
 
@@ -166,15 +140,8 @@ def _interval(table: CsvTable, column: int, stamps: FloatArray) -> float:
     n = stamps.size - 1
     if n < 1:
         raise InputError(f"{table.source} has a single row: give two epochs or more")
+    check_rising(table, column, stamps)
     steps = np.diff(stamps)
-    bad = np.flatnonzero(steps <= 0.0)
-    if bad.size:
-        row = int(bad[0]) + 1
-        what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
-        raise InputError(
-            f"{_place(table, column, row)}: time stamp {stamps[row]:.15g} {what}: take such rows "
-            "out"
-        )
     usual = float(np.median(steps))
     gaps = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual)
     dt = float(stamps[-1] - stamps[0]) / n
@@ -182,7 +149,7 @@ def _interval(table: CsvTable, column: int, stamps: FloatArray) -> float:
     if gaps.size or late.size:
         row = int(gaps[0]) + 1 if gaps.size else int(late[0])
         raise InputError(
-            f"{_place(table, column, row)}: time stamp {stamps[row]:.15g} is off the even spacing "
+            f"{place(table, column, row)}: time stamp {stamps[row]:.15g} is off the even spacing "
             f"of {usual:.6g}: resample the log to even steps, or use the part before or after"
         )
     return dt * (meaning(table.names[column]).seconds or 1.0)
@@ -190,47 +157,16 @@ def _interval(table: CsvTable, column: int, stamps: FloatArray) -> float:
 
 def _factors(table: CsvTable, columns: Mapping[str, int], latitude: FloatArray) -> dict[str, float]:
     """What each quantity is to be multiplied by to come to rad or m."""
-    units = {name: _unit(table.names[columns[name]]) for name in (*_ANGLES, "height")}
-    common = units["latitude"]
-    if common is None and np.any(np.abs(latitude) > 0.5 * np.pi):
-        common = "deg"
-    factors = {}
-    for name in _ANGLES:
-        unit = units[name] or common
-        if unit is None:
-            raise InputError(
-                f"{table.source}, column {label(table.names, columns[name])}: are its angles in "
-                f"rad or deg? name it {name}_rad or {name}_deg"
-            )
-        if unit not in ("rad", "deg"):
-            raise InputError(
-                f"{table.source}, column {label(table.names, columns[name])}: {unit} is no unit "
-                f"of an angle: name it {name}_rad or {name}_deg"
-            )
-        factors[name] = _FACTORS[unit]
-    unit = units["height"] or "m"
-    if unit not in ("m", "ft"):
-        raise InputError(
-            f"{table.source}, column {label(table.names, columns['height'])}: {unit} is no unit "
-            "of a height: name it height_m"
-        )
-    return {**factors, "height": _FACTORS[unit]}
+    common = angle_unit(table.names[columns["latitude"]], latitude)
+    factors = {name: angle_factor(table, columns[name], name, common) for name in _ANGLES}
+    return {**factors, "height": length_factor(table, columns["height"], "height")}
 
 
 def _check_angles(
     table: CsvTable, columns: Mapping[str, int], angles: Mapping[str, FloatArray]
 ) -> None:
-    """Refuse what no latitude or pitch can be: most often a wrong unit in the header."""
-    quarter = 0.5 * np.pi * (1.0 + 1e-9)
-    limits = {name: _LARGEST_ANGLE for name in _ANGLES} | {"latitude": quarter, "pitch": quarter}
-    for name, limit in limits.items():
-        bad = np.flatnonzero(np.abs(angles[name]) > limit)
-        if bad.size:
-            raise InputError(
-                f"{_place(table, columns[name], int(bad[0]))}: a {name} of "
-                f"{np.degrees(angles[name][bad[0]]):.6g} deg: check the unit in the header"
-            )
-
-
-def _place(table: CsvTable, column: int, row: int) -> str:
-    return f"{table.source}, column {label(table.names, column)}, {table.where(row)}"
+    """Refuse what no latitude or pitch can be, nor any other angle."""
+    for name in ("latitude", "pitch"):
+        check_angles(table, columns[name], name, angles[name])
+    for name in ("longitude", "roll", "yaw"):
+        check_angles(table, columns[name], name, angles[name], _LARGEST_ANGLE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.consistency import (
+    LEVELS,
     Consistency,
     InnovationTest,
     at_epoch,
@@ -20,7 +22,6 @@ from gmwm.ins.consistency import (
 )
 from gmwm.ins.earth import ned_difference
 from gmwm.ins.experiment import Experiment
-from gmwm.ins.monte_carlo import MonteCarlo, Runs, monte_carlo
 from gmwm.ins.outage_errors import (
     QUANTITIES,
     Difference,
@@ -29,6 +30,8 @@ from gmwm.ins.outage_errors import (
     pooled_sizes,
     spread,
 )
+from gmwm.ins.runs import Runs
+from gmwm.ins.trials import MonteCarlo, monte_carlo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
 _SETTLED = 0.25  # share of the trajectory after which the filter with GNSS is judged
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("position", "velocity", "attitude", "sensors")
+_WIDTH = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ class Validation:
         folder: Path | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Validation:
-        """Do the runs of an experiment; see `gmwm.ins.monte_carlo.monte_carlo`."""
+        """Do the runs of an experiment; see `gmwm.ins.trials.monte_carlo`."""
         study = monte_carlo(
             experiment.scenario, experiment.source, experiment.filters, experiment.runs,
             experiment.seed, jobs=jobs, folder=folder, progress=progress,
@@ -73,6 +77,26 @@ class Validation:
     def names(self) -> tuple[str, ...]:
         """Of the filters; the others are compared with the first."""
         return tuple(self.study.filters)
+
+    @property
+    def reached(self) -> tuple[str, ...]:
+        """Filters of which at least one run reached the end of each outage."""
+        found = []
+        for name in self.names:
+            runs = self.study[name]
+            ends = [runs.index(outage.end) for outage in self.study.outages]
+            if all(np.any(np.isfinite(runs.error[:, end, 0])) for end in ends):
+                found.append(name)
+        return tuple(found)
+
+    @property
+    def divergences(self) -> tuple[str, ...]:
+        """One sentence for each filter that diverged in some run."""
+        found = {name: self.study[name] for name in self.names if self.study[name].diverged}
+        return tuple(
+            f"{name} diverged in {runs.diverged} of {runs.runs} runs: figures are of the others"
+            for name, runs in found.items()
+        )
 
     def spreads(self, name: str) -> list[dict[str, Spread]]:
         """Errors of a filter before the first fix after each outage."""
@@ -102,8 +126,7 @@ class Validation:
     # -- words ------------------------------------------------------------------------------------
 
     def __str__(self) -> str:
-        width = max(len(name) for name in self.names)
-        width = max(width, len("filter"))
+        width = max(len("filter"), *(len(name) for name in self.names))
         blocks = [self._head()]
         for i, outage in enumerate(self.study.outages):
             blocks.append(
@@ -113,18 +136,17 @@ class Validation:
                     *self._error_rows(i, width),
                 ]
             )
-        blocks.append(["NEES per degree of freedom, 1 if the filter knows how good it is; * out of "
-                       "its band", *self._nees_rows(width)])  # fmt: skip
+        blocks.append(["NEES per degree of freedom: 1 if the filter knows how good it is, * out of "
+                       "band", *self._nees_rows(width)])  # fmt: skip
         if self.study.outages:
-            blocks.append(["Share of position errors within predicted intervals at the ends of "
-                           "outages", *self._coverage_rows(width)])  # fmt: skip
+            blocks.append(["Position errors within predicted intervals at the ends of outages, %",
+                           *self._coverage_rows(width)])  # fmt: skip
         blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
                        *self._innovation_rows(width)])  # fmt: skip
         if self.study.outages and len(self.names) > 1:
             blocks.append(
                 [
-                    f"Horizontal error against {self.names[0]}: ratio of RMS, difference of the "
-                    "means [m]",
+                    f"Horizontal error against {self.names[0]}, over all outages",
                     *self._difference_rows(width),
                 ]
             )
@@ -132,26 +154,25 @@ class Validation:
 
     def _head(self) -> list[str]:
         truth, runs = self.study.truth, self.study[self.names[0]].runs
+        word = "run" if runs == 1 else "runs"
         lines = [
-            f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} runs, "
-            f"seed {self.experiment.seed}"
+            f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
+            f"{word}, seed {self.experiment.seed}"
         ]
-        lines += [f"- {note}" for note in self.study.notes]
-        for name in self.names:
-            if self.study[name].diverged:
-                lines.append(f"- {name} diverged in {self.study[name].diverged} of {runs} runs")
+        for note in (*self.study.notes, *self.divergences):
+            lines += textwrap.wrap(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
         return lines
 
     def _error_rows(self, outage: int, width: int) -> list[str]:
-        rows = [f"{'':{width}} {'':10} {'mean':>9} {'RMS':>9} {'median':>9} {'95 %':>9} "
+        rows = [f"{'':{width}} {'':16} {'mean':>9} {'RMS':>9} {'median':>9} {'95 %':>9} "
                 f"{'predicted':>10}"]  # fmt: skip
-        found = {name: self.spreads(name)[outage] for name in self.names}
+        found = {name: self.spreads(name)[outage] for name in self.reached}
         for quantity, unit in QUANTITIES.items():
-            for i, name in enumerate(self.names):
+            for i, name in enumerate(found):
                 s = found[name][quantity]
-                label = f"{quantity[:10]}" if i == 0 else f"  [{unit}]" if i == 1 else ""
+                label = f"{quantity} [{unit}]" if i == 0 else ""
                 rows.append(
-                    f"{name:{width}} {label:10} {s.mean:>9.4g} {s.rms:>9.4g} {s.median:>9.4g} "
+                    f"{name:{width}} {label:16} {s.mean:>9.4g} {s.rms:>9.4g} {s.median:>9.4g} "
                     f"{s.p95:>9.4g} {s.predicted:>10.4g}"
                 )
         return rows
@@ -170,14 +191,16 @@ class Validation:
         return rows
 
     def _coverage_rows(self, width: int) -> list[str]:
-        rows = []
+        heads = [f"{100.0 * level:g} %" for level in LEVELS]
+        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{head + ' ':>12}" for head in heads)]
         for name in self.names:
             for outage, found in zip(self.study.outages, self.at_ends(name), strict=True):
                 cells = [
-                    f"{100.0 * c.level:g} %: {100.0 * c.share:5.1f} %" + (" " if c.within else "*")
+                    "- " if np.isnan(c.share) else f"{100.0 * c.share:.1f}" + " *"[not c.within]
                     for c in found.coverage["position"]
                 ]
-                rows.append(f"{name:{width}} at {outage.end:<7g} " + "  ".join(cells))
+                label = f"at {outage.end:g} s"
+                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
         return rows
 
     def _innovation_rows(self, width: int) -> list[str]:
@@ -186,19 +209,23 @@ class Validation:
             test = self.innovations(name)
             mark = " " if test.nis.within else "*"
             rows.append(
-                f"{name:{width}} {test.nis.value:>8.4f}{mark} (band {test.nis.lower:.4f} .. "
+                f"{name:{width}} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
                 f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
             )
         return rows
 
     def _difference_rows(self, width: int) -> list[str]:
-        rows = []
+        rows = [f"{'':{width}} {'ratio of RMS':<26}  difference of means [m], = if none"]
         for name in self.names[1:]:
+            if not {name, self.names[0]} <= set(self.reached):
+                rows.append(f"{name:{width}} -")
+                continue
             d = self.against_first(name, "horizontal")
-            verdict = "" if d.significant else "  no difference"
+            ratio = f"{d.ratio:.3g} ({d.ratio_lower:.3g} .. {d.ratio_upper:.3g})"
+            mark = "" if d.significant else " ="
             rows.append(
-                f"{name:{width}} {d.ratio:.3f} ({d.ratio_lower:.3f} .. {d.ratio_upper:.3f})  "
-                f"{d.value:+.4g} ({d.lower:+.4g} .. {d.upper:+.4g}){verdict}"
+                f"{name:{width}} {ratio:<26}  "
+                f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
             )
         return rows
 
@@ -253,7 +280,7 @@ class Validation:
         for outage in self.study.outages:
             label = f"outage of {outage.duration:g} s at {outage.start:g} s"
             panels[label] = {
-                name: _growth(self.study[name], outage.start, outage.end) for name in self.names
+                name: _growth(self.study[name], outage.start, outage.end) for name in self.reached
             }
         if not panels:
             raise InputError("the experiment has no outage: there is nothing to draw")
@@ -270,16 +297,19 @@ class Validation:
 def _growth(runs: Runs, start: float, end: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times since the start, and horizontal and vertical RMS, true and predicted."""
     shown = (runs.time >= start) & (runs.time <= end) & (runs.before | (runs.time < end))
+    alive = np.all(np.isfinite(runs.error[:, shown, 0]), axis=1)
 
     def rms(values: FloatArray) -> FloatArray:
-        squares = np.nanmean(values[:, shown, :3] ** 2, axis=0)
+        squares = np.mean(values[alive][:, shown, :3] ** 2, axis=0)
         return np.sqrt(np.stack([squares[:, 0] + squares[:, 1], squares[:, 2]], axis=1))
 
     return runs.time[shown] - start, rms(runs.error), rms(runs.sd)
 
 
 def _starred(consistency: Consistency, group: str) -> str:
-    if group not in consistency.nees:
-        return "-"
-    ratio = consistency.nees[group]
-    return f"{ratio.value:.3g}" + (" " if ratio.within else "*")
+    """NEES of a group with a star if it is out of its band; a single run has no band."""
+    ratio = consistency.nees.get(group)
+    if ratio is None or np.isnan(ratio.value):
+        return "- "
+    out = not np.isnan(ratio.lower) and not ratio.within
+    return f"{ratio.value:.3g}" + " *"[out]

@@ -24,8 +24,8 @@ from gmwm.ins.aiding import Outage, gnss
 from gmwm.ins.experiment import Experiment
 from gmwm.ins.missions import car_drive, helicopter_mapping
 from gmwm.ins.model_text import sensor_models
-from gmwm.ins.monte_carlo import Scenario, Simulated
 from gmwm.ins.recorded import Recorded
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.validation import Validation
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise

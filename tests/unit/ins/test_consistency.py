@@ -25,7 +25,7 @@ from gmwm.ins.consistency import (
     mean_ratio,
     over_time,
 )
-from gmwm.ins.monte_carlo import GROUPS, Runs
+from gmwm.ins.runs import GROUPS, Runs
 
 SIZES = {"position": 3, "velocity": 3, "attitude": 3, "navigation": 9, "sensors": 6}
 

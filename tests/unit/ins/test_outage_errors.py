@@ -10,8 +10,9 @@ from scipy.stats import binom, ttest_rel
 
 from gmwm.errors import InputError
 from gmwm.ins.aiding import Outage
-from gmwm.ins.monte_carlo import MonteCarlo, Runs
 from gmwm.ins.outage_errors import QUANTITIES, difference, pooled_sizes, sizes, spread
+from gmwm.ins.runs import Runs
+from gmwm.ins.trials import MonteCarlo
 
 TIME = np.array([0.0, 30.0, 30.0, 60.0, 60.0])
 BEFORE = np.array([False, True, False, True, False])

@@ -7,11 +7,12 @@ from scipy.optimize import minimize
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.covariance_analysis import Course, covariance_analysis
+from gmwm.ins.analysis import Course, covariance_analysis
 from gmwm.ins.missions import fixed_wing_loiter
-from gmwm.ins.monte_carlo import Scenario, Simulated, monte_carlo
 from gmwm.ins.reduction import FORMS, ReducedError, Reduction, read_off, reduce
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import AXES, SensorModels
+from gmwm.ins.trials import monte_carlo
 
 DT = 0.1
 TRUTH = fixed_wing_loiter(duration=150.0, dt=DT)

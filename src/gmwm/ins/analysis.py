@@ -13,8 +13,8 @@ from gmwm.ins.analysis_kernels import run_both
 from gmwm.ins.covariance_kernels import NAVIGATION
 from gmwm.ins.emulation import Imu, emulate
 from gmwm.ins.filter import Filter, Outputs, modified, unmodified
-from gmwm.ins.monte_carlo import Scenario
 from gmwm.ins.rotation import matrix_from_rpy
+from gmwm.ins.scenario import Scenario
 from gmwm.ins.sensors import SensorModels
 from gmwm.ins.states import IntArray, SensorStates
 

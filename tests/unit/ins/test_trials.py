@@ -1,7 +1,6 @@
 """Monte Carlo: what it promises about seeds, filters, workers, interruptions and initial errors."""
 
 import json
-import sys
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -12,17 +11,18 @@ from scipy.stats import chi2, kstest
 
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
+from gmwm.ins import run_store, trials
 from gmwm.ins.aiding import Aiding, Outage, barometer, gnss
 from gmwm.ins.filter import InitialSd
 from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.monte_carlo import GROUPS, Runs, Scenario, Simulated, disturbed, monte_carlo
 from gmwm.ins.recorded import Recorded
+from gmwm.ins.runs import GROUPS, PER_RUN, Runs
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import AXES, SensorErrors, SensorModels
 from gmwm.ins.solution import Solution
 from gmwm.ins.trajectory import NavState
+from gmwm.ins.trials import disturbed, monte_carlo
 from gmwm.recording import Recording
-
-module = sys.modules[Runs.__module__]  # the package shows the function under the same name
 
 DT = 0.05
 TRUTH = helicopter_mapping(duration=130.0, dt=DT).segment(70.0, 130.0)
@@ -62,7 +62,7 @@ def test_a_seed_gives_one_result(reference):
 
 def test_a_longer_study_begins_with_the_shorter_one(reference):
     short = study(7)["good"]
-    for key in module._PER_RUN:
+    for key in PER_RUN:
         np.testing.assert_array_equal(getattr(short, key), getattr(reference, key)[:7])
 
 
@@ -72,7 +72,8 @@ def test_the_result_does_not_depend_on_workers(reference):
 
 @pytest.mark.parametrize("chunk", [1, 4, 100])
 def test_nor_on_how_the_runs_are_shared_out(reference, chunk, monkeypatch):
-    monkeypatch.setattr(module, "_CHUNK", chunk)
+    for module in (run_store, trials):
+        monkeypatch.setattr(module, "CHUNK", chunk)
     assert_same(study(25)["good"], reference)
 
 

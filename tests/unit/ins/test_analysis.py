@@ -17,12 +17,14 @@ from gmwm import (
 )
 from gmwm.errors import InputError
 from gmwm.ins.aiding import Aiding, Outage, barometer, gnss, standstills
-from gmwm.ins.covariance_analysis import Course, covariance_analysis
+from gmwm.ins.analysis import Course, covariance_analysis
 from gmwm.ins.emulation import emulate
 from gmwm.ins.filter import Filter, InitialSd
 from gmwm.ins.missions import car_drive, helicopter_mapping
-from gmwm.ins.monte_carlo import GROUPS, Scenario, Simulated, monte_carlo
+from gmwm.ins.runs import GROUPS
+from gmwm.ins.scenario import Scenario, Simulated
 from gmwm.ins.sensors import SensorModels
+from gmwm.ins.trials import monte_carlo
 
 DT = 0.05
 TRUTH = helicopter_mapping(duration=270.0, dt=DT).segment(70.0, 270.0)
