@@ -20,6 +20,7 @@ _NEEDED = (
     "navigate --help)"
 )
 
+_READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time"}
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
 
 
@@ -112,8 +113,14 @@ def navigate(
     folder = Path() if file is None else file.parent
     reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
     if _OF_DATA.isdisjoint(content):
+        # The rate is also that of a ready-made trajectory.
+        if "rate" in reading:
+            content["rate"] = reading.pop("rate")
         if reading:
-            raise InputError(f"{next(iter(reading))}: says how --imu is read, and there is none")
+            raise InputError(
+                f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
+                "it out"
+            )
         _validate(content, folder, output, jobs or os.cpu_count() or 1, resume)
     else:
         content["imu"] = _with_reading(content.get("imu"), reading)

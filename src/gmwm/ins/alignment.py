@@ -103,14 +103,17 @@ def align(
     # The time of levelling is the middle of the stretch unless all of it is at rest.
     levelled = epoch if still and first <= epoch <= last else (first + last) // 2
     matrices = _turned(imu, bias, matrix_from_rpy(level), levelled, epoch)
-    tilt_sd = _tilt_sd(models, (last - first) * imu.dt, imu.dt, still)
     gyro_sd = _mean_sd(models, "gyro", (last - first) * imu.dt, imu.dt)
+    drift = gyro_sd if still else float(np.hypot(gyro_sd, np.hypot(_bias(models, "gyro"), RATE)))
+    tilt_sd = float(np.hypot(
+        _tilt_sd(models, (last - first) * imu.dt, imu.dt, still),
+        drift * (epoch - levelled) * imu.dt,
+    ))  # fmt: skip
     at_level = rpy_from_matrix(matrices)
     lat = float(positions.value[fix, 0])
     if heading is not None:
         yaw, yaw_sd, how = heading, heading_sd, "heading as given"
     else:
-        drift = gyro_sd if still else float(np.hypot(gyro_sd, _bias(models, "gyro")))
         found = [_course(imu, aiding, bias, matrices, epoch, drift)]
         if still:
             found.append(_compass(mean, level, lat, np.hypot(gyro_sd, _bias(models, "gyro"))))
@@ -138,7 +141,7 @@ def align(
     earth = C.T @ np.array([RATE * np.cos(lat), 0.0, -RATE * np.sin(lat)])
     known_sd = float(np.hypot(gyro_sd, RATE * np.hypot(yaw_sd, tilt_sd))) if still else None
     notes = (
-        f"levelled by {(last - first) * imu.dt:.3g} s from {first * imu.dt:.6g} s on, "
+        f"levelled by {(last - first) * imu.dt:.3g} s, {first * imu.dt:.6g} s after the start, "
         + ("at rest; the gyros' mean there is taken off" if still else "in steady motion"),
         f"{how}: {np.degrees(yaw) % 360.0:.2f} deg, 1 sigma {np.degrees(yaw_sd):.2g} deg",
     )
@@ -261,7 +264,7 @@ def _course(
     mean_turn = float(np.angle(np.mean(np.exp(1j * turned))))
     gone = drift * (0.5 * (begin + end) - epoch * imu.dt)
     total = float(np.sqrt(sd**2 + _CRAB**2 + gone**2))
-    return course - mean_turn, total, f"heading from GNSS velocity at {begin:.6g} s"
+    return course - mean_turn, total, f"heading from GNSS, {begin:.6g} s after the start"
 
 
 def _from_velocity(aiding: Aiding, start: float) -> tuple[float, float, float, float] | None:

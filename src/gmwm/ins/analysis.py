@@ -139,7 +139,7 @@ class Course:
         """True and predicted covariance of a filter; see `covariance_analysis`."""
         scenario, dt = self.scenario, self.scenario.trajectory.dt
         aiding = scenario.aiding.without(scenario.outages)
-        ready = Filter.of(believed, aiding, dt, scenario.step)
+        ready = Filter.of(believed, aiding, dt, scenario.step, scenario.second_order)
         real = Filter.of(truth, aiding, dt, scenario.step)
         events = aiding.events(dt, scenario.trajectory.n)
         initial = scenario.trajectory.state(0)
@@ -163,7 +163,7 @@ class Course:
             J, joint.axis, joint.partner, joint.phi, joint.phi_off, joint.gain, joint.noise,
             joint.noise_off, joint.cross, joint.integral,
             np.where(real.coloured >= 0, real.coloured + m, -1),
-            events.epoch, events.kind, events.sd, ready.lever_arm,
+            events.epoch, events.kind, events.sd, ready.lever_arm, ready.second_order,
             self.outputs.epoch, self.outputs.before, out_P, out_J,
         )  # fmt: skip
         index = self.outputs.epoch

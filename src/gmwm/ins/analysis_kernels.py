@@ -12,7 +12,8 @@ import numba
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.ins.covariance_kernels import carry, take_in, transition
+from gmwm.ins.covariance_kernels import carry, take_in, tilt_squared, transition
+from gmwm.ins.earth import gravity
 from gmwm.ins.filter_kernels import IS_HEIGHT, IS_POSITION, measurement_row
 from gmwm.ins.states import IntArray
 
@@ -76,6 +77,7 @@ def run_both(
     j_phi_off: FloatArray, j_gain: FloatArray, j_noise: FloatArray, j_noise_off: FloatArray,
     j_cross: FloatArray, j_integral: FloatArray, j_coloured: IntArray,
     event_epoch: IntArray, event_kind: IntArray, event_sd: FloatArray, lever: FloatArray,
+    second_order: bool,
     out_epoch: IntArray, out_before: IntArray, out_P: FloatArray, out_J: FloatArray,
 ) -> None:  # fmt: skip
     """Carry a filter's covariance and the joint second moments through a scenario.
@@ -93,7 +95,7 @@ def run_both(
         Of the filter, as in `gmwm.ins.filter_kernels.run`.
     J, j_axis, ..., j_coloured : ndarray
         Of the joint vector; ``j_coloured`` are the places of the true coloured noise.
-    event_epoch, ..., out_before : ndarray
+    event_epoch, ..., out_before
         As in `gmwm.ins.filter_kernels.run`.
     out_P : (K, 9 + m, 9 + m), out_J : (K, N, N) ndarray
         Results.
@@ -105,6 +107,7 @@ def run_both(
     h, K, x = np.zeros(9), np.zeros(n), np.zeros(n)
     a, k = np.zeros(size), np.zeros(size)
     event = out = 0
+    gathered = j_gathered = 0.0
     for s in range(epoch.size):
         count = samples[s]
         if count > 0:
@@ -114,6 +117,11 @@ def run_both(
             carry(J, A, B, j_axis, j_partner, j_phi[count], j_phi_off[count], j_gain[count],
                   j_noise[count], j_noise_off[count], j_cross[count], j_integral[count],
                   j_S, j_T, U, j_row)  # fmt: skip
+            if second_order:
+                # The mean is taken off, and that of the filter is nearly the true one.
+                g = gravity(mid_lla[s, 0], mid_lla[s, 2])
+                gathered = tilt_squared(P, g, count * dt, gathered)[1]
+                j_gathered = tilt_squared(J, g, count * dt, j_gathered)[1]
         while out < out_epoch.size and out_epoch[out] == epoch[s] and out_before[out] == 1:
             out_P[out], out_J[out] = P, J
             out += 1
@@ -130,6 +138,7 @@ def run_both(
                     truth = 9 + j_coloured[component]
                 take_in(P, h, state, sd * sd, 0.0, x, K)
                 take_in_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
+            gathered = j_gathered = 0.0
             event += 1
         while out < out_epoch.size and out_epoch[out] == epoch[s]:
             out_P[out], out_J[out] = P, J

@@ -234,6 +234,42 @@ def carry(
             P[j, i] = total
 
 
+@numba.njit(cache=True, nogil=True)
+def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple[float, float]:
+    """Allow for the square of the tilt error over a step, which a linear filter does not know.
+
+    Specific force that is resolved with a tilt error phi falls short of gravity by ``g phi^2 / 2``.
+    Where gyros are poor and accelerometers good, that is more than the vertical error that a linear
+    filter expects. Mean and variance of the square follow from the covariance of the tilt, as in
+    the Gaussian second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*,
+    sec. 9.3). The tilt hardly changes from step to step, so standard deviations add up, not
+    variances, until a measurement corrects it.
+
+    Parameters
+    ----------
+    P : (n, n) ndarray
+        Changed in place: variance of the vertical velocity error.
+    g : float
+        m/s^2.
+    step : float
+        s.
+    gathered : float
+        Standard deviation of the velocity error of this kind since the last measurement, m/s.
+
+    Returns
+    -------
+    mean : float
+        Downward velocity error that the step makes on average, m/s.
+    gathered : float
+        After the step.
+    """
+    north, east, both = P[6, 6], P[7, 7], P[6, 7]
+    spread = g * math.sqrt(0.5 * (north * north + east * east) + both * both)
+    after = gathered + spread * step
+    P[5, 5] += after * after - gathered * gathered
+    return 0.5 * g * (north + east) * step, after
+
+
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
 def take_in(
     P: FloatArray, h: FloatArray, state: int, variance: float, z: float, x: FloatArray,

@@ -106,7 +106,7 @@ class Experiment:
             truth=truth,
             runs=checks.whole("runs", content.get("runs", 100), 1),
             seed=checks.whole("seed", content.get("seed", 0), 0),
-            title=str(content["trajectory"]),
+            title=Path(content["trajectory"]).name,
         )
 
 

@@ -76,6 +76,10 @@ class Filter:
         States of the coloured noise of GNSS positions; -1 for none.
     lever_arm : (3,) ndarray
         m.
+    second_order : bool
+        Whether the square of the tilt error is allowed for; without it the filter is linear, and
+        too sure of its vertical channel where gyros are poor and accelerometers good; see
+        `gmwm.ins.covariance_kernels.tilt_squared`.
     """
 
     states: SensorStates
@@ -83,6 +87,7 @@ class Filter:
     stride: int
     coloured: IntArray
     lever_arm: FloatArray
+    second_order: bool = True
 
     @classmethod
     def of(
@@ -91,6 +96,7 @@ class Filter:
         aiding: Aiding,
         dt: float,
         step: float = _COVARIANCE_STEP,
+        second_order: bool = True,
     ) -> Filter:
         """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s)."""
         stride = max(round(checks.positive("step", step) / dt), 1)
@@ -102,7 +108,7 @@ class Filter:
                      if s > 0.0]  # fmt: skip
             coloured[sd > 0.0] = states.m + np.arange(len(names))
             states = states.with_markov(names, sd[sd > 0.0], aiding.coloured_tau, dt)
-        return cls(states, dt, stride, coloured, np.asarray(aiding.lever_arm))
+        return cls(states, dt, stride, coloured, np.asarray(aiding.lever_arm), second_order)
 
     @property
     def size(self) -> int:
@@ -157,7 +163,7 @@ class Filter:
             imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
             table.noise, table.noise_off, table.cross, table.integral, self.coloured,
-            events.epoch, events.kind, events.value, events.sd, self.lever_arm,
+            events.epoch, events.kind, events.value, events.sd, self.lever_arm, self.second_order,
             outputs.epoch, outputs.before,
             nav, matrices, nav_P, sensor, sensor_P, innovation, sd,
         )  # fmt: skip
@@ -265,6 +271,7 @@ def navigate(
     step: float = _COVARIANCE_STEP,
     interval: float = 1.0,
     before: Sequence[float] = (),
+    second_order: bool = True,
 ) -> Solution:
     """Integrated navigation: filter IMU increments with sensor models and aiding.
 
@@ -285,6 +292,8 @@ def navigate(
     before : sequence of float, optional
         Times (s) at which the solution before the measurements is wanted too, such as the end of an
         outage.
+    second_order : bool, optional
+        See `Filter`.
 
     Returns
     -------
@@ -296,7 +305,7 @@ def navigate(
         If sensor models or measurements cannot be used.
     """
     models = SensorModels.of(sensors)
-    ready = Filter.of(models, aiding, imu.dt, step)
+    ready = Filter.of(models, aiding, imu.dt, step, second_order)
     events = aiding.events(imu.dt, imu.n)
     if not np.any(events.kind == IS_POSITION) and aiding.fixes and np.any(ready.coloured >= 0):
         raise InputError("coloured_sd without position fixes: set it to zero")

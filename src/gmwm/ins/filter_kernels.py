@@ -8,8 +8,8 @@ import numba
 import numpy as np
 
 from gmwm._typing import FloatArray
-from gmwm.ins.covariance_kernels import carry, take_in, transition
-from gmwm.ins.earth import radii_at
+from gmwm.ins.covariance_kernels import carry, take_in, tilt_squared, transition
+from gmwm.ins.earth import gravity, radii_at
 from gmwm.ins.mechanization import step
 from gmwm.ins.rotation import orthonormalise, turn_navigation
 from gmwm.ins.states import IntArray
@@ -168,7 +168,7 @@ def run(
     phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
     noise_off: FloatArray, cross: FloatArray, integral: FloatArray, coloured: IntArray,
     event_epoch: IntArray, event_kind: IntArray, event_value: FloatArray, event_sd: FloatArray,
-    lever: FloatArray, out_epoch: IntArray, out_before: IntArray,
+    lever: FloatArray, second_order: bool, out_epoch: IntArray, out_before: IntArray,
     out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
     out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
 ) -> int:  # fmt: skip
@@ -195,6 +195,9 @@ def run(
         Measurements in order of time.
     event_value, event_sd : (E, 3) ndarray
     lever : (3,) ndarray
+    second_order : bool
+        Whether the square of the tilt error is allowed for; see
+        `gmwm.ins.covariance_kernels.tilt_squared`.
     out_epoch : (K,) ndarray of int
         Epochs to be kept, in order of time.
     out_before : (K,) ndarray of int
@@ -218,6 +221,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     C_mid, v_mid, lla_mid, rate = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3)
     ax = ay = az = fx = fy = fz = 0.0
     epoch = event = out = steps = 0
+    gathered = 0.0
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
         while out < n_out and out_epoch[out] == epoch and out_before[out] == 1:
@@ -254,6 +258,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                 x[i] += estimated[9 + i]
                 estimated[9 + i] = 0.0
             correct(C, v, lla, estimated)
+            gathered = 0.0
         while out < n_out and out_epoch[out] == epoch:
             _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
                   out_sensor_P)  # fmt: skip
@@ -293,6 +298,9 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         carry(P, A, B, axis, partner, phi[samples], phi_off[samples], gain[samples],
               noise[samples], noise_off[samples], cross[samples], integral[samples],
               S, T, U, row)  # fmt: skip
+        if second_order:
+            mean, gathered = tilt_squared(P, gravity(lla[0], lla[2]), samples * dt, gathered)
+            v[2] -= mean
         steps += 1
         if steps % _CLEAN_EVERY == 0:
             orthonormalise(C)

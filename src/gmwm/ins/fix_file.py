@@ -144,7 +144,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     """Read GNSS fixes on the receiver's own clock; see `read_fixes`."""
     table = open_log(Path(path))
     columns, unused = _columns(table)
-    values = table.load(list(columns.values()))
+    values = table.load(sorted(set(columns.values())))
     found = {name: values[column] for name, column in columns.items()}
     _check_clock(table, columns[TIME], found[TIME])
     position = _position(table, columns, found)

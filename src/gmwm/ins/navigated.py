@@ -169,7 +169,10 @@ class Navigated:
     def verdict(self) -> str:
         """Whether the filter's model fits these data; only the innovations can tell."""
         if self.solution.diverged_at is not None:
-            return "The filter diverged: the sensor models or the initial state are far off."
+            return (
+                "The filter diverged: the sensor models or the initial state are far off, or a "
+                "fix is."
+            )
         if self.fits:
             return (
                 "The innovations do not contradict the filter's model: they are as large as it "

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gmwm.errors import InputError
+from gmwm.files import moved_into_place
 from gmwm.ins.runs import Runs
 
 CHUNK = 10
@@ -64,7 +65,13 @@ class RunStore:
         return self.folder / f"runs-{start}-{min(start + CHUNK, self.runs)}.npz"
 
     def put(self, start: int, chunk: Chunk) -> None:
-        """Keep a finished chunk; its file appears whole or not at all."""
+        """Keep a finished chunk; its file appears whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
         path = self.path(start)
         if path is None:
             return
@@ -73,9 +80,9 @@ class RunStore:
             for name, runs in chunk.items()
             for each in fields(Runs)
         }
-        partial = path.with_suffix(".partial.npz")
-        np.savez(partial, **arrays)
-        partial.replace(path)
+        # numpy adds the suffix to names without it, so the stream is opened here.
+        with moved_into_place(path) as partial, partial.open("wb") as stream:
+            np.savez(stream, **arrays)
 
     def get(self, start: int) -> Chunk | None:
         """A finished chunk; ``None`` if there is none, or its file is damaged."""

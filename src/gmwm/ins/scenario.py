@@ -66,6 +66,8 @@ class Scenario:
         Of the covariance, s.
     interval : float
         At which errors are kept, s; zero for some 300 epochs.
+    second_order : bool
+        Whether filters allow for the square of the tilt error; see `gmwm.ins.filter.Filter`.
     """
 
     trajectory: Trajectory
@@ -74,6 +76,7 @@ class Scenario:
     initial_sd: InitialSd = field(default_factory=InitialSd)
     step: float = 0.1
     interval: float = 0.0
+    second_order: bool = True
 
     def __post_init__(self) -> None:
         dt = self.trajectory.dt

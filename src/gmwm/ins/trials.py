@@ -150,7 +150,7 @@ class _Task:
         events = aiding.events(imu.dt, imu.n)
         found = {}
         for name, models in self.filters.items():
-            ready = Filter.of(models, aiding, imu.dt, scenario.step)
+            ready = Filter.of(models, aiding, imu.dt, scenario.step, scenario.second_order)
             found[name] = ready.run(noisy, initial, scenario.initial_sd, events, outputs)
         return found, errors
 
@@ -198,7 +198,8 @@ def _fingerprint(task: _Task) -> str:
     filters = [(name, _exactly(models)) for name, models in task.filters.items()]
     source = task.source
     drawn = _exactly(source.models) if isinstance(source, Simulated) else repr(source)
-    for part in (filters, drawn, task.seed, scenario.outages, scenario.initial_sd, scenario.step,
+    for part in (filters, drawn, task.seed, scenario.outages, scenario.initial_sd,
+                 scenario.step, scenario.second_order,
                  scenario.interval, aiding.coloured_tau, truth.dt):  # fmt: skip
         digest.update(repr(part).encode())
     arrays = [truth.lla, truth.velocity, truth.rpy, aiding.lever_arm, aiding.coloured_sd]

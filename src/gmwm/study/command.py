@@ -79,7 +79,8 @@ def reproduce(
     Example:
       gmwm reproduce table2 --runs 200 -o study
       gmwm reproduce fig2 --runs 200 -o study --resume
-      gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 --gyro-unit deg/s
+      gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
+        --gyro-unit deg/s --accel-unit g
     """
     from gmwm.files import folder_to_fill
 

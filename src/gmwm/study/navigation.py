@@ -57,6 +57,7 @@ TABLE_6 = sensor_models(
 
 FIGURES = ("fig5", "fig6", "fig7", "fig8", "fig9")
 
+_OF_ONE_GYRO = ("fig5", "fig6")
 _HOURS, _RATE = 4.5, 100.0
 _SHOWN = "gyro_x"  # of the Allan plots
 _RUNS = 100
@@ -215,15 +216,21 @@ def reproduce_figure(
     text, paths
         What to print, and the files that were written.
     """
+    if figure not in _OF_ONE_GYRO and len(recordings) == 1:
+        raise InputError("give two recordings or more: one to calibrate, others to navigate with")
     first = recordings[0] if recordings else static_recording(seed)
+    needed = (_SHOWN,) if figure in _OF_ONE_GYRO else AXES
+    missing = [axis for axis in needed if axis not in first.names]
+    if missing:
+        raise InputError(
+            f"{first.source}: there is no channel {missing[0]}: {figure} needs {', '.join(needed)}"
+        )
     calibrated = Calibrated.of(first)
-    if figure in ("fig5", "fig6"):
+    if figure in _OF_ONE_GYRO:
         shown = calibrated.lines[_SHOWN] if figure == "fig5" else calibrated.gmwm[_SHOWN]
         drawn = shown.plot().get_figure()
         assert drawn is not None
         return str(shown), _saved(drawn, folder / figure)  # type: ignore[arg-type]
-    if recordings and len(recordings) < 2:
-        raise InputError("give two recordings or more: one to calibrate, others to navigate with")
     vehicle = "car" if figure == "fig9" else "helicopter"
     validation = Validation.of(
         experiment(vehicle, calibrated, runs or _RUNS, seed, recordings[1:]),

@@ -33,8 +33,9 @@ AIDING = gnss(
     TRUTH, velocity_sd=0.05, lever_arm=(1.0, -0.5, -2.0), coloured_sd=(0.5, 0.0, 1.0),
     coloured_tau=60.0, imu=IMU,
 ) + barometer(TRUTH, 2.0)  # fmt: skip
-RICH = Scenario(TRUTH, AIDING, (Outage(100.0, 60.0),), interval=4.0)
-PLAIN = Scenario(TRUTH, gnss(TRUTH), (Outage(100.0, 60.0),), interval=4.0)
+# Laws of the linear filter.
+RICH = Scenario(TRUTH, AIDING, (Outage(100.0, 60.0),), interval=4.0, second_order=False)
+PLAIN = Scenario(TRUTH, gnss(TRUTH), (Outage(100.0, 60.0),), interval=4.0, second_order=False)
 
 EVERYTHING = SensorModels.of(
     {
@@ -102,7 +103,7 @@ def test_the_prediction_is_that_of_the_filter_itself(believed, step):
     scenario = replace(RICH, step=step)
     found = covariance_analysis(scenario, FULL, believed)
     aiding = AIDING.without(scenario.outages)
-    ready = Filter.of(believed, aiding, DT, step)
+    ready = Filter.of(believed, aiding, DT, step, second_order=False)
     events, outputs = aiding.events(DT, TRUTH.n), scenario.outputs()
     solution = ready.run(IMU, TRUTH.state(0), scenario.initial_sd, events, outputs)
     np.testing.assert_array_equal(found.time, solution.time)
@@ -228,7 +229,7 @@ def test_a_ramp_unknown_to_the_filter_shows_as_its_bias():
         number = list(FULL.models).index(axis)
         errors[:, number] = RateRamp(rate).simulate(TRUTH.n, DT, np.random.default_rng(0))
     aiding = PLAIN.aiding.without(PLAIN.outages)
-    ready = Filter.of(FULL, aiding, DT)
+    ready = Filter.of(FULL, aiding, DT, second_order=False)
     events = aiding.events(DT, TRUTH.n)
 
     def filtered(imu):

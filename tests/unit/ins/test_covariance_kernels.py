@@ -15,9 +15,10 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.ins.covariance_kernels import carry, error_rates, take_in, transition
+from gmwm.ins.covariance_kernels import carry, error_rates, take_in, tilt_squared, transition
 from gmwm.ins.earth import ned_difference, offset
-from gmwm.ins.emulation import Imu
+from gmwm.ins.emulation import Imu, emulate
+from gmwm.ins.manoeuvres import Stop, perform
 from gmwm.ins.mechanization import integrate
 from gmwm.ins.rotation import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
 from gmwm.ins.sensors import AXES, SensorModels
@@ -336,3 +337,35 @@ def test_a_very_exact_measurement_leaves_a_covariance():
         take_in(P, h, -1, 1e-8, 0.0, x, K)
     assert P[4, 4] == pytest.approx(1e-11, rel=1e-3)
     assert np.linalg.eigvalsh(P).min() > -1e-13 * np.linalg.eigvalsh(P).max()
+
+
+def test_the_square_of_a_tilt_has_the_moments_that_are_allowed_for():
+    """Fixed tilts, drawn: mean and spread of g phi^2 / 2 over a while, in steps of any length."""
+    rng = np.random.default_rng(8)
+    root = np.array([[0.02, 0.0], [0.012, 0.03]])
+    P = np.zeros((9, 9))
+    P[6:8, 6:8] = root @ root.T
+    g, gathered, total = 9.8, 0.0, 0.0
+    for step in (0.1, 0.5, 0.4):
+        mean, gathered = tilt_squared(P, g, step, gathered)
+        total += mean
+    tilts = rng.standard_normal((400_000, 2)) @ root.T
+    errors = 0.5 * g * np.sum(tilts**2, axis=1)
+    assert total == pytest.approx(np.mean(errors), rel=0.01)
+    assert np.sqrt(P[5, 5]) == pytest.approx(np.std(errors), rel=0.02)
+    assert gathered == pytest.approx(np.sqrt(P[5, 5]), rel=1e-12)
+    assert np.count_nonzero(P) == 5  # nothing else is touched
+
+
+def test_a_tilted_navigator_falls_by_the_mean_that_is_taken_off():
+    """Two seconds of an error-free IMU at rest, navigated with a tilt of 2 deg."""
+    tilt = np.radians(2.0)
+    stand = perform([Stop(2.0)], start=(0.8, 0.1, 300.0), heading=0.0, dt=DT)
+    imu, start = emulate(stand), stand.state(0)
+    wrong = integrate(
+        imu, NavState(start.lla, start.velocity, start.rpy + np.array([tilt, 0.0, 0.0]))
+    )
+    fall = (wrong.velocity[-1, 2] - stand.velocity[-1, 2]) / stand.duration
+    P = np.zeros((9, 9))
+    P[6, 6] = tilt**2
+    assert fall == pytest.approx(tilt_squared(P, 9.81, 1.0, 0.0)[0], rel=0.01)

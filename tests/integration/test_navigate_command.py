@@ -1,0 +1,378 @@
+"""``gmwm navigate``: what it prints and writes, and how it refuses what it cannot use."""
+
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from gmwm import WhiteNoise, cli
+from gmwm.calibration import Calibration
+from gmwm.estimate.methods import fit
+from gmwm.ins.sensors import AXES
+from gmwm.recording import Channel
+from gmwm.variance.analysis import wavelet_variance
+
+MODELS = {"gyro": {"N": "140 deg/h/sqrt(Hz)"}, "accel": {"N": "140 ug/sqrt(Hz)"}}
+STUDY = {
+    "trajectory": "car",
+    "duration": 30,
+    "rate": 20,
+    "truth": MODELS,
+    "filters": {"truth": "truth", "<b>big": {"gyro": {"N": 0.01}, "accel": {"N": 0.1}}},
+    "outages": [[18, 6]],
+    "runs": 2,
+}
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run ``gmwm navigate ARGUMENTS`` in a folder of its own."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", "navigate", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code
+        printed, told = capsys.readouterr()
+        return code, printed, told
+
+    return _run
+
+
+def written(path="study.yaml", **changes):
+    """A study file, with some keys changed; those of ``None`` are left out."""
+    content = {name: each for name, each in (STUDY | changes).items() if each is not None}
+    Path(path).write_text(yaml.safe_dump(content, sort_keys=False))
+    return path
+
+
+def without_time(printed):
+    return printed.split("\n\nwrote ")[0]
+
+
+def calibration(path, axes=AXES):
+    """A calibration.json of white noise."""
+    fits = {}
+    for i, axis in enumerate(axes):
+        values = 1e-3 * np.random.default_rng(i).standard_normal(2000)
+        quantity = axis.partition("_")[0]
+        unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
+        wv = wavelet_variance(Channel(axis, values, 0.01, quantity, unit))
+        fits[axis] = fit(WhiteNoise(), wv)
+    Calibration(fits, {}, "test", 100.0, 2000).save(path)
+    return path
+
+
+def test_a_study_prints_tables_and_writes_a_report(run):
+    code, printed, told = run(written(), "--jobs", 1)
+    assert (code, told) == (0, "")
+    table = Path("gmwm-navigate/validation.txt").read_text()
+    assert printed.startswith(table)
+    assert table.startswith("car: 30 s at 20 Hz, 2 runs, seed 0\n")
+    for block in ("Errors after 6 s without GNSS, at 24 s", "NEES per", "Innovations", "against"):
+        assert block in table
+    assert max(map(len, table.splitlines())) <= 80
+    page = Path("gmwm-navigate/validation.html").read_text()
+    assert "<b>big" not in page
+    assert "&lt;b&gt;big" in page
+
+
+def test_the_same_seed_gives_the_same_files_and_another_does_not(run):
+    written()
+    files = [Path("a/validation.txt"), Path("a/validation.html")]
+    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 3)
+    first = [path.read_bytes() for path in files]
+    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 3)
+    assert [path.read_bytes() for path in files] == first
+    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 4)
+    assert files[0].read_bytes() != first[0]
+
+
+def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run):
+    written()
+    _, first, _ = run("study.yaml", "-o", "a", "--jobs", 1)
+    stamps = {path: path.stat().st_mtime_ns for path in Path("a/runs").iterdir()}
+    code, again, _ = run("study.yaml", "-o", "a", "--jobs", 1, "--resume")
+    assert code == 0
+    assert without_time(again) == without_time(first)
+    assert {path: path.stat().st_mtime_ns for path in Path("a/runs").iterdir()} == stamps
+    code, _, told = run("study.yaml", "-o", "a", "--jobs", 1, "--resume", "--seed", 5)
+    assert code == 2
+    assert "another study" in told
+    # The table of the first study is left as it was.
+    assert Path("a/validation.txt").read_text() == without_time(first) + "\n"
+
+
+def test_options_go_before_the_file(run):
+    written(runs=50, duration=4000)
+    code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 1, "--duration", 20, "--seed", 7,
+                           "--outage", "8:4", "--filter", "only=truth", "--trajectory",
+                           "loiter")  # fmt: skip
+    assert code == 0
+    assert printed.startswith("loiter: 20 s at 20 Hz, 1 run, seed 7\n")
+    assert "only   at 12 s" in printed
+    assert "big" not in printed
+
+
+def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run):
+    code, printed, _ = run(written(rate=None), "--rate", 10, "--runs", 1, "--jobs", 1)
+    assert code == 0
+    assert printed.startswith("car: 30 s at 10 Hz")
+    code, _, told = run("study.yaml", "--gyro-unit", "deg/s")
+    assert (code, "says how --imu is read, and there is none" in told) == (2, True)
+
+
+def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run):
+    folder = Path("deep/er")
+    folder.mkdir(parents=True)
+    calibration(folder / "cal.json")
+    calibration(Path("here.json"))
+    written(folder / "study.yaml", filters={"mine": "cal.json"}, outages=None, runs=1)
+    assert run(folder / "study.yaml", "--jobs", 1)[0] == 0
+    arguments = ("--jobs", 1, "--filter", "mine=here.json", "--truth", "here.json")
+    assert run(folder / "study.yaml", *arguments)[0] == 0
+    code, _, told = run(folder / "study.yaml", "--jobs", 1, "--filter", "mine=cal.json")
+    assert code == 2
+    assert "cal.json: cannot be read" in told
+
+
+def test_a_study_from_options_alone(run):
+    calibration(Path("cal.json"))
+    code, printed, _ = run("--trajectory", "car", "--duration", 15, "--truth", "cal.json",
+                           "--filter", "A=truth", "--runs", 1, "--jobs", 1)  # fmt: skip
+    assert code == 0
+    assert printed.startswith("car: 15 s at 100 Hz, 1 run, seed 0\n")
+
+
+def test_a_logged_trajectory(run):
+    t = np.arange(0.0, 30.1, 0.1)
+    rows = np.stack([t, 46 + 1e-4 * t, 7 + 0 * t, 400 + 0 * t, 0 * t, 0 * t, 0 * t], axis=-1)
+    header = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
+    lines = [header, *(",".join(f"{x:.12g}" for x in row) for row in rows)]
+    Path("log.csv").write_text("\n".join(lines))
+    written(trajectory="log.csv", rate=None, duration=None)
+    code, printed, _ = run("study.yaml", "--jobs", 1)
+    assert code == 0
+    assert printed.startswith("log.csv: 30 s at 10 Hz")
+    code, _, told = run("study.yaml", "--duration", 31)
+    assert (code, "give at most that" in told) == (2, True)
+    # A latitude in degrees that claims to be in radians.
+    Path("log.csv").write_text("\n".join(lines).replace("latitude_deg", "latitude_rad"))
+    code, _, told = run("study.yaml", "--jobs", 1)
+    assert code == 2
+    assert "check the unit in the header" in told
+
+
+BAD = {
+    "nothing": ({"trajectory": None, "truth": None, "filters": None}, "no trajectory, no truth"),
+    "unknown key": ({"filter": {}}, "'filter' is unknown: there are trajectory"),
+    "filters: number": ({"filters": 5}, "filters: 5: write NAME"),
+    "filters: list": ({"filters": ["truth"]}, "write NAME: calibration.json"),
+    "filter: number": ({"filters": {"a": 5}}, "filter a: 5: give a calibration.json"),
+    "filter: missing file": ({"filters": {"a": "no.json"}}, "no.json: cannot be read"),
+    "filter: folder": ({"filters": {"a": "."}}, "cannot be read"),
+    "filter: no JSON": ({"filters": {"a": "study.yaml"}}, "is no JSON"),
+    "filter: blank name": ({"filters": {" ": "truth"}}, "is no name"),
+    "filter: control": ({"filters": {"a\tb": "truth"}}, "is no name"),
+    "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "is no name"),
+    "filter: reduced form": ({"filters": {"a": {"reduce": "N+X"}}}, "known are N+K, N+GM"),
+    "filter: reduced key": ({"filters": {"a": {"reduce": "N+K", "to": 1}}}, "'to' is unknown"),
+    "filter: flicker": (
+        {"filters": {"a": {"gyro": {"B": "1 deg/h"}, "accel": {"N": 1}}}},
+        "filter a, gyro_x: BiasInstability.*approximate it by Gauss-Markov",
+    ),
+    "truth: list": ({"truth": [1]}, "truth: [1]: give"),
+    "truth: lacks axis": ({"truth": {"gyro": {"N": 1}}}, "accel_x has none"),
+    "truth: empty sensor": ({"truth": MODELS | {"gyro": {"bias": 1}}}, "there is no noise"),
+    "truth: sensor": ({"truth": MODELS | {"mag": {"N": 1}}}, "'mag' is no sensor"),
+    "truth: letter": ({"truth": MODELS | {"gyro": {"Z": 1}}}, "'Z' is no term"),
+    "truth: unit": ({"truth": MODELS | {"gyro": {"N": "1 deg/h"}}}, "does not measure the same"),
+    "truth: negative": ({"truth": MODELS | {"gyro": {"N": -1}}}, "truth, gyro, N"),
+    "truth: NaN": ({"truth": MODELS | {"gyro": {"N": float("nan")}}}, "is no number"),
+    "truth: huge": ({"truth": MODELS | {"gyro": {"N": "1e999"}}}, "is too large"),
+    "truth: yes": ({"truth": MODELS | {"gyro": {"N": True}}}, "is no number"),
+    "truth: flat GM": ({"truth": MODELS | {"gyro": {"GM": [1, 2]}}}, "write [[sigma, tau], ...]"),
+    "truth: tau unit": ({"truth": MODELS | {"gyro": {"GM": [[1, "3 m"]]}}}, "same as s"),
+    "recordings: number": ({"truth": {"recordings": 5}}, "write [file, ...]"),
+    "recordings: none": ({"truth": {"recordings": []}}, "there is none"),
+    "recordings: missing": ({"truth": {"recordings": "x.csv"}}, "x.csv does not exist"),
+    "recordings: key": ({"truth": {"recordings": "x.csv", "unit": 1}}, "'unit' is unknown"),
+    "recordings: units": ({"truth": {"recordings": "x.csv", "units": 5}}, "write {gyro: deg/s"),
+    "recordings: unit": ({"truth": {"recordings": "x", "units": {"gyro": 1}}}, "write deg/s"),
+    "recordings: channels": ({"truth": {"recordings": "x", "channels": 1}}, "write {gyro_x"),
+    "recordings: channel": ({"truth": {"recordings": "x", "channels": {"gyro_x": 1.5}}}, "column"),
+    "recordings: time": ({"truth": {"recordings": "x", "time": 1.5}}, "write a column, or none"),
+    "recordings: rate": ({"truth": {"recordings": "x", "rate": "fast"}}, "is no number"),
+    "trajectory: number": ({"trajectory": 5}, "trajectory: 5: write helicopter"),
+    "trajectory: missing": ({"trajectory": "no.csv"}, "'no.csv' is no file, and none of"),
+    "trajectory: folder": ({"trajectory": ".", "rate": None}, "is a directory"),
+    "trajectory: rate": ({"trajectory": "study.yaml"}, "leave it out"),
+    "trajectory: YAML": ({"trajectory": "study.yaml", "rate": None}, "study.yaml"),
+    "duration: text": ({"duration": "long"}, "duration: 'long' is no number"),
+    "duration: unit": ({"duration": "30 m"}, "same as s"),
+    "duration: zero": ({"duration": 0}, "give a positive number"),
+    "duration: endless": ({"duration": 1e12}, "steps"),
+    "rate: zero": ({"rate": 0}, "give a positive number"),
+    "outages: number": ({"outages": 5}, "write [[start, length], ...]"),
+    "outages: flat": ({"outages": [18, 6]}, "write [start, length] in seconds"),
+    "outages: beyond": ({"outages": [[18, 60]]}, "goes beyond the end"),
+    "outages: negative": ({"outages": [[18, -1]]}, "give seconds above zero"),
+    "outages: early": ({"outages": [[-1, 5]]}, "seconds since the first epoch"),
+    "outages: overlap": ({"outages": [[10, 9], [18, 6]]}, "write them as one, or apart"),
+    "outages: same": ({"outages": [[18, 6], [18, 6]]}, "write them as one, or apart"),
+    "outages: unit": ({"outages": [["1 m", 6]]}, "same as s"),
+    "outages: between": ({"outages": [[18, 6.01]]}, "between two epochs"),
+    "outages: no fix": ({"outages": [[18.1, 0.4]]}, "no fix falls into that"),
+    "gnss: number": ({"gnss": 5}, "gnss: 5: write KEY: VALUE"),
+    "gnss: key": ({"gnss": {"sd": 1}}, "'sd' is unknown: there are interval"),
+    "gnss: none": ({"gnss": {"position_sd": "none"}}, "there is no fix"),
+    "gnss: seldom": ({"gnss": {"interval": 60}}, "there is no fix"),
+    "gnss: odd interval": ({"gnss": {"interval": 0.07}}, "give a multiple"),
+    "gnss: text": ({"gnss": {"position_sd": "fine"}}, "is no number"),
+    "gnss: negative": ({"gnss": {"velocity_sd": -1}}, "gnss, velocity_sd = -1.0"),
+    "gnss: mapping": ({"gnss": {"position_sd": {"north": 1}}}, "is no number"),
+    "gnss: two": ({"gnss": {"lever_arm": [1, 2]}}, "give three numbers"),
+    "gnss: unit": ({"gnss": {"lever_arm": ["1 s", 0, 0]}}, "same as m"),
+    "initial_sd: number": ({"initial_sd": 5}, "initial_sd: 5: write KEY: VALUE"),
+    "initial_sd: key": ({"initial_sd": {"roll": 1}}, "'roll' is unknown"),
+    "initial_sd: unit": ({"initial_sd": {"tilt": "1 m"}}, "same as rad"),
+    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "give a positive number"),
+    "runs: part": ({"runs": 1.5}, "give a whole number"),
+    "seed: negative": ({"seed": -1}, "give a whole number"),
+}  # fmt: skip
+
+
+def refused(outcome, message):
+    """One sentence, exit code 2, nothing printed and nothing left behind."""
+    code, printed, told = outcome
+    assert (code, printed) == (2, "")
+    assert told.startswith("gmwm: ")
+    assert told.count("\n") == 1
+    assert "Traceback" not in told
+    pattern = message if ".*" in message else re.escape(message)
+    assert re.search(pattern, told), told
+    assert not Path("gmwm-navigate").exists()
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_file_that_cannot_be_used_is_refused_in_one_sentence(run, case):
+    changes, message = BAD[case]
+    refused(run(written(**changes), "--jobs", 1), message)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("hello", "is no mapping"),
+        ("- 1\n- 2", "is no mapping"),
+        ("a: [1", "is no YAML (line 1"),
+        ("a:\n\t- 1", "line 2, column 1"),
+        ("a: *b", "undefined alias"),
+        ("a: !!python/object:os.system 1", "is no YAML"),
+        ("truth: x\ntrajectory: car\ntruth: y", "line 3: 'truth' is there twice"),
+        ("filters:\n  A: x\n  B: y\n  A: z", "line 4: 'A' is there twice"),
+        ("filters: {1: x, '1': y}", "'1' is there twice"),
+        ("a\0: 1", "is no YAML"),
+        ("\xff\xfe", "is no"),
+    ],
+)  # fmt: skip
+def test_what_is_no_study_file(run, text, message):
+    Path("study.yaml").write_bytes(text.encode("latin-1"))
+    refused(run("study.yaml"), message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "needs a trajectory, a truth and filters: give STUDY.yaml, or --trajectory"),
+        (("no.yaml",), "no.yaml: cannot be read (No such file or directory)"),
+        ((".",), "cannot be read (Is a directory)"),
+        (("study.yaml", "--filter", "A"), "--filter A: write NAME=FILE"),
+        (("study.yaml", "--filter", "A="), "write NAME=FILE"),
+        (("study.yaml", "--filter", "A=x", "--filter", "A=y"), "--filter A=... is given twice"),
+        (("study.yaml", "--outage", "5"), "--outage 5: write START:LENGTH"),
+        (("study.yaml", "--outage", "nan:5"), "outages: nan is no number"),
+        (("study.yaml", "--duration", "-5"), "give a positive number"),
+        (("study.yaml", "--truth", "no.json"), "no.json: cannot be read"),
+        (("--trajectory", "car"), "no truth, no filters"),
+    ],
+)
+def test_options_that_cannot_be_used(run, arguments, message):
+    written()
+    refused(run(*arguments), message)
+
+
+def test_a_calibration_that_lacks_an_axis(run):
+    calibration(Path("five.json"), AXES[:5])
+    refused(run(written(truth="five.json")), "truth, five.json: sensor models: accel_z has none")
+    refused(run(written(filters={"A": "five.json"})), "filter A, five.json: sensor models: accel_z")
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
+    written()
+    Path("out/validation.html").mkdir(parents=True)
+    code, _, told = run("study.yaml", "-o", "out", "--jobs", 1)
+    assert (code, "in the way" in told) == (2, True)
+    assert not Path("out/runs").exists()
+    Path("taken").mkdir()
+    Path("taken/runs").write_text("mine")
+    code, _, told = run("study.yaml", "-o", "taken", "--jobs", 1)
+    assert (code, "in the way" in told) == (2, True)
+    assert Path("taken/runs").read_text() == "mine"
+    code, _, told = run("study.yaml", "-o", "study.yaml", "--jobs", 1)
+    assert (code, "cannot be written" in told) == (2, True)
+
+
+def test_real_errors_of_another_rate_are_refused_before_any_run(run):
+    rng = np.random.default_rng(2)
+    rows = np.column_stack([1e-3 * rng.standard_normal((4000, 6))])
+    header = "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+    lines = [header, *(",".join(f"{x:.6g}" for x in row) for row in rows)]
+    Path("static.csv").write_text("\n".join(lines))
+    truth = {"recordings": "static.csv", "rate": 100, "units": {"gyro": "rad/s", "accel": "m/s^2"}}
+    filters = {"A": MODELS}
+    refused(run(written(truth=truth, filters=filters)), "has 100 Hz and the trajectory 20 Hz")
+    truth["rate"] = "20 Hz"
+    refused(run(written(truth=truth)), "real errors have no true model")
+    written(truth=truth, filters=filters, outages=None)
+    code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 9)
+    assert code == 0
+    assert "6 runs in place of 9" in " ".join(printed.split())
+
+
+class _References(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attrs):
+        self.found += [
+            value for name, value in attrs if name in ("src", "href", "xlink:href", "action")
+        ]
+
+
+def test_the_report_needs_no_network(run):
+    run(written(), "--jobs", 1)
+    text = Path("gmwm-navigate/validation.html").read_text()
+    page = _References()
+    page.feed(text)
+    assert all(each.startswith("#") for each in page.found)
+    assert "@import" not in text
+    assert "<script" not in text
+
+
+def test_help_shows_the_units_and_an_example(run):
+    code, printed, _ = run("--help")
+    assert code == 0
+    assert "gmwm navigate study.yaml" in printed
+    assert max(map(len, printed.splitlines())) <= 80

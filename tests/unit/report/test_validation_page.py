@@ -1,0 +1,64 @@
+import re
+from pathlib import Path
+
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.report.validation_page import write_validation_report
+
+
+def text_of(path: Path) -> str:
+    return re.sub(r"<svg.*?</svg>", "", path.read_text(), flags=re.S)
+
+
+def test_every_filter_is_on_the_page_and_no_name_is_markup(tmp_path, made_up):
+    names = {"<b>bold</b>": 3.0, "a&b": 1.0, "\"'": 1.0, "x$y$": 1.0, "_z": 1.0, "w" * 40: 1.0}
+    text = text_of(write_validation_report(made_up(names, ((20, 10),)), tmp_path / "a.html"))
+    for shown in ("&lt;b&gt;bold&lt;/b&gt;", "a&amp;b", "&#34;&#39;", "x$y$", "_z", "w" * 40):
+        assert text.count(shown) >= 5
+    assert "<b>bold" not in text
+    assert text.count('class="figure"') == 3
+
+
+def test_the_page_needs_no_network_and_is_the_same_each_time(tmp_path, made_up):
+    found = made_up({"A": 1.0}, ((20, 10),))
+    first = write_validation_report(found, tmp_path / "a.html").read_bytes()
+    assert write_validation_report(found, tmp_path / "a.html").read_bytes() == first
+    for needle in (b"<script", b"@import", b"<link", b"src=", b"url(http"):
+        assert needle not in first
+
+
+def test_sentences_say_who_knows_how_good_it_is(tmp_path, made_up):
+    found = made_up(outages=((20, 10),), runs=400)
+    text = text_of(write_validation_report(found, tmp_path / "a.html"))
+    assert "At the end of the outage, right knows how good its position is" in text
+    assert "bold believes its position to be better than it is" in text
+    assert "timid believes its position to be worse than it is" in text
+    assert "the horizontal error with bold is larger than with right: 3 times" in text
+
+
+def test_few_runs_tell_nothing(tmp_path, made_up):
+    found = made_up({"A": 1.0}, outages=((20, 10),), runs=1)
+    text = text_of(write_validation_report(found, tmp_path / "a.html"))
+    assert "At the end of the outage, A cannot be judged by so few runs" in text
+    assert "nan %" not in text
+
+
+@pytest.mark.parametrize(
+    ("outages", "dead"),
+    [
+        ((), ()),
+        ((), ("bold",)),
+        (((20, 10),), ("right",)),
+        (((20, 10),), ("right", "bold", "timid")),
+    ],
+)
+def test_a_page_without_outages_or_with_filters_that_diverged(tmp_path, outages, dead, made_up):
+    path = write_validation_report(made_up(outages=outages, dead=dead), tmp_path / "a.html")
+    assert text_of(path).count("diverged in 40 of 40 runs") == len(dead)
+
+
+def test_a_place_that_cannot_be_written(tmp_path, made_up):
+    with pytest.raises(InputError, match="cannot be written"):
+        write_validation_report(made_up({"A": 1.0}, (), 2), tmp_path / "no" / "a.html")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,111 @@
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.estimate.methods import fit
+from gmwm.ins.sensors import AXES
+from gmwm.process import BiasInstability
+from gmwm.recording import Recording
+from gmwm.study import navigation
+from gmwm.study.navigation import TABLE_5, TABLE_6, Calibrated, experiment, reproduce_figure
+from gmwm.variance.analysis import wavelet_variance
+
+RATE, N = 20.0, 60_000
+UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+def recording(model, seed=0, axes=AXES, n=N):
+    rng = np.random.default_rng(seed)
+    columns = {axis: sum(t.simulate(n, 1 / RATE, rng) for t in model.terms) for axis in axes}
+    return Recording.from_arrays(columns, RATE, UNITS, source="test.csv")
+
+
+@cache
+def calibrated(model):
+    given = recording(model)
+    kind = WhiteNoise() + BiasInstability() + RandomWalk()
+    lines = {axis: fit(kind, wavelet_variance(given[axis]), method="allan") for axis in AXES}
+    fits = {axis: fit(WhiteNoise(), wavelet_variance(given[axis])) for axis in AXES}
+    return Calibrated(lines, Calibration(fits, {}, "test.csv", RATE, N))
+
+
+def test_the_papers_tables_are_those_printed():
+    hour, micro = np.radians(1.0) / 3600.0, 1e-6 * 9.80665
+    gyro = {type(t): t for t in TABLE_6.models["gyro_x"].terms}
+    assert pytest.approx(140.0 * hour) == gyro[WhiteNoise].N
+    slow = [t for t in TABLE_6.models["gyro_x"].terms if isinstance(t, GaussMarkov)]
+    assert sorted(t.tau for t in slow) == [0.1, 20.0, 2000.0]
+    accel = TABLE_5.models["accel_z"].terms
+    assert pytest.approx(1e5 * micro) == accel[0].N
+    assert accel[1].sigma == pytest.approx(4e4 * micro)
+
+
+def test_lines_give_white_noise_and_a_walk_where_there_are_both():
+    walking = calibrated(WhiteNoise(1e-3) + RandomWalk(3e-4)).line_models()
+    for axis in AXES:
+        params = walking.models[axis].params
+        assert set(params) == {"N", "K"}
+        # Lines read at the ends of the plot are biased by what is between them: within a third.
+        assert params["N"] == pytest.approx(1e-3, rel=0.33)
+        assert params["K"] == pytest.approx(3e-4, rel=0.7)
+
+
+def test_an_experiment_has_a_filter_for_each_calibration():
+    found = calibrated(WhiteNoise(1e-3) + RandomWalk(3e-4))
+    simulated = experiment("car", found, 3, 5)
+    assert list(simulated.filters) == ["GMWM", "AV", "KF-tuned", "truth"]
+    assert simulated.truth is TABLE_6
+    assert (simulated.runs, simulated.seed) == (3, 5)
+    real = experiment("car", found, 3, 5, [recording(WhiteNoise(1e-3) + RandomWalk(3e-4), 1)] * 2)
+    assert list(real.filters) == ["GMWM", "AV", "AV x 10"]
+    assert real.truth is None
+    ten, one = (real.filters[name].models["gyro_x"].params for name in ("AV x 10", "AV"))
+    assert ten == {name: pytest.approx(10.0 * each) for name, each in one.items()}
+    assert real.filters["AV"].bias_sd["gyro_x"] > 0.0
+    assert real.filters["GMWM"].bias_sd["gyro_x"] == 0.0
+
+
+@pytest.mark.parametrize("figure", ["fig5", "fig6"])
+def test_a_gyro_is_drawn(tmp_path, monkeypatch, figure):
+    found = calibrated(WhiteNoise(1e-3) + RandomWalk(3e-4))
+    monkeypatch.setattr(Calibrated, "of", lambda given: found)
+    given = [recording(WhiteNoise(1e-3) + RandomWalk(3e-4), n=100)]
+    text, paths = reproduce_figure(figure, tmp_path, runs=None, seed=0, jobs=1, recordings=given)
+    assert "gyro_x" in text
+    assert [path.name for path in paths] == [f"{figure}.png", f"{figure}.svg"]
+    assert all(path.stat().st_size > 1000 for path in paths)
+
+
+@pytest.mark.parametrize("figure", ["fig7", "fig8", "fig9"])
+def test_a_study_is_drawn_and_its_table_kept(tmp_path, monkeypatch, made_up, figure):
+    monkeypatch.setattr(Calibrated, "of", lambda given: None)
+    short = recording(WhiteNoise(1e-3) + RandomWalk(3e-4), n=100)
+    monkeypatch.setattr(navigation, "static_recording", lambda seed: short)
+    asked = {}
+
+    def remembered(vehicle, calibrated, runs, seed, recordings):
+        asked.update(vehicle=vehicle, runs=runs, seed=seed)
+
+    monkeypatch.setattr(navigation, "experiment", remembered)
+    validation = made_up(runs=5)
+    monkeypatch.setattr(navigation.Validation, "of", lambda *args, **options: validation)
+    text, paths = reproduce_figure(figure, tmp_path, runs=7, seed=3, jobs=1)
+    assert asked == {"vehicle": "car" if figure == "fig9" else "helicopter", "runs": 7, "seed": 3}
+    assert (tmp_path / f"{figure}.txt").read_text() == text + "\n" == str(validation) + "\n"
+    assert {path.suffix for path in paths} == {".txt", ".png", ".svg"}
+
+
+def test_recordings_that_cannot_be_used_are_refused_before_they_are_calibrated(tmp_path):
+    model = WhiteNoise(1e-3) + RandomWalk(3e-4)
+    for figure, given, message in (
+        ("fig7", [recording(model, n=100)], "two recordings or more"),
+        ("fig5", [recording(model, axes=AXES[1:], n=100)], "no channel gyro_x"),
+        ("fig9", [recording(model, axes=AXES[:5], n=100)] * 2, "no channel accel_z"),
+    ):
+        with pytest.raises(InputError, match=message):
+            reproduce_figure(figure, tmp_path, runs=2, seed=0, jobs=1, recordings=given)
+    assert list(tmp_path.iterdir()) == []
