@@ -104,9 +104,10 @@ class Calibrated:
 
 def _from_lines(fitted: Fit) -> Model:
     regions = {region.key: region for region in fitted.regions}
-    if "N" not in regions:
-        raise InputError(f"{fitted.wv.name}: the Allan plot has no line of slope -1/2")
-    terms: list[Process] = [WhiteNoise(fitted.params["N"])]
+    wv = fitted.wv
+    at_one = float(np.exp(np.interp(0.0, np.log(wv.tau), np.log(wv.allan_deviation))))
+    # Without a line of slope -1/2, N is what the plot shows at 1 s.
+    terms: list[Process] = [WhiteNoise(fitted.params["N"] if "N" in regions else at_one)]
     if "K" in regions:
         terms.append(RandomWalk(fitted.params["K"]))
     elif "B" in regions:
