@@ -155,10 +155,11 @@ class Validation:
     def _head(self) -> list[str]:
         truth, runs = self.study.truth, self.study[self.names[0]].runs
         word = "run" if runs == 1 else "runs"
-        lines = [
+        first = (
             f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
             f"{word}, seed {self.experiment.seed}"
-        ]
+        )
+        lines = textwrap.wrap(first, _WIDTH, subsequent_indent="  ")
         for note in (*self.study.notes, *self.divergences):
             lines += textwrap.wrap(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
         return lines
