@@ -67,7 +67,14 @@ def test_a_longer_study_begins_with_the_shorter_one(reference):
 
 
 def test_the_result_does_not_depend_on_workers(reference):
-    assert_same(study(25, jobs=2)["good"], reference)
+    """But for the last digit: vector instructions follow the alignment of arrays."""
+    found = study(25, jobs=2)["good"]
+    for each in fields(Runs):
+        expected = getattr(reference, each.name)
+        scale = np.nanmax(np.abs(expected)) if expected.dtype == float else 0.0
+        np.testing.assert_allclose(
+            getattr(found, each.name), expected, rtol=1e-7, atol=1e-9 * scale
+        )
 
 
 @pytest.mark.parametrize("chunk", [1, 4, 100])
