@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from scipy.stats import chi2
 
 from gmwm._typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate.discrepancy import chi_square
 from gmwm.estimate.fit import Fit
+from gmwm.estimate.goodness import FittedMoments
 from gmwm.process import Model
 from gmwm.variance.pooled import PooledVariance
 from gmwm.variance.wavelet import WaveletVariance
@@ -31,6 +33,9 @@ class JointFit(Fit):
     equality_p : float
         p-value of the test that the parameters are equal in all recordings; NaN where fewer than
         two of them determine the parameters.
+    curves_p : float
+        p-value of the test that the wavelet variances of each recording are those of the joint
+        model, to within the discrepancy granted to it; it judges the model too.
     spread : dict
         Standard deviation of each parameter between recordings beyond their standard errors, by
         key: relative for positive parameters, in its SI unit for others.
@@ -38,6 +43,7 @@ class JointFit(Fit):
 
     parts: tuple[Fit, ...] = ()
     equality_p: float = float("nan")
+    curves_p: float = float("nan")
     spread: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
@@ -60,8 +66,8 @@ class JointFit(Fit):
         """How many recordings there are, and whether they agree."""
         said = f"{len(self.parts)} recordings"
         if np.isfinite(self.equality_p):
-            said += f", equality of the parameters: p = {self.equality_p:.2g}"
-        return said
+            return f"{said}, equality of the parameters: p = {self.equality_p:.2g}"
+        return f"{said}, each as the joint model has it: p = {self.curves_p:.2g}"
 
     def _spread_text(self, key: str, value: float | None) -> str:
         if value is None:
@@ -78,6 +84,7 @@ class JointFit(Fit):
             **super().to_dict(),
             "parts": [part.to_dict() for part in self.parts],
             "equality_p": None if np.isnan(self.equality_p) else self.equality_p,
+            "curves_p": None if np.isnan(self.curves_p) else self.curves_p,
             "spread": self.spread,
         }
 
@@ -109,7 +116,17 @@ def fit_joint(
     whole = method(model, pooled, **options)
     each = tuple(method(model, part, **options) for part in parts)
     p_value, spread = _heterogeneity(whole, each)
+    curves_p = _curves_test(whole, each)
     remarks = whole.remarks
+    unlike = p_value < _SIGNIFICANT
+    if np.isnan(p_value) and curves_p < _SIGNIFICANT:
+        # Where the parameters cannot be compared, the curves can.
+        unlike = True
+        remarks = (
+            *remarks,
+            "the wavelet variances of the recordings are not those of the joint model (p = "
+            f"{curves_p:.2g}): the recordings differ, or the model does",
+        )
     if p_value < _SIGNIFICANT:
         remarks = (
             *remarks,
@@ -117,8 +134,23 @@ def fit_joint(
             "are their mean, see the spread",
         )
     values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
-    values |= {"remarks": remarks, "valid": whole.valid and not p_value < _SIGNIFICANT}
-    return JointFit(**values, parts=each, equality_p=p_value, spread=spread)
+    values |= {"remarks": remarks, "valid": whole.valid and not unlike}
+    return JointFit(**values, parts=each, equality_p=p_value, curves_p=curves_p, spread=spread)
+
+
+def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
+    """Chi-square test of all recordings' wavelet variances against the joint model."""
+    statistic, levels = 0.0, 0
+    for part in each:
+        found = FittedMoments.of(
+            replace(part, model=whole.model, keys=whole.keys, discrepancy=whole.discrepancy)
+        )
+        if np.any(found.implied <= 0.0):
+            return float("nan")
+        statistic += chi_square(found.target, found.implied, found.covariance, found.implied)[1]
+        levels += found.target.size
+    dof = levels - len(whole.keys)
+    return float(chi2.sf(statistic, dof)) if dof > 0 else float("nan")
 
 
 def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:

@@ -82,6 +82,7 @@ def _joint(content: Mapping[str, Any]) -> JointFit:
         **values,
         parts=parts,
         equality_p=_number("equality_p", content["equality_p"]),
+        curves_p=_number("curves_p", content.get("curves_p")),
         spread={key: _number(key, value) for key, value in content["spread"].items()},
     )
 

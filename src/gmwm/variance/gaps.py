@@ -42,7 +42,7 @@ class _Grid:
     centred: FloatArray  # pairs of all coarser levels whose centres coincide
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _grids(runs: Runs, averaging: tuple[float, ...]) -> tuple[_Grid, ...]:
     m = np.array(averaging, dtype=int)
     grids = []
