@@ -94,8 +94,9 @@ def errors(
     """
     import matplotlib.pyplot as plt
 
-    d, columns = len(labels), min(len(panels), _BESIDE)
+    d = len(labels)
     blocks = -(-len(panels) // _BESIDE)
+    columns = -(-len(panels) // blocks)
     figure, axes = plt.subplots(
         blocks * d, columns, figsize=(_PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d),
         sharex=True, layout="constrained", squeeze=False,
