@@ -11,6 +11,7 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
+from gmwm import checks
 from gmwm.diagnosis import Finding
 from gmwm.doubt import wider_ranges
 from gmwm.errors import InputError
@@ -305,6 +306,12 @@ def calibrate(
 def _check_together(recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise InputError("there is no recording: give one at least")
+    for each in recordings:
+        if not isinstance(each, Recording):
+            raise InputError(
+                f"{checks.shown(each)} is no recording: give what gmwm.read returns, or make one "
+                "with Recording.from_arrays"
+            )
     first = recordings[0]
     for other in recordings[1:]:
         if abs(other.rate / first.rate - 1.0) > _SAME_RATE:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm import checks
 from gmwm._typing import FloatArray
 from gmwm.diagnosis.arrays import BoolArray
 from gmwm.diagnosis.contamination import contamination, contamination_finding
@@ -21,6 +22,7 @@ from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_finding
 from gmwm.diagnosis.samples import dead_finding, gap_findings, saturation_finding, stuck_finding
 from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM
 from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.errors import InputError
 from gmwm.recording import Channel, Recording
 
 Progress = Callable[[str], None]
@@ -71,6 +73,11 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     >>> found.masked(rec)["gyro_x"].is_complete
     False
     """
+    if not isinstance(recording, Recording):
+        raise InputError(
+            f"{checks.shown(recording)} is no recording: give what gmwm.read returns, or make one "
+            "with Recording.from_arrays"
+        )
     whole = [_length(recording), *_reader_findings(recording), *_clock(recording)]
     examined: dict[str, _Examined] = {}
     for channel in recording:

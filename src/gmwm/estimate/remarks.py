@@ -107,7 +107,7 @@ def idle_remarks(
     this kind might have been found.
     """
     root = weight_root(covariance)
-    remarks = []
+    idle: list[tuple[float, str]] = []
     amplitudes = design.amplitudes(point.x)
     for i in design.shaped:
         others = [k for k in range(len(design.terms)) if k != i]
@@ -118,11 +118,13 @@ def idle_remarks(
         without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
         freed = 1 + int(np.sum(design.terms[i].free_shape))
         if without - point.objective < chi2.isf(_IDLE_P / target.size, freed):
-            remarks.append(
+            remark = (
                 f"a {design.terms[i].process.title()} term does not improve the fit significantly: "
                 "it is not identifiable, leave it out"
             )
-    return remarks
+            idle.append((without, remark))
+    # Of several alike, each can stand in for another: one of them is too many, not all.
+    return [min(idle)[1]] if idle else []
 
 
 def undetermined_remarks(model: Model, keys: tuple[str, ...], matrix: FloatArray) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._typing import FloatArray
 from gmwm.ins.covariance_kernels import carry, take_in, tilt_squared, transition
 from gmwm.ins.earth import gravity
-from gmwm.ins.filter_kernels import IS_HEIGHT, IS_POSITION, measurement_row
+from gmwm.ins.filter_kernels import IS_HEIGHT, IS_POSITION, IS_VELOCITY, measurement_row
 from gmwm.ins.states import IntArray
 
 
@@ -138,7 +138,8 @@ def run_both(
                     truth = 9 + j_coloured[component]
                 take_in(P, h, state, sd * sd, 0.0, x, K)
                 take_in_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
-            gathered = j_gathered = 0.0
+            if kind in (IS_POSITION, IS_VELOCITY):
+                gathered = j_gathered = 0.0
             event += 1
         while out < out_epoch.size and out_epoch[out] == epoch[s]:
             out_P[out], out_J[out] = P, J

@@ -243,7 +243,7 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
     filter expects. Mean and variance of the square follow from the covariance of the tilt, as in
     the Gaussian second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*,
     sec. 9.3). The tilt hardly changes from step to step, so standard deviations add up, not
-    variances, until a measurement corrects it.
+    variances, until a fix corrects it; heights and standstills do not show it.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
     step : float
         s.
     gathered : float
-        Standard deviation of the velocity error of this kind since the last measurement, m/s.
+        Standard deviation of the velocity error of this kind since the last GNSS fix, m/s.
 
     Returns
     -------

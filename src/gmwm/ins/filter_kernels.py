@@ -228,7 +228,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
             _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
                   out_sensor_P)  # fmt: skip
             out += 1
-        measured = False
+        measured = of_gnss = False
         if event < n_events and event_epoch[event] == epoch:
             measured = True
             if epoch > 0:
@@ -238,6 +238,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                     rate[i] = rotation[0, i] / dt
         while event < n_events and event_epoch[event] == epoch:
             kind = event_kind[event]
+            of_gnss = of_gnss or kind in (IS_POSITION, IS_VELOCITY)
             components = 1 if kind == IS_HEIGHT else 3
             for component in range(components):
                 sd = event_sd[event, component]
@@ -258,7 +259,8 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                 x[i] += estimated[9 + i]
                 estimated[9 + i] = 0.0
             correct(C, v, lla, estimated)
-            gathered = 0.0
+            if of_gnss:
+                gathered = 0.0
         while out < n_out and out_epoch[out] == epoch:
             _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
                   out_sensor_P)  # fmt: skip

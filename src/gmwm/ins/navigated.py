@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _WIDTH = 80
 _DOUBT = 0.001  # probability below which innovations contradict the model
+_LOST = 5.0  # times the expected size of innovations
 _MOSTLY_FINE = 1.5  # NIS by the median
 _COLUMNS = (
     "time_s", "latitude_deg", "longitude_deg", "height_m",
@@ -161,9 +162,21 @@ class Navigated:
     @property
     def fits(self) -> bool:
         """Whether the innovations do not contradict the filter's model."""
-        test = self.test()
-        whiteness = np.isnan(test.whiteness) or test.whiteness > _DOUBT
-        return self.solution.diverged_at is None and test.nis.p_value > _DOUBT and bool(whiteness)
+        # Kind by kind: too large positions and too small velocities must not make each other good.
+        return self.solution.diverged_at is None and not self._misfits and self._is_white
+
+    @property
+    def _misfits(self) -> dict[str, float]:
+        """Kinds whose innovations have another size than expected -> how many times it is."""
+        tests = {kind: self.test(kind).nis for kind in self.kinds}
+        tests["all"] = self.test().nis
+        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= _DOUBT}
+        return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
+
+    @property
+    def _is_white(self) -> bool:
+        whiteness = self.test().whiteness
+        return bool(np.isnan(whiteness) or whiteness > _DOUBT)
 
     @property
     def verdict(self) -> str:
@@ -178,32 +191,45 @@ class Navigated:
                 "The innovations do not contradict the filter's model: they are as large as it "
                 "expects, and white."
             )
-        test = self.test()
-        size = test.nis.value
-        if test.nis.p_value <= _DOUBT and size > 1.0:
-            cause = (
-                "the sensors are worse than their models say, or the fixes than their standard "
-                "deviations"
-            )
-            if self._usual_size < _MOSTLY_FINE:
-                cause = (
-                    "most are not, so that some fixes are outliers, or errors without fixes grow "
-                    "faster than the sensor models say"
-                )
+        sizes = self._misfits
+        if sizes and max(sizes.values()) > _LOST:
             return (
-                f"The filter's model does not fit: innovations are {np.sqrt(size):.2g} times as "
-                f"large as it expects; {cause}."
+                f"The filter is lost: innovations are {max(sizes.values()):.2g} times as large as "
+                "it expects, and the accuracy that it predicts is not to be believed; look first "
+                "at the heading that it started with, then at the units of the sensors and the "
+                "clock of the fixes."
             )
-        if test.nis.p_value <= _DOUBT:
-            return (
-                f"The filter's model does not fit: innovations are only {np.sqrt(size):.2g} times "
-                "as large as it expects; the sensors are better than their models say, or the "
-                "fixes than their standard deviations."
+        if sizes:
+            told = " and ".join(
+                f"{size:.2g} times as large{'' if kind == 'all' else f' in {kind}'}"
+                for kind, size in sizes.items()
+            )
+            return f"The filter's model does not fit: innovations are {told} as it expects; " + (
+                self._cause(sizes) + "."
             )
         return (
             "The filter's model does not fit: innovations are as large as it expects, but depend "
             "on those before; the errors of the fixes are coloured, or a slow error of the "
             "sensors is missing in their models."
+        )
+
+    def _cause(self, sizes: dict[str, float]) -> str:
+        """What innovations of these sizes may come from."""
+        if min(sizes.values()) < 1.0 < max(sizes.values()):
+            return "the standard deviations of the fixes do not go together"
+        if max(sizes.values()) < 1.0:
+            return (
+                "the sensors are better than their models say, or the fixes than their standard "
+                "deviations"
+            )
+        if self._usual_size < _MOSTLY_FINE:
+            return (
+                "most are not, so that some fixes are outliers, or errors without fixes grow "
+                "faster than the sensor models say"
+            )
+        return (
+            "the sensors are worse than their models say, or the fixes than their standard "
+            "deviations"
         )
 
     # -- words and files --------------------------------------------------------------------------
@@ -231,10 +257,11 @@ class Navigated:
 
     def _accuracy(self) -> list[str]:
         lines = []
-        if self.solution.time.size:
+        if self.solution.time.size and self.solution.diverged_at is None:
             sd = self.solution.sd[-1]
+            doubt = "" if self.fits else " (if its model were right, which it is not)"
             lines += [
-                "Predicted accuracy at the end, 1 sigma",
+                f"Predicted accuracy at the end, 1 sigma{doubt}",
                 f"horizontal {np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
                 f"{np.linalg.norm(sd[3:6]):.3g} m/s,",
                 f"tilt {np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "

@@ -153,6 +153,6 @@ def _judged(found: Sequence[Ratio]) -> str:
     elif not all(ratio.upper - ratio.lower < _TELLING for ratio in found):
         verdict = "cannot be judged by so few runs"
     else:
-        verdict = "knows how good its position is"
+        verdict = "shows no contradiction between its position errors and what it predicts"
     values = ", ".join(f"{ratio.value:.3g}" for ratio in found)
     return f"{verdict} (NEES per degree of freedom {values})"

@@ -31,7 +31,10 @@ def test_the_page_needs_no_network_and_is_the_same_each_time(tmp_path, made_up):
 def test_sentences_say_who_knows_how_good_it_is(tmp_path, made_up):
     found = made_up(outages=((20, 10),), runs=400)
     text = text_of(write_validation_report(found, tmp_path / "a.html"))
-    assert "At the end of the outage, right knows how good its position is" in text
+    assert (
+        "At the end of the outage, right shows no contradiction between its position errors and "
+        "what it predicts" in text
+    )
     assert "bold believes its position to be better than it is" in text
     assert "timid believes its position to be worse than it is" in text
     assert "the horizontal error with bold is larger than with right: 3 times" in text
