@@ -224,7 +224,10 @@ def joint_table(together: Calibration) -> str:
     ]
     for name in CHANNELS:
         fit = together[name]
-        equal = f"{fit.equality_p:.2g}" if isinstance(fit, JointFit) else "-"
+        p = fit.equality_p if isinstance(fit, JointFit) else float("nan")
+        if isinstance(fit, JointFit) and np.isnan(p):
+            p = fit.curves_p
+        equal = f"{p:.2g}"
         cells = "".join(f"{held(fit, part) + off(fit, part):>28}" for part in parts_of(fit))
         lines.append(f"{name:9}{'yes' if fit.valid else 'no':>6} {equal:>9}{cells}")
     return "\n".join([*lines, ""])
