@@ -139,7 +139,7 @@ class Validation:
         blocks.append(["NEES per degree of freedom: 1 if the filter knows how good it is, * out of "
                        "band", *self._nees_rows(width)])  # fmt: skip
         if self.study.outages:
-            blocks.append(["Position errors within predicted intervals at the ends of outages, %",
+            blocks.append(["Position errors within predicted intervals, %",
                            *self._coverage_rows(width)])  # fmt: skip
         blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
                        *self._innovation_rows(width)])  # fmt: skip
@@ -178,15 +178,18 @@ class Validation:
                 )
         return rows
 
+    def _judgements(self, name: str) -> list[tuple[str, Consistency]]:
+        """Consistency of a filter with GNSS and at the ends of the outages."""
+        ends = zip(self.study.outages, self.at_ends(name), strict=True)
+        return [
+            ("GNSS on", self.with_gnss(name)),
+            *((f"at {outage.end:g} s", each) for outage, each in ends),
+        ]
+
     def _nees_rows(self, width: int) -> list[str]:
         rows = [f"{'filter':{width}} {'':12}" + "".join(f"{g:>12}" for g in _GROUPS)]
         for name in self.names:
-            cases = [("GNSS on", self.with_gnss(name))]
-            cases += [
-                (f"at {outage.end:g} s", each)
-                for outage, each in zip(self.study.outages, self.at_ends(name), strict=True)
-            ]
-            for label, consistency in cases:
+            for label, consistency in self._judgements(name):
                 cells = [_starred(consistency, group) for group in _GROUPS]
                 rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
         return rows
@@ -195,12 +198,11 @@ class Validation:
         heads = [f"{100.0 * level:g} %" for level in LEVELS]
         rows = [f"{'filter':{width}} {'':12}" + "".join(f"{head + ' ':>12}" for head in heads)]
         for name in self.names:
-            for outage, found in zip(self.study.outages, self.at_ends(name), strict=True):
+            for label, found in self._judgements(name):
                 cells = [
                     "- " if np.isnan(c.share) else f"{100.0 * c.share:.1f}" + " *"[not c.within]
                     for c in found.coverage["position"]
                 ]
-                label = f"at {outage.end:g} s"
                 rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
         return rows
 
