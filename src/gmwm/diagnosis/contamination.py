@@ -62,6 +62,6 @@ def contamination_finding(name: str, share: float) -> Finding | None:
         name, "outliers", "warning",
         f"{100.0 * share:.2g} % of the samples are outliers spread over the record, beyond four "
         f"standard deviations, where noise has {100.0 * _NOISE:.2g} %",
-        "use robust wavelet variances (robust=True)",
+        "gmwm calibrate takes robust wavelet variances (in Python robust=True)",
         {"share": share},
     )  # fmt: skip

@@ -104,7 +104,7 @@ def event_finding(
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
         text += f" (others at {', '.join(others)} s)"
     action = (
-        "leave it out with Health.masked, or use robust=True"
+        "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True"
         if harmful
         else "too small to change the variance; Health.masked leaves it out"
     )

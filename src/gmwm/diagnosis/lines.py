@@ -109,7 +109,7 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
         findings.append(
             Finding(
                 name, "line", "warning", text,
-                "add a Sinusoid to the model, or find what turns or hums",
+                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
                 {
                     "frequency": main.frequency,
                     "amplitude": main.amplitude,

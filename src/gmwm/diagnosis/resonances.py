@@ -106,7 +106,7 @@ def resonance_finding(name: str, unit: str, bump: Bump) -> Finding:
         f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
         f"{bump.ratio:.2g} times its surroundings, {spoken(bump.sigma, unit)} rms"
     )
-    action = "add a Resonance to the model if its frequency is within the band that you use"
+    action = "gmwm calibrate adds a Resonance to the model where it is needed"
     numbers = {
         "frequency": bump.frequency,
         "damping": bump.damping,

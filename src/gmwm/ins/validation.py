@@ -240,7 +240,8 @@ class Validation:
 
         truth, start = self.study.truth, self.study.truth.lla[0]
         whole = ned_difference(truth.lla[:: max(round(1.0 / truth.dt), 1)], start)
-        parts, solutions = [], {name: [] for name in self.names}  # type: ignore[var-annotated]
+        parts: list[FloatArray] = []
+        solutions: dict[str, list[FloatArray]] = {name: [] for name in self.names}
         for outage in self.study.outages:
             first, last = round(outage.start / truth.dt), round(outage.end / truth.dt)
             every = max(round(0.1 / truth.dt), 1)

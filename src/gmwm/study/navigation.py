@@ -228,10 +228,12 @@ def reproduce_figure(
         )
     calibrated = Calibrated.of(first)
     if figure in _OF_ONE_GYRO:
+        import matplotlib.pyplot as plt
+
         shown = calibrated.lines[_SHOWN] if figure == "fig5" else calibrated.gmwm[_SHOWN]
-        drawn = shown.plot().get_figure()
-        assert drawn is not None
-        return str(shown), _saved(drawn, folder / figure)  # type: ignore[arg-type]
+        drawn, axes = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+        shown.plot(axes)
+        return str(shown), _saved(drawn, folder / figure)
     vehicle = "car" if figure == "fig9" else "helicopter"
     validation = Validation.of(
         experiment(vehicle, calibrated, runs or _RUNS, seed, recordings[1:]),
