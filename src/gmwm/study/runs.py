@@ -258,11 +258,15 @@ def _here(work: Callable[[int], list[Row]], todo: Sequence[int], jobs: int) -> R
 def _on_cluster(work: Callable[[int], list[Row]], todo: Sequence[int], address: str) -> Rows:
     try:
         from distributed import Client, as_completed
+        from distributed.comm import parse_address
+        from distributed.comm.registry import get_backend
     except ImportError:
         raise InputError(
             "a cluster needs Dask: install it with pip install 'gmwm[cluster]'"
         ) from None
     try:
+        # A scheme that nobody speaks is refused before any thread is started.
+        get_backend(parse_address(address)[0])
         client = Client(address, timeout="10s")
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None
