@@ -258,7 +258,7 @@ def _here(work: Callable[[int], list[Row]], todo: Sequence[int], jobs: int) -> R
 def _on_cluster(work: Callable[[int], list[Row]], todo: Sequence[int], address: str) -> Rows:
     try:
         from distributed import Client, as_completed
-        from distributed.comm import parse_address
+        from distributed.comm.addressing import parse_address
         from distributed.comm.registry import get_backend
     except ImportError:
         raise InputError(
