@@ -14,12 +14,12 @@ from time import process_time
 import numpy as np
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.analysis import covariance_analysis
-from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.scenario import Scenario, Simulated
-from gmwm.ins.sensors import SensorModels
-from gmwm.ins.trials import monte_carlo
+from gmwm.ins.covariance.analysis import covariance_analysis
+from gmwm.ins.filter.aiding import Outage, gnss
+from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.montecarlo.scenario import Scenario, Simulated
+from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.trajectory.missions import helicopter_mapping
 
 RUNS = 50
 REPEATS = 5

@@ -16,13 +16,13 @@ from time import perf_counter, process_time
 import numpy as np
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.aiding import gnss
-from gmwm.ins.emulation import emulate
-from gmwm.ins.filter import Filter, InitialSd, Outputs
-from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.scenario import Scenario, Simulated
-from gmwm.ins.sensors import AXES, SensorModels
-from gmwm.ins.trials import monte_carlo
+from gmwm.ins.filter.aiding import gnss
+from gmwm.ins.filter.filter import Filter, InitialSd, Outputs
+from gmwm.ins.imu.emulation import emulate
+from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.montecarlo.scenario import Scenario, Simulated
+from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.trajectory.missions import helicopter_mapping
 
 TAUS = (0.5, 5.0, 30.0, 300.0, 1000.0)
 REPEATS = 5

@@ -13,10 +13,10 @@ from time import perf_counter
 import numpy as np
 
 from gmwm import WhiteNoise
-from gmwm.variance.covariance import dyadic_levels, haar_covariance
+from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance
+from gmwm.variance.covariance.robust import robust_covariance
 from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
 from gmwm.variance.robust import EFFICIENCY, robust_variance
-from gmwm.variance.robust_covariance import robust_covariance
 
 SAMPLES = 1_000_000
 REPEATS = 7

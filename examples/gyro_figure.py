@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import gmwm
-from gmwm.demo import simulated_imu
+from gmwm.study.demo import simulated_imu
 
 recording, truth = simulated_imu(4 * 3600.0, seed=1)
 fit = gmwm.select(recording["gyro_x"]).fit

@@ -32,9 +32,9 @@ from real_data_recording import (
 
 import gmwm
 from gmwm import Calibration, Fit, JointFit
-from gmwm.selection import describe
-from gmwm.summary import floor, white_density
-from gmwm.units import field_units
+from gmwm._core.units import field_units
+from gmwm.calibration.summary import floor, white_density
+from gmwm.selection.select import describe
 
 KNOCKED = 4  # the recording with the knock
 FEWEST_DOF = 30.0  # of a level whose misfit counts

@@ -22,7 +22,7 @@ from real_data_recording import (
 )
 
 from gmwm import Calibration, Fit
-from gmwm.plot import COMPONENT_COLOURS, SUM_COLOUR, deviation_range
+from gmwm.plotting.deviation import COMPONENT_COLOURS, SUM_COLOUR, deviation_range
 
 SECONDS_SHOWN = 4.0  # around the knock
 MARKERS = ("o", "^", "s", "D")

@@ -3,24 +3,26 @@
 import numpy as np
 
 import gmwm
-from gmwm import Parameter, SimulatedProcess, WhiteNoise
+from gmwm import Process, WhiteNoise, parameter
 
 
-class RoundedNoise(SimulatedProcess):
+class RoundedNoise(Process):
     """White noise behind a converter whose steps are as large as the noise."""
 
-    parameters = (Parameter("sigma", "u"), Parameter("lsb", "u"))
+    sigma: float = parameter("u")
+    lsb: float = parameter("u")
 
-    def _draw(self, n, dt, rng):
+    def draw(self, n, dt, rng):
         return self.lsb * np.rint(self.sigma / self.lsb * rng.standard_normal(n))
 
 
-class HeldBias(SimulatedProcess):
+class HeldBias(Process):
     """Bias instability as a value that is held for a time and then drawn anew."""
 
-    parameters = (Parameter("level", "u", role="scale"), Parameter("hold", "s"))
+    level: float = parameter("u", role="scale")
+    hold: float = parameter("s")
 
-    def _draw(self, n, dt, rng):
+    def draw(self, n, dt, rng):
         length = max(round(self.hold / dt), 1)
         blocks = self.level * rng.standard_normal(-(-n // length) + 1)
         start = int(rng.integers(length))

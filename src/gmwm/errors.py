@@ -1,4 +1,4 @@
-"""The exceptions of the package."""
+"""The exceptions and warnings of the package."""
 
 
 class InputError(ValueError):
@@ -6,4 +6,28 @@ class InputError(ValueError):
 
     The message is one sentence that says what is wrong, where, and how to mend it. The command
     line prints it and exits with code 2.
+
+    Parameters
+    ----------
+    text : str
+        The message.
+    code : str, optional
+        What kind of thing is wrong, for programs.
+    """
+
+    def __init__(self, text: str, code: str = "") -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class MissingNameError(InputError, KeyError):
+    """A name that a mapping does not have."""
+
+    __str__ = InputError.__str__
+
+
+class FitWarning(UserWarning):
+    """A fit that is not valid was returned; ``fit.notices`` say why.
+
+    ``warnings.simplefilter("ignore", gmwm.FitWarning)`` switches it off.
     """

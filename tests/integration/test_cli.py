@@ -14,13 +14,15 @@ from click.testing import CliRunner
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise, cli
-from gmwm.calibration import Calibration
-from gmwm.estimate.fit import Fit
+from gmwm._core.units import SI_UNIT
+from gmwm.calibration.calibration import Calibration
+from gmwm.cli.calibrate import show
+from gmwm.cli.demo import show_truth
+from gmwm.estimate.result.fit import Fit
 from gmwm.process import as_model
-from gmwm.units import SI_UNIT
 from gmwm.variance.wavelet import WaveletVariance
+from places import GOLDEN
 
-GOLDEN = Path(__file__).parents[1] / "golden"
 WIDTH = 80
 SI = ("--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
 RATE = ("--rate", "100")
@@ -47,7 +49,7 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 def run_process(*arguments, cwd):
-    command = [sys.executable, "-m", "gmwm.cli", *arguments]
+    command = [sys.executable, "-m", "gmwm", *arguments]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120)
 
 
@@ -487,7 +489,7 @@ def test_exit_code_of_the_process(tmp_path):
 def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     # As in "gmwm calibrate ... | head -1".
     (tmp_path / "f.csv").write_text("\n".join(good_lines()))
-    command = [sys.executable, "-m", "gmwm.cli", "calibrate", "f.csv", *ALL, "-o", "out"]
+    command = [sys.executable, "-m", "gmwm", "calibrate", "f.csv", *ALL, "-o", "out"]
     read_end, write_end = os.pipe()
     os.close(read_end)
     try:
@@ -648,7 +650,7 @@ def test_table_of_every_kind_of_parameter(capsys):
         valid=False,
         remarks=["the model differs from the data by more than their statistical errors"],
     )
-    cli._show(
+    show(
         made_up_calibration(
             gyro,
             accel,
@@ -670,7 +672,7 @@ def test_table_of_truth_beside_estimate(capsys):
     other = {key: errors[key] for key in ("N", "sigma_1", "tau_1")}
     bound = made_up("gyro_y", DEMO_TRUTH.with_params(nil), other, {"sigma_2": 5e-4})
     truth = dict.fromkeys(("gyro_x", "gyro_y"), DEMO_TRUTH)
-    cli._show_truth(made_up_calibration(gyro, bound), truth)
+    show_truth(made_up_calibration(gyro, bound), truth)
     assert stripped(capsys.readouterr().out) == golden("cli_truth.txt")
 
 
@@ -680,9 +682,9 @@ def test_no_number_or_name_is_cut_off(capsys):
     errors = {"N": 1e-4, "sigma_1": 1e-4, "tau_1": 1e-3, "sigma_2": 1e-5, "tau_2": 200.0}
     names = [f"accel_{axis}" for axis in "xyz"]
     fits = [made_up(name, DEMO_TRUTH.with_params(values), errors, valid=False) for name in names]
-    cli._show_truth(made_up_calibration(*fits), dict.fromkeys(names, DEMO_TRUTH))
+    show_truth(made_up_calibration(*fits), dict.fromkeys(names, DEMO_TRUTH))
     truth = capsys.readouterr().out
-    cli._show(made_up_calibration(*fits))
+    show(made_up_calibration(*fits))
     table = capsys.readouterr().out
     for printed in (truth, table):
         assert "…" not in printed

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.earth import ned_difference
-from gmwm.ins.emulation import emulate
-from gmwm.ins.filter import InitialSd, navigate
-from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.sensors import SensorModels
+from gmwm.ins.filter.aiding import Outage, gnss
+from gmwm.ins.filter.filter import InitialSd, navigate
+from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.imu.emulation import emulate
+from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.trajectory.missions import helicopter_mapping
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from gmwm import WhiteNoise, cli
-from gmwm.calibration import Calibration
-from gmwm.estimate.methods import fit
-from gmwm.ins.sensors import AXES
-from gmwm.recording import Channel
+from gmwm.calibration.calibration import Calibration
+from gmwm.estimate.entrance import fit
+from gmwm.ins.imu.sensors import AXES
+from gmwm.readers.recording import Channel
 from gmwm.variance.analysis import wavelet_variance
 
 MODELS = {"gyro": {"N": "140 deg/h/sqrt(Hz)"}, "accel": {"N": "140 ug/sqrt(Hz)"}}

@@ -10,14 +10,14 @@ import pytest
 from scipy.stats import binom
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.analysis import covariance_analysis
-from gmwm.ins.consistency import at_epoch, innovation_test, over_time
-from gmwm.ins.missions import helicopter_mapping
-from gmwm.ins.outage_errors import difference, sizes, spread
-from gmwm.ins.scenario import Scenario, Simulated
-from gmwm.ins.sensors import SensorModels
-from gmwm.ins.trials import monte_carlo
+from gmwm.ins.covariance.analysis import covariance_analysis
+from gmwm.ins.filter.aiding import Outage, gnss
+from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.montecarlo.consistency import at_epoch, innovation_test, over_time
+from gmwm.ins.montecarlo.outage_errors import difference, sizes, spread
+from gmwm.ins.montecarlo.scenario import Scenario, Simulated
+from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.trajectory.missions import helicopter_mapping
 
 TRUE = SensorModels.of(
     {

@@ -4,17 +4,16 @@ The numbers are those of docs/real-data.md. The frequencies of the line were rea
 periodograms, independently of this package.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.signal import welch
 
 import gmwm
 from gmwm import Resonance, Sinusoid
-from gmwm.units import factor
+from gmwm._core.units import factor
+from places import SHARED
 
-ADIS = Path(__file__).resolve().parents[3] / "shared/data/adis16405"
+ADIS = SHARED / "data/adis16405"
 COLUMNS = {"gyro_x": 0, "gyro_y": 1, "gyro_z": 2, "accel_x": 3, "accel_y": 4, "accel_z": 5}
 LINES = {1: 0.565, 2: 0.568, 3: 0.540, 4: 0.534}
 MG = factor("mg", "m/s^2")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gmwm.ins import MonteCarlo, Outage, Runs, car_drive
-from gmwm.ins.rotation import matrix_from_rpy
-from gmwm.ins.solution import Solution
-from gmwm.ins.validation import Validation
+from gmwm.ins.filter.solution import Solution
+from gmwm.ins.geometry.rotation import matrix_from_rpy
+from gmwm.ins.montecarlo.validation import Validation
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}
 """Name -> true errors in units of the predicted ones."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm import checks
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import BoolArray
+from gmwm._core import checks
+from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis.contamination import contamination, contamination_finding
 from gmwm.diagnosis.drift import drift_finding, variance_finding
 from gmwm.diagnosis.events import event_finding, find_events
@@ -20,13 +18,9 @@ from gmwm.diagnosis.pairs import crosstalk_findings, temperature_findings
 from gmwm.diagnosis.resolution import rounding_finding, step_size
 from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_finding
 from gmwm.diagnosis.samples import dead_finding, gap_findings, saturation_finding, stuck_finding
-from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM
-from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM, background, bands, spectrum
 from gmwm.errors import InputError
-from gmwm.recording import Channel, Recording
-
-Progress = Callable[[str], None]
-"""Called with the name of each channel when it is done."""
+from gmwm.readers import Channel, Recording
 
 _LONG_ENOUGH = 3600.0  # s: slow errors of inertial sensors have correlation times of minutes
 _JITTER, _LARGE_JITTER = 0.1, 0.3  # of a sampling interval, rms
@@ -55,7 +49,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     ----------
     recording : Recording
     progress : callable, optional
-        Called with each channel's name when it is done.
+        Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
 
     Returns
     -------
@@ -81,9 +75,11 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     whole = [_length(recording), *_reader_findings(recording), *_clock(recording)]
     examined: dict[str, _Examined] = {}
     for channel in recording:
-        examined[channel.name] = _examined(channel)
         if progress is not None:
-            progress(channel.name)
+            progress(len(examined), len(recording), channel.name)
+        examined[channel.name] = _examined(channel)
+    if progress is not None:
+        progress(len(recording), len(recording), "")
     shared = gap_findings(recording, recording.dt)
     shared += crosstalk_findings(
         {name: one.errors for name, one in examined.items() if one.errors is not None}

@@ -5,14 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import f as f_distribution
-from scipy.stats import norm
+from scipy.stats import f as f_distribution, norm
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import BoolArray
+from gmwm._core.text import spoken
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import Innovations
-from gmwm.diagnosis.words import spoken
 
 FALSE_ALARM = 1e-3
 """Chance of each finding where noise is Gaussian and stationary."""

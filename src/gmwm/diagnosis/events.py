@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
-from gmwm._typing import FloatArray
+from gmwm._core.text import spoken
+from gmwm._core.typing import FloatArray
 from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.innovations import Innovations
-from gmwm.diagnosis.words import spoken
 
 FALSE_ALARM = 1e-3
 """Chance of an event in a channel of Gaussian noise, however long."""

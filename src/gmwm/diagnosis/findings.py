@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gmwm.errors import InputError
-from gmwm.recording import Recording
+from gmwm.readers import Recording
 
 Severity = Literal["good", "note", "warning", "bad"]
 

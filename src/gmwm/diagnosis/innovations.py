@@ -14,8 +14,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import BoolArray, inner
+from gmwm._core.typing import BoolArray, FloatArray, inner
 
 FEWEST = 64
 """Samples below which there are no innovations."""

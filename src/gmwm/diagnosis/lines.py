@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import IntArray
+from gmwm._core.text import spoken
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.spectrum import FIRST, POWER_INFLATION, Spectrum
-from gmwm.diagnosis.words import spoken
 
 FALSE_ALARM = 1e-3
 """Chance of a line in a channel of Gaussian noise."""

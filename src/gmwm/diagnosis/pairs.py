@@ -5,15 +5,13 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as t_distribution
+from scipy.stats import norm, t as t_distribution
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import inner
+from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis.drift import PARTS, part_means
 from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import FEWEST
-from gmwm.recording import Recording
+from gmwm.readers import Recording
 
 FALSE_ALARM = 1e-3
 """Chance of a finding where no two channels depend on each other."""

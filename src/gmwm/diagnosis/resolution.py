@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import inner
+from gmwm._core.text import spoken
+from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis.findings import Finding, Severity
-from gmwm.diagnosis.words import spoken
 
 _LOOKED_AT = 65_536  # samples; a lattice shows in fewer
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point

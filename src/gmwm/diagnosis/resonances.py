@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import BoolArray
+from gmwm._core.text import spoken
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.spectrum import Bands, Spectrum
-from gmwm.diagnosis.words import spoken
 from gmwm.process import Resonance
 
 FALSE_ALARM = 1e-3

@@ -7,12 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.stats import binom
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import IntArray
+from gmwm._core.text import spoken
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import Innovations
-from gmwm.diagnosis.words import spoken
-from gmwm.recording import Channel
+from gmwm.readers import Channel
 
 FALSE_ALARM = 1e-3
 """Chance of a stuck value or of saturation in a channel of Gaussian noise."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from gmwm._typing import FloatArray
-from gmwm.diagnosis.arrays import BoolArray, IntArray, inner
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, inner
 
 FEWEST = 512
 """Samples below which there is no spectrum worth a look."""

@@ -8,28 +8,27 @@ the record.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.documents import Document
+from gmwm._core.frozen import freeze
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.design import Design
-from gmwm.estimate.fit import Fit
-from gmwm.estimate.goodness import FittedMoments
-from gmwm.estimate.methods import fit as fit_series
-from gmwm.estimate.profile import Profile
-from gmwm.estimate.scales import Scales
-from gmwm.estimate.start import search
-from gmwm.estimate.weights import Weights
+from gmwm.estimate.entrance import estimate
+from gmwm.estimate.moments import GMWM, Design, Profile, Weights, search
+from gmwm.estimate.problem import Scales, drift_key, shape_of
+from gmwm.estimate.result import Fit, plain
 from gmwm.process import Model, Process, as_model
-from gmwm.variance.pooled import PooledVariance
+from gmwm.variance import PooledVariance
 
 
-@dataclass(frozen=True, eq=False)
-class Bootstrap:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bootstrap(Document):
     """Estimates from simulated data.
 
     Attributes
@@ -40,8 +39,28 @@ class Bootstrap:
         Their estimates, SI units.
     """
 
+    SCHEMA: ClassVar[str] = "gmwm.bootstrap"
+
     keys: tuple[str, ...]
     draws: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, "draws")
+
+    def __repr__(self) -> str:
+        return f"<Bootstrap of {', '.join(self.keys)}, {len(self.draws)} draws>"
+
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, in JSON types."""
+        draws = [[plain(value) for value in row] for row in self.draws.tolist()]
+        return {"keys": list(self.keys), "draws": draws}
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`."""
+        keys = tuple(map(str, content["keys"]))
+        draws = np.array(content["draws"], dtype=float).reshape(-1, len(keys))
+        return cls(keys, draws)
 
     @property
     def stderr(self) -> dict[str, float]:
@@ -151,8 +170,8 @@ class _Problem:
 
     @classmethod
     def of(cls, fit: Fit) -> _Problem:
-        at = FittedMoments.of(fit)
-        root = Weights.of(fit.omega, fit.wv).root(at.covariance)
+        at = fit.moments
+        root = Weights.of(fit.weights, fit.wv).root(at.covariance)
         return cls(at.scales, at.target, at.implied, at.covariance, root)
 
     def targets(self, runs: int, rng: np.random.Generator) -> FloatArray:
@@ -178,8 +197,7 @@ def _opened(fit: Fit) -> Model:
 
 
 def _shapes(fit: Fit, design: Design) -> list[tuple[float, ...]]:
-    terms = [fit.model.terms[term.index] for term in design.terms]
-    return [tuple(float(t.values[p.name] or 0.0) for p in t.shape_parameters) for t in terms]
+    return [shape_of(fit.model.terms[term.place]) for term in design.terms]
 
 
 def _refined(profile: Profile, start: Sequence[tuple[float, ...]]) -> dict[str, float]:
@@ -190,12 +208,11 @@ def _refined(profile: Profile, start: Sequence[tuple[float, ...]]) -> dict[str, 
 
 
 def _ramp_draws(fit: Fit, runs: int, rng: np.random.Generator) -> list[dict[str, float]]:
-    slopes = [i.key for i in fit.model.parameters if i.parameter.role == "slope"]
-    free = [key for key in slopes if key in fit.keys]
-    return [
-        {key: fit.params[key] + fit.stderr[key] * float(rng.standard_normal()) for key in free}
-        for _ in range(runs)
-    ]
+    key = drift_key(fit.model)
+    if key is None or key not in fit.keys:
+        return [{} for _ in range(runs)]
+    slope, error = fit.params[key], fit.stderr[key]
+    return [{key: slope + error * float(rng.standard_normal())} for _ in range(runs)]
 
 
 def _from_series(fit: Fit, opened: Model, rng: np.random.Generator) -> dict[str, float]:
@@ -204,7 +221,8 @@ def _from_series(fit: Fit, opened: Model, rng: np.random.Generator) -> dict[str,
     lengths = [part.n for part in wv.parts] if isinstance(wv, PooledVariance) else [wv.n]
     series = [fit.model.simulate(n, wv.dt, rng) for n in lengths]
     data = series if len(series) > 1 else series[0]
-    return fit_series(opened, data, wv.dt, omega=fit.omega, discrepancy=fit.discrepancy).params
+    method = GMWM(fit.weights, fit.discrepancy)
+    return estimate(opened, data, wv.dt, method).params
 
 
 def _gain(designs: Sequence[Design], target: FloatArray, root: FloatArray) -> float:

@@ -9,10 +9,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gmwm.calibration import Calibration
+from gmwm._core.files import written
+from gmwm.calibration import Calibration, Level, noise_density, random_walk
 from gmwm.errors import InputError
-from gmwm.files import written
-from gmwm.summary import Level, noise_density, random_walk
 
 _SENSORS = (
     ("accel", "accelerometer", "m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"),

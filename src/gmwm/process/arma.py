@@ -11,11 +11,11 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.signal import lfilter, lfiltic
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import spectral, synthesis
 from gmwm.process.base import Process, Shape
-from gmwm.process.parameter import Parameter
+from gmwm.process.parameter import Parameter, parameter
 from gmwm.process.state_space import StateSpace
 
 Coefficients = int | float | Sequence[float | None] | None
@@ -47,10 +47,12 @@ class ARIMA(Process):
         For coefficients outside the stationary (AR) or invertible (MA) region.
     """
 
+    sigma2: float = parameter("u^2", "variance", meaning="innovation variance")
     label: ClassVar[str] = "ARIMA"
-    prefix: ClassVar[str] = ""
     repeatable = True
     separable_shape = False
+    d: int
+    orders: tuple[int, int]
 
     def __init__(
         self,
@@ -65,24 +67,27 @@ class ARIMA(Process):
         names = [f"ar_{i + 1}" for i in range(len(ar_values))]
         names += [f"ma_{i + 1}" for i in range(len(ma_values))]
         shapes = tuple(Parameter(name, "-", lower=-np.inf, meaning="coefficient") for name in names)
-        variance = Parameter("sigma2", "u^2", "variance", meaning="innovation variance")
-        object.__setattr__(self, "parameters", (*shapes, variance))
-        object.__setattr__(self, "d", d)
-        object.__setattr__(self, "orders", (len(ar_values), len(ma_values)))
+        object.__setattr__(self, "parameters", (*shapes, *type(self).parameters))
+        self.__dict__.update(d=d, orders=(len(ar_values), len(ma_values)))
         super().__init__(*ar_values, *ma_values, sigma2)
         for values, sign, what in ((self.ar, 1, "stationary"), (self.ma, -1, "invertible")):
             if None not in values and not _stable([sign * value for value in values]):
                 raise InputError(f"{self!r} is not {what}: its polynomial has a root within 1")
 
     @property
+    def is_autoregression(self) -> bool:
+        """Whether it has autoregressive coefficients only."""
+        return self.orders[0] > 0 and self.orders[1] == 0 and self.d == 0
+
+    @property
     def ar(self) -> tuple[Any, ...]:
         """Autoregressive coefficients, ``None`` where open."""
-        return tuple(getattr(self, f"ar_{i + 1}") for i in range(self.orders[0]))
+        return tuple(self.values[f"ar_{i + 1}"] for i in range(self.orders[0]))
 
     @property
     def ma(self) -> tuple[Any, ...]:
         """Moving-average coefficients, ``None`` where open."""
-        return tuple(getattr(self, f"ma_{i + 1}") for i in range(self.orders[1]))
+        return tuple(self.values[f"ma_{i + 1}"] for i in range(self.orders[1]))
 
     def _arguments(self, values: dict[str, float | None]) -> dict[str, Any]:
         p, q = self.orders
@@ -122,7 +127,7 @@ class ARIMA(Process):
                     parts.append(f"{name}=[{inner}]")
         if type(self) is ARIMA:
             parts.insert(1, f"d={self.d}")
-        if self.sigma2 is not None:
+        if self.values["sigma2"] is not None:
             parts.append(f"sigma2={self.sigma2:.12g}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
@@ -186,7 +191,7 @@ class ARIMA(Process):
         mean = np.zeros(len(names))
         return StateSpace(transition, noise, output, 0.0, mean, stationary, tuple(names))
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         if not self.ar:
             noise = np.sqrt(self.sigma2) * rng.standard_normal(n + len(self.ma))
             series = lfilter([1.0, *self.ma], [1.0], noise)[len(self.ma) :]

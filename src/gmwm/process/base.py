@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from functools import lru_cache
 from inspect import Signature, signature
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import spectral, synthesis
 from gmwm.process.parameter import Parameter
@@ -23,22 +21,23 @@ Shape = tuple[float, ...]
 """Values of a process's shape parameters, in the order of ``parameters``."""
 
 
-class Process(ABC):
+class Process:
     """A zero-mean Gaussian error process with stationary Haar wavelet coefficients.
 
-    A subclass names its ``parameters`` and gives ``psd``; wavelet variance, simulation and
+    A subclass declares its parameters and gives ``psd``; wavelet variance, simulation and
     everything else follow. Where a closed form is known, it overrides ``haar_variance``,
-    ``autocovariance``, ``state_space`` or ``_draw``.
+    ``autocovariance``, ``state_space`` or ``draw``. A process without a spectrum in closed form
+    gives ``draw`` alone and is fitted by simulated moments.
 
     A parameter is *given* (a number) or *open* (``None``, to be estimated). Instances do not
     change.
 
     Examples
     --------
-    >>> from gmwm import Parameter, Process
+    >>> from gmwm import Process, parameter
     >>> class PinkishNoise(Process):
-    ...     parameters = (Parameter("level", "u", role="scale"),
-    ...                   Parameter("slope", "-", lower=0.0, upper=2.0))
+    ...     level: float = parameter("u", role="scale")
+    ...     slope: float = parameter("-", lower=0.0, upper=2.0)
     ...     def psd(self, f, dt):
     ...         return self.level**2 * dt * (2 * f * dt) ** -self.slope
     >>> PinkishNoise(level=2.0, slope=0.5)
@@ -46,7 +45,7 @@ class Process(ABC):
     """
 
     parameters: tuple[Parameter, ...] = ()
-    """The parameters in constructor order; at most one of them linear, see `Parameter.role`."""
+    """Those declared, in order; at most one of them linear, see `Parameter.role`."""
 
     label: ClassVar[str] = ""
     """Name for tables and legends; the class name where empty."""
@@ -60,12 +59,43 @@ class Process(ABC):
     separable_shape: ClassVar[bool] = True
     """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
 
+    ordered_by: ClassVar[str] = ""
+    """Shape parameter by which several terms of this kind are ordered, and told apart."""
+
+    is_white: ClassVar[bool] = False
+    """Whether it is white at any rate: noise of a measurement, which needs no state."""
+
+    is_walk: ClassVar[bool] = False
+    """Whether it wanders off from where it starts, so that its start is a parameter of its own."""
+
+    is_drift: ClassVar[bool] = False
+    """Whether it is a deterministic slope: a regressor, no noise."""
+
+    is_line: ClassVar[bool] = False
+    """Whether all of its variance is in spectral lines."""
+
+    has_finite_state_space: ClassVar[bool] = True
+    """Whether `state_space`, where there is one, is exact."""
+
+    _constructor: ClassVar[Signature] = Signature()
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        declared = {
+            name: value
+            for kind in reversed(cls.__mro__)
+            for name, value in vars(kind).items()
+            if isinstance(value, Parameter)
+        }
+        cls.parameters = tuple(declared.values())
+        cls._constructor = signature(cls.__init__)
+
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         # A constructor that names its parameters would answer with a TypeError.
         try:
-            _signature(cls).bind_partial(None, *args, **kwargs)
+            cls._constructor.bind_partial(None, *args, **kwargs)
         except TypeError as error:
-            names = ", ".join([*_signature(cls).parameters][1:]) or "none"
+            names = ", ".join([*cls._constructor.parameters][1:]) or "none"
             raise InputError(f"{cls.__name__}: {error}, its parameters are {names}") from None
         return super().__new__(cls)
 
@@ -88,8 +118,7 @@ class Process(ABC):
         for parameter in self.parameters:
             value = values[parameter.name]
             if value is not None:
-                value = self._checked(parameter, value)
-            object.__setattr__(self, parameter.name, value)
+                self.__dict__[parameter.name] = self._checked(parameter, value)
 
     def _checked(self, parameter: Parameter, value: Any) -> float:
         where = f"{type(self).__name__}: {parameter.name}"
@@ -110,16 +139,12 @@ class Process(ABC):
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} does not change: make a new one")
 
-    def __getattr__(self, name: str) -> Any:
-        # Only reached for names that are not set; tells type checkers that there are parameters.
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
     # -- values ---------------------------------------------------------------------------------
 
     @property
     def values(self) -> dict[str, float | None]:
         """Parameter name -> value, ``None`` where open."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
+        return {parameter.name: self.__dict__.get(parameter.name) for parameter in self.parameters}
 
     @property
     def is_open(self) -> bool:
@@ -175,7 +200,11 @@ class Process(ABC):
 
     # -- primitives -----------------------------------------------------------------------------
 
-    @abstractmethod
+    @classmethod
+    def has_spectrum(cls) -> bool:
+        """Whether the spectrum is known; if not, everything is found by simulation."""
+        return cls.psd is not Process.psd
+
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         """Two-sided power spectral density of the sampled process, without spectral lines.
 
@@ -190,7 +219,16 @@ class Process(ABC):
         -------
         ndarray
             In u^2/Hz; its integral over (-1/(2 dt), 1/(2 dt)) is the variance, where that exists.
+
+        Raises
+        ------
+        InputError
+            If the process is known by simulation only.
         """
+        name = type(self).__name__
+        if type(self).draw is Process.draw:
+            raise InputError(f"{name} gives neither psd nor draw: define one of them")
+        raise InputError(f'{name} is known by simulation only: fit it with method = "simulated"')
 
     def lines(self) -> tuple[tuple[float, float], ...]:
         """Spectral lines as (frequency in Hz, amplitude in u)."""
@@ -294,20 +332,20 @@ class Process(ABC):
         Raises
         ------
         InputError
-            If a parameter is open, ``n`` or ``dt`` is not positive or too large, or ``_draw`` of a
-        subclass gives no series.
+            If a parameter is open, ``n`` or ``dt`` is not positive or too large, or ``draw`` of a
+            subclass gives no series.
         """
         self._require_given()
         n, dt = checks.samples(n), checks.positive("dt", dt, _INTERVAL)
         try:
-            drawn = self._draw(n, dt, checks.generator(seed))
+            drawn = self.draw(n, dt, checks.generator(seed))
         except MemoryError:
             raise InputError(f"n = {n:,}: the memory does not hold so many, give less") from None
         return self._series(drawn, n)
 
     def _series(self, drawn: Any, n: int) -> FloatArray:
-        """What ``_draw`` of any subclass gave, as a series."""
-        where = f"_draw of {type(self).__name__}"
+        """What ``draw`` of any subclass gave, as a series."""
+        where = f"draw of {type(self).__name__}"
         if drawn is None:
             raise InputError(f"{where} returns nothing: let it return {n:,} samples")
         series = checks.real_numbers(drawn, f"what {where} returns")
@@ -319,7 +357,13 @@ class Process(ABC):
             raise InputError(f"{where} returns samples that are not finite: repair it")
         return series
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        """``n`` samples of a process with given parameters, in u; see `simulate`.
+
+        A process that is known by simulation only gives this. To be estimated, it must use the
+        generator in the same way whatever its parameters are: the same random numbers then give
+        series that change smoothly with the parameters.
+        """
         return synthesis.from_psd(self.psd, n, dt, rng)
 
     # -- for the estimator ------------------------------------------------------------------------
@@ -399,11 +443,6 @@ class Process(ABC):
     def title(cls) -> str:
         """Name for tables and legends."""
         return cls.label or cls.__name__
-
-
-@lru_cache(maxsize=256)
-def _signature(kind: type[Process]) -> Signature:
-    return signature(kind.__init__)
 
 
 def _grid_axis(parameter: Parameter, dt: float, n: int, points: int = 16) -> FloatArray:

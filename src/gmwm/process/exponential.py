@@ -20,7 +20,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 _SERIES_BELOW = 0.5
 _SINH_TERMS = [1.0 / factorial(2 * k + 1) for k in range(1, 9)]

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.process import synthesis
 from gmwm.process.base import Process, Shape
 from gmwm.process.exponential import exponential_haar, exponential_psd, real_haar
-from gmwm.process.parameter import Parameter
+from gmwm.process.parameter import parameter
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 8
@@ -27,11 +27,10 @@ class GaussMarkov(Process):
         Correlation time, s. At sampling interval dt it is an AR(1) with phi = exp(-dt/tau).
     """
 
-    parameters = (
-        Parameter("sigma", "u", "scale", meaning="Gauss-Markov standard deviation"),
-        Parameter("tau", "s", meaning="Gauss-Markov correlation time"),
-    )
+    sigma: float = parameter("u", "scale", meaning="Gauss-Markov standard deviation")
+    tau: float = parameter("s", meaning="Gauss-Markov correlation time")
     label: ClassVar[str] = "Gauss-Markov"
+    ordered_by: ClassVar[str] = "tau"
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
         super().__init__(sigma, tau)
@@ -56,7 +55,7 @@ class GaussMarkov(Process):
         q = -variance * np.expm1(-2.0 * dt / self.tau)
         return StateSpace.scalar("Gauss-Markov", float(np.exp(-dt / self.tau)), float(q), variance)
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         series = rng.standard_normal(n)
         driving = self.sigma * np.sqrt(-np.expm1(-2.0 * dt / self.tau))
         synthesis.first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
@@ -100,11 +99,9 @@ class Resonance(Process):
     exponentials of complex rate, to which the formulas of the first order apply.
     """
 
-    parameters = (
-        Parameter("sigma", "u", "scale", meaning="resonance standard deviation"),
-        Parameter("frequency", "Hz", meaning="resonance frequency"),
-        Parameter("damping", "-", upper=1.0, meaning="resonance damping ratio"),
-    )
+    sigma: float = parameter("u", "scale", meaning="resonance standard deviation")
+    frequency: float = parameter("Hz", meaning="resonance frequency")
+    damping: float = parameter("-", upper=1.0, meaning="resonance damping ratio")
     label: ClassVar[str] = "resonance"
     prefix: ClassVar[str] = "resonance_"
 
@@ -172,7 +169,7 @@ class Resonance(Process):
             names=("resonance", "resonance rate"),
         )
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return synthesis.from_state_space(self.state_space(dt), n, rng)
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process.base import Process
-from gmwm.process.gauss_markov import GaussMarkov
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
@@ -138,6 +137,11 @@ class Model:
         """Spectral lines of all terms as (frequency in Hz, amplitude in u)."""
         return tuple(line for term in self.terms for line in term.lines())
 
+    def white_density(self) -> float:
+        """Power spectral density of the white terms, u^2/Hz."""
+        white = (term for term in self.terms if term.is_white)
+        return float(sum(term.psd(np.ones(1), 1.0)[0] for term in white))
+
     def drift_rate(self) -> float:
         """Deterministic slope, u/s."""
         return float(sum(term.drift_rate() for term in self.terms))
@@ -186,6 +190,11 @@ class Model:
             )
 
     # -- looks ------------------------------------------------------------------------------------
+
+    def title(self) -> str:
+        """Its terms in a few words: ``white noise + 2 Gauss-Markov``."""
+        counts = Counter(term.title() for term in self.terms)
+        return " + ".join(f"{n} {title}" if n > 1 else title for title, n in counts.items())
 
     def term_labels(self) -> list[str]:
         """One label per term, numbered where a kind occurs more than once."""
@@ -249,15 +258,16 @@ def as_model(model: Process | Model) -> Model:
 
 
 def _in_order(terms: tuple[Process, ...]) -> tuple[Process, ...]:
-    """Sort Gauss-Markov terms by correlation time, in the places they have."""
-    places = [i for i, term in enumerate(terms) if isinstance(term, GaussMarkov)]
-    times = [terms[i].values["tau"] for i in places]
-    if any(tau is None for tau in times):
-        return terms
+    """Sort terms of a kind that has an order, in the places they have, where all are known."""
     ordered = list(terms)
-    ranked = sorted(places, key=lambda i: terms[i].values["tau"] or 0.0)
-    for place, source in zip(places, ranked, strict=True):
-        ordered[place] = terms[source]
+    for kind in {type(term) for term in terms if term.ordered_by}:
+        places = [i for i, term in enumerate(terms) if type(term) is kind]
+        keys = {i: terms[i].values[kind.ordered_by] for i in places}
+        if None in keys.values():
+            continue
+        ranked = sorted(places, key=lambda i: keys[i] or 0.0)
+        for place, source in zip(places, ranked, strict=True):
+            ordered[place] = terms[source]
     return tuple(ordered)
 
 
@@ -294,7 +304,7 @@ def _number(terms: tuple[Process, ...]) -> tuple[ModelParameter, ...]:
             if counts[key] > 1:
                 seen[key] += 1
                 key = f"{key}_{seen[key]}"
-            result.append(ModelParameter(key, index, parameter, getattr(term, parameter.name)))
+            result.append(ModelParameter(key, index, parameter, term.values[parameter.name]))
     return tuple(result)
 
 

@@ -12,12 +12,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import digamma
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.process import synthesis
 from gmwm.process.base import Process
-from gmwm.process.parameter import Parameter
+from gmwm.process.parameter import parameter
 from gmwm.process.state_space import StateSpace
-from gmwm.wavelets import wavelet as filters
+from gmwm.process.wavelets import wavelet as filters
 
 
 class WhiteNoise(Process):
@@ -29,8 +29,9 @@ class WhiteNoise(Process):
         Root power spectral density, u/sqrt(Hz). At sampling interval dt the variance is N^2/dt.
     """
 
-    parameters = (Parameter("N", "u/sqrt(Hz)", "scale", meaning="white noise"),)
+    N: float = parameter("u/sqrt(Hz)", "scale", meaning="white noise")
     label: ClassVar[str] = "white noise"
+    is_white: ClassVar[bool] = True
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -48,7 +49,7 @@ class WhiteNoise(Process):
         self._require_given()
         return StateSpace.white(self.N**2 / dt)
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         series = rng.standard_normal(n)
         series *= self.N / np.sqrt(dt)
         return series
@@ -68,7 +69,7 @@ class QuantizationNoise(Process):
         first difference of sqrt(12) U(0, 1); its Allan variance is 3 Q^2/tau^2.
     """
 
-    parameters = (Parameter("Q", "u s", "scale", meaning="quantization noise"),)
+    Q: float = parameter("u s", "scale", meaning="quantization noise")
     label: ClassVar[str] = "quantization noise"
 
     def __init__(self, Q: float | None = None) -> None:
@@ -96,7 +97,7 @@ class QuantizationNoise(Process):
             names=("quantization", "quantization, previous"),
         )
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return np.sqrt(12.0) * self.Q / dt * np.diff(rng.random(n + 1))
 
     @classmethod
@@ -113,8 +114,9 @@ class RandomWalk(Process):
         u/s/sqrt(Hz). The variance of the increment over dt is K^2 dt.
     """
 
-    parameters = (Parameter("K", "u/s/sqrt(Hz)", "scale", meaning="random walk"),)
+    K: float = parameter("u/s/sqrt(Hz)", "scale", meaning="random walk")
     label: ClassVar[str] = "random walk"
+    is_walk: ClassVar[bool] = True
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)
@@ -130,7 +132,7 @@ class RandomWalk(Process):
         self._require_given()
         return StateSpace.scalar("random walk", 1.0, self.K**2 * dt, 0.0)
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         steps = rng.standard_normal(n)
         steps[0] = 0.0
         return self.K * np.sqrt(dt) * np.cumsum(steps)
@@ -149,8 +151,9 @@ class RateRamp(Process):
         Slope, u/s, signed.
     """
 
-    parameters = (Parameter("R", "u/s", "slope", lower=-np.inf, meaning="rate ramp"),)
+    R: float = parameter("u/s", "slope", lower=-np.inf, meaning="rate ramp")
     label: ClassVar[str] = "rate ramp"
+    is_drift: ClassVar[bool] = True
 
     def __init__(self, R: float | None = None) -> None:
         super().__init__(R)
@@ -181,8 +184,8 @@ class RateRamp(Process):
             names=("ramp", "ramp rate"),
         )
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
-        return self.R * dt * np.arange(n)
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        return self.R * dt * np.arange(n, dtype=float)
 
     @classmethod
     def examples(cls) -> tuple[Process, ...]:
@@ -206,8 +209,9 @@ class BiasInstability(Process):
     (4 O(m) - O(2m))/(8 m^2)]: B^2/pi at m = 1, (ln 2/pi) B^2 in the limit.
     """
 
-    parameters = (Parameter("B", "u", "scale", meaning="bias instability"),)
+    B: float = parameter("u", "scale", meaning="bias instability")
     label: ClassVar[str] = "bias instability"
+    has_finite_state_space: ClassVar[bool] = False
 
     states_per_decade: ClassVar[int] = 2
     """Density of the Gauss-Markov bank in the state-space form."""
@@ -247,7 +251,7 @@ class BiasInstability(Process):
             ]
         )
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         # Exact: the increments are stationary with autocovariance -(4 B^2/pi)/(4 k^2 - 1).
         lag = np.arange(n + 1)
         covariance = -4.0 / np.pi / (4.0 * lag**2 - 1.0)

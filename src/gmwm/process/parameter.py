@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from gmwm.errors import InputError
 
 Role = Literal["scale", "variance", "shape", "slope"]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of an error process.
+    """One parameter of an error process; declared by `parameter`.
 
     Attributes
     ----------
@@ -50,3 +52,43 @@ class Parameter:
         if self.linear and value == 0.0:
             return True
         return self.lower < value < self.upper
+
+
+class _Declared(Parameter):
+    """A parameter in the body of a class: its name is that under which it stands there.
+
+    Values stand in the dictionary of an instance, which goes before this descriptor.
+    """
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        object.__setattr__(self, "name", name)
+
+    def __get__(self, instance: object | None, owner: type) -> Parameter:
+        if instance is None:
+            return self
+        raise InputError(f"{self.name} of {instance!r} is open: give it a value, or estimate it")
+
+
+def parameter(
+    unit: str,
+    role: Role = "shape",
+    *,
+    lower: float = 0.0,
+    upper: float = float("inf"),
+    meaning: str = "",
+) -> Any:
+    """Declare a parameter in the body of a process; see `Parameter` for the arguments.
+
+    On an instance the name reads as the value, and raises `InputError` where it is open.
+
+    Examples
+    --------
+    >>> from gmwm import Process, parameter
+    >>> class Flat(Process):
+    ...     level: float = parameter("u/sqrt(Hz)", role="scale")
+    ...     def psd(self, f, dt):
+    ...         return self.level**2 + 0.0 * f
+    >>> Flat(level=2.0).level
+    2.0
+    """
+    return _Declared("", unit, role, lower, upper, meaning)

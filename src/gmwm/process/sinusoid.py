@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.process.base import Process, Shape
-from gmwm.process.parameter import Parameter
+from gmwm.process.parameter import parameter
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 100
@@ -25,12 +25,11 @@ class Sinusoid(Process):
         Hz; what lies above 1/(2 dt) is aliased.
     """
 
-    parameters = (
-        Parameter("amplitude", "u", "scale", meaning="line amplitude"),
-        Parameter("frequency", "Hz", meaning="line frequency"),
-    )
+    amplitude: float = parameter("u", "scale", meaning="line amplitude")
+    frequency: float = parameter("Hz", meaning="line frequency")
     label: ClassVar[str] = "sinusoid"
     prefix: ClassVar[str] = "sinusoid_"
+    is_line: ClassVar[bool] = True
 
     def __init__(self, amplitude: float | None = None, frequency: float | None = None) -> None:
         super().__init__(amplitude, frequency)
@@ -64,7 +63,7 @@ class Sinusoid(Process):
             names=("line, in phase", "line, in quadrature"),
         )
 
-    def _draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         cycles = self.frequency * dt * np.arange(n) + rng.random()
         return self.amplitude * np.cos(2.0 * np.pi * cycles)
 

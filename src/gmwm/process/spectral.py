@@ -25,10 +25,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import expit
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process.wavelet_gain import GainWeights, gain_weights
-from gmwm.wavelets import Wavelet, wavelet
+from gmwm.process.wavelets import Wavelet, wavelet
 
 PSD = Callable[[FloatArray, float], FloatArray]
 """``psd(f, dt)``: two-sided density in u^2/Hz at frequencies f in Hz."""
@@ -193,7 +193,7 @@ def wavelet_variance(
     dt : float
         Sampling interval in seconds.
     name : str
-        Wavelet, see `gmwm.wavelets.wavelet`.
+        Wavelet, see `gmwm.process.wavelets.wavelet`.
 
     Returns
     -------

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 
 @dataclass(frozen=True)

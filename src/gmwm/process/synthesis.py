@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from scipy import fft
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.process.spectral import PSD, evaluated
 from gmwm.process.state_space import StateSpace
 

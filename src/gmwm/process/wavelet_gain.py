@@ -36,8 +36,8 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._typing import FloatArray
-from gmwm.wavelets import Wavelet, wavelet
+from gmwm._core.typing import FloatArray
+from gmwm.process.wavelets import Wavelet, wavelet
 
 _NODES_PER_PANEL = 8
 _PANELS_LOG2 = 5  # panels an octave: 32 hold a resonance of damping 0.01 to 1e-5

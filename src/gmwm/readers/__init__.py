@@ -5,6 +5,19 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 `gmwm.errors.InputError` with one sentence: what is wrong, where, and how to mend it.
 """
 
+from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.names import TIME, bare, meaning
 from gmwm.readers.reader import read
+from gmwm.readers.recording import Channel, Recording
+from gmwm.readers.table import label
 
-__all__ = ["read"]
+__all__ = [
+    "TIME",
+    "Channel",
+    "CsvTable",
+    "Recording",
+    "bare",
+    "label",
+    "meaning",
+    "read",
+]

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, meaning
 from gmwm.readers.table import FEWEST, LARGEST, label, usable

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers.names import meaning
 from gmwm.readers.roles import Roles
 from gmwm.readers.table import Table
-from gmwm.units import SI_UNIT, factor, quantity_of
 
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.jumps import Jumps, find_jumps
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.cells import BLANKS, number, split_line
 from gmwm.readers.layout import Layout, find_layout

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 _Rows = npt.NDArray[np.int64]
 

@@ -12,16 +12,16 @@ from typing import Literal
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import meaning
+from gmwm.readers.recording import Recording
 from gmwm.readers.roles import Columns, Reference, Roles, assign_roles
 from gmwm.readers.table import FEWEST, Table, label
-from gmwm.recording import Recording
 
 
 def read(

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import label
-from gmwm.units import SI_UNIT
 
 Reference = str | int
 """A column's name, or its index counted from 0."""

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 FORMATS = "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ"
 """For messages about files of another kind."""

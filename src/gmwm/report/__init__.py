@@ -1,5 +1,12 @@
 """The self-contained HTML report of a calibration; opens without a network."""
 
-from gmwm.report.page import write_report
+from gmwm.report.calibration import duration_text, write_report
+from gmwm.report.navigated import write_navigated_report
+from gmwm.report.validation import write_validation_report
 
-__all__ = ["write_report"]
+__all__ = [
+    "duration_text",
+    "write_navigated_report",
+    "write_report",
+    "write_validation_report",
+]

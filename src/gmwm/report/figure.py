@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import field_units
 from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
-from gmwm.estimate.fit import Fit
-from gmwm.plot import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
-from gmwm.units import field_units
+from gmwm.estimate.result import Fit
+from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
 
 _GRID = "#dddddd"
 _BESIDE = 1.7  # ratio of averaging times that is left free at both ends

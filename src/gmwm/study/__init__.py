@@ -1,1 +1,26 @@
 """The simulation study of Stebler et al. (2012), and a harder case, over the public API."""
+
+from gmwm.study.appendix import converge, convergence_table
+from gmwm.study.choice import choice_study, choice_table
+from gmwm.study.demo import compare, simulated_imu
+from gmwm.study.figures import boxplots
+from gmwm.study.navigation import reproduce_figure
+from gmwm.study.runs import run_scenario
+from gmwm.study.scenario import FIGURES, SCENARIOS, Scenario
+from gmwm.study.summary import summarise
+
+__all__ = [
+    "FIGURES",
+    "SCENARIOS",
+    "Scenario",
+    "boxplots",
+    "choice_study",
+    "choice_table",
+    "compare",
+    "converge",
+    "convergence_table",
+    "reproduce_figure",
+    "run_scenario",
+    "simulated_imu",
+    "summarise",
+]

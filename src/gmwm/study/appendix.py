@@ -15,10 +15,10 @@ from functools import partial
 
 import numpy as np
 
-from gmwm._typing import FloatArray
-from gmwm.estimate.methods import fit
+from gmwm._core.typing import FloatArray
+from gmwm.estimate import fit
 from gmwm.process import RandomWalk, WhiteNoise
-from gmwm.variance.analysis import wavelet_variance
+from gmwm.variance import wavelet_variance
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
@@ -105,7 +105,7 @@ def _one_run(n: int, seed: int, run: int) -> list[FloatArray]:
     ]
 
 
-def text(rows: list[Convergence]) -> str:
+def convergence_table(rows: list[Convergence]) -> str:
     """The table, 80 columns wide."""
     lines = [
         "Appendix A: least squares on the Allan variance of white noise + random walk",

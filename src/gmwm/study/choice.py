@@ -77,7 +77,7 @@ def choose(index: int, n: int, seed: int) -> tuple[bool, int]:
     return kinds[0] == kinds[1], len(chosen.terms) - len(truth.terms)
 
 
-def study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> list[Choice]:
+def choice_study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> list[Choice]:
     """Choose models for ``runs`` series of every truth and length, in parallel processes."""
     from joblib import Parallel, delayed, parallel_config
 
@@ -94,10 +94,8 @@ def study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> 
     return result
 
 
-def text(choices: Sequence[Choice]) -> str:
+def choice_table(choices: Sequence[Choice]) -> str:
     """The study as a table."""
-    from gmwm.selection import describe
-
     runs = choices[0].runs
     lines = [
         f"Models chosen by gmwm.select, {runs} series each",
@@ -109,6 +107,6 @@ def text(choices: Sequence[Choice]) -> str:
         many = sum(count for more, count in choice.surplus.items() if more > 1)
         lines.append(
             f"{choice.n:>9,} {choice.right / runs:>6.0%} {fewer / runs:>6.0%} "
-            f"{choice.surplus[1] / runs:>5.0%} {many / runs:>5.0%}  {describe(choice.truth)}"
+            f"{choice.surplus[1] / runs:>5.0%} {many / runs:>5.0%}  {choice.truth.title()}"
         )
     return "\n".join([*lines, "", "right: the very terms; fewer, +1, +2..: terms less or too many"])

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from gmwm import plot
-from gmwm._typing import FloatArray
-from gmwm.files import moved_into_place
+from gmwm import plotting
+from gmwm._core.files import moved_into_place
+from gmwm._core.typing import FloatArray
 from gmwm.study.scenario import Scenario
 
 
@@ -35,7 +35,7 @@ def boxplots(scenario: Scenario, table: pa.Table, stem: Path) -> list[Path]:
         for quantity in scenario.quantities
     }
     truths = {quantity.name: scenario.true_value(quantity) for quantity in scenario.quantities}
-    figure = plot.boxes(panels, truths, title=f"{scenario.title} (dashed: truth)")
+    figure = plotting.boxes(panels, truths, title=f"{scenario.title} (dashed: truth)")
     written = []
     for suffix in (".png", ".svg"):
         target = stem.with_suffix(suffix)

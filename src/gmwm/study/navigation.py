@@ -15,21 +15,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gmwm._core.files import moved_into_place, written
+from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
-from gmwm.estimate.fit import Fit
-from gmwm.estimate.methods import fit
-from gmwm.files import moved_into_place, written
-from gmwm.ins.aiding import Outage, gnss
-from gmwm.ins.experiment import Experiment
-from gmwm.ins.missions import car_drive, helicopter_mapping
-from gmwm.ins.model_text import sensor_models
-from gmwm.ins.recorded import Recorded
-from gmwm.ins.scenario import Scenario, Simulated
-from gmwm.ins.sensors import AXES, SensorModels
-from gmwm.ins.validation import Validation
+from gmwm.estimate import fit
+from gmwm.estimate.result import Fit
+from gmwm.ins.filter import Outage, gnss
+from gmwm.ins.imu import AXES, Recorded, SensorModels
+from gmwm.ins.montecarlo import Experiment, Scenario, Simulated, Validation
+from gmwm.ins.spec import sensor_models
+from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
-from gmwm.recording import Recording
+from gmwm.readers import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,9 +80,9 @@ class Calibrated:
     gmwm: Calibration
 
     @classmethod
-    def of(cls, recording: Recording, done: Callable[[str], None] | None = None) -> Calibrated:
+    def of(cls, recording: Recording, progress: Progress | None = None) -> Calibrated:
         """Calibrate a recording both ways."""
-        calibration = calibrate(recording, progress=done)
+        calibration = calibrate(recording, progress=progress)
         kind = WhiteNoise() + BiasInstability() + RandomWalk()
         lines = {
             axis: fit(kind, calibration[axis].wv, method="allan")
@@ -165,8 +163,7 @@ def experiment(
 def _bias(models: SensorModels, source: Recorded) -> dict[str, float]:
     """Standard deviation of a constant, where the model has no stationary slow term."""
     walks = {
-        axis: any(isinstance(term, RandomWalk) for term in model.terms)
-        for axis, model in models.models.items()
+        axis: any(term.is_walk for term in model.terms) for axis, model in models.models.items()
     }
     return {axis: source.bias_sd[axis] if walks[axis] else 0.0 for axis in AXES}
 
@@ -195,7 +192,7 @@ def reproduce_figure(
     seed: int,
     jobs: int,
     recordings: Sequence[Recording] = (),
-    progress: Callable[[int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[str, list[Path]]:
     """Draw one of the paper's Figures 5 to 9.
 

@@ -15,18 +15,16 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from gmwm._typing import FloatArray
+from gmwm._core.files import folder_to_fill, moved_into_place
+from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
-from gmwm.estimate.fit import Fit
-from gmwm.estimate.methods import fit
-from gmwm.files import folder_to_fill, moved_into_place
-from gmwm.study.catalogue import SCENARIOS
-from gmwm.study.scenario import Quantity, Scenario
-from gmwm.variance.analysis import wavelet_variance
+from gmwm.estimate import fit
+from gmwm.estimate.result import Fit
+from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
+from gmwm.variance import wavelet_variance
 
 Row = dict[str, Any]
 Rows = Generator[list[Row], None, None]
-Progress = Callable[[int, int], None]
 """Called with the number of finished runs and of all."""
 
 _SECONDS_PER_PART = 10.0
@@ -155,7 +153,7 @@ def run_scenario(
         todo = [run for run in range(runs) if run not in done]
         finished = runs - len(todo)
         if progress is not None:
-            progress(finished, runs)
+            progress(finished, runs, "")
         work = partial(one_run, scenario.name, chosen, seed)
         results = _on_cluster(work, todo, cluster) if cluster else _here(work, todo, jobs)
         with closing(results), store:
@@ -163,7 +161,7 @@ def run_scenario(
                 store.add(rows)
                 finished += 1
                 if progress is not None:
-                    progress(finished, runs)
+                    progress(finished, runs, "")
         table = store.read()
     return table.filter(pc.less(table["run"], runs)).sort_by(
         [("run", "ascending"), ("method", "ascending")]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from gmwm._typing import FloatArray
-from gmwm.estimate.bounds import cramer_rao
+from gmwm._core.typing import FloatArray
+from gmwm.estimate import cramer_rao
 from gmwm.study.scenario import Quantity, Scenario
 
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.recording import Channel
+from gmwm.readers import Channel
 from gmwm.variance.analysis import as_channel, checked_samples
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class Deviations:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """All kinds against averaging time, into new axes or those of another deviation plot.
+        """All kinds against averaging time, into new axes or those of another deviation plotting.
 
         Parameters
         ----------
@@ -147,9 +147,9 @@ class Deviations:
             E.g. what ``wavelet_variance(...).plot()`` returns; that has the overlapping Allan
             deviation already.
         """
-        from gmwm import plot
+        from gmwm import plotting
 
-        return plot.deviations(
+        return plotting.deviations(
             {
                 _KINDS[kind].label: (
                     self.tau[kind], self.deviation[kind], self.lower[kind], self.upper[kind]

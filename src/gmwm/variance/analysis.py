@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.recording import Channel
-from gmwm.variance.covariance import dyadic_levels
-from gmwm.variance.data_covariance import WINDOWS
-from gmwm.variance.data_covariance import data_covariance as covariance_of_data
+from gmwm.process import wavelet as known_wavelet
+from gmwm.readers import Channel
+from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.covariance.haar import dyadic_levels
 from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
 from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
@@ -25,7 +25,7 @@ MIN_SAMPLES = 8
 
 
 def wavelet_variance(
-    data: Channel | FloatArray,
+    data: Channel | FloatArray | Sequence[float],
     dt: float | None = None,
     *,
     wavelet: str = "haar",
@@ -53,7 +53,7 @@ def wavelet_variance(
         Of the robust estimate where there are no outliers, between 0 and 1.
     data_covariance : {"none", "octave"}, optional
         Estimate the covariance of the variances from the coefficients too, over all lags or with
-        a lag window (see `gmwm.variance.data_covariance`), for ``fit(omega="data")``.
+        a lag window (see `gmwm.variance.covariance.empirical`), for ``fit(weights="data")``.
     confidence : float, optional
         Level of the chi-square intervals.
 
@@ -164,9 +164,7 @@ def _averaging(channel: Channel, runs: Runs, wavelet: str) -> FloatArray:
     """Averaging times, in samples, of the levels with a coefficient."""
     if wavelet == "haar":
         return dyadic_levels(runs.longest)
-    from gmwm import wavelets
-
-    kind = wavelets.wavelet(wavelet)
+    kind = known_wavelet(wavelet)
     if kind.width(1) > runs.longest:
         raise InputError(
             f"{_where(channel)} has no {kind.width(1)} samples in a row, which {wavelet} needs: "
@@ -223,7 +221,7 @@ def _block_means(values: FloatArray, integral: FloatArray, runs: Runs) -> tuple[
 
 
 def as_wavelet_variance(
-    data: WaveletVariance | Channel | FloatArray,
+    data: WaveletVariance | Channel | FloatArray | Sequence[float],
     dt: float | None,
     *,
     data_covariance: str | None = None,
@@ -242,7 +240,7 @@ def as_wavelet_variance(
     return data
 
 
-def as_channel(data: FloatArray, dt: float | None) -> Channel:
+def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
     """A channel without a name from an array and its sampling interval (s).
 
     Raises

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 
 @numba.njit(cache=True, nogil=True)

@@ -14,10 +14,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gmwm import checks
-from gmwm._typing import FloatArray
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.wavelets import wavelet as wavelet_of
+from gmwm.process import wavelet as wavelet_of
 
 _CHUNK = 4096  # samples that stay in the cache while all taps pass over them
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmwm._typing import FloatArray
-from gmwm.process.spectral import PSD, quadrature
+from gmwm._core.typing import FloatArray
+from gmwm.process import PSD, quadrature
 
 _ITERATIONS = 12
 _STEP = 0.8

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process.spectral import PSD
+from gmwm.process import PSD
 from gmwm.variance.wavelet import WaveletVariance
 
 

@@ -30,9 +30,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import brentq
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process.spectral import legendre
+from gmwm.process import legendre
 from gmwm.variance.robust_kernels import biweight_means, middle_bin
 
 EFFICIENCY = 0.6

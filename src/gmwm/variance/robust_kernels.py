@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 _DROPPED_BITS = 46  # of the 52 of a mantissa: bins of 1.6 %
 _BIN_MASK = (1 << 17) - 1  # without the sign

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from gmwm._typing import FloatArray
+from gmwm._core.typing import FloatArray
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
-from gmwm._typing import FloatArray
-from gmwm.process.spectral import PSD
-from gmwm.variance.covariance import haar_covariance, line_covariance, mean_covariance
-from gmwm.variance.gaps import gappy_covariance, gappy_mean_covariance
+from gmwm._core.typing import FloatArray
+from gmwm.process import PSD
+from gmwm.variance.covariance.gaps import gappy_covariance, gappy_mean_covariance
+from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
 from gmwm.variance.pilot import pilot_psd
 from gmwm.variance.runs import Runs
 
@@ -105,7 +105,7 @@ class WaveletVariance:
         """Number of samples that a coefficient is made of, (J,)."""
         if self.wavelet == "haar":
             return 2.0 * self.averaging
-        from gmwm.wavelets import wavelet
+        from gmwm.process import wavelet
 
         kind = wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
@@ -115,7 +115,7 @@ class WaveletVariance:
         """Mean of the coefficients per unit of drift (u/s), s, (J,)."""
         if self.wavelet == "haar":
             return 0.5 * self.tau
-        from gmwm.wavelets import wavelet
+        from gmwm.process import wavelet
 
         moments = wavelet(self.wavelet).vanishing_moments
         return 0.5 * self.tau if moments < 2 else np.zeros_like(self.tau)
@@ -159,7 +159,7 @@ class WaveletVariance:
                     tuple(lines), psd, self.dt, self.averaging, self.counts
                 )
         if self.efficiency < 1.0:
-            from gmwm.variance.robust_covariance import robust_covariance
+            from gmwm.variance.covariance.robust import robust_covariance
 
             covariance = robust_covariance(
                 psd, self.n, self.dt, self.efficiency, covariance, self.counts
@@ -172,7 +172,7 @@ class WaveletVariance:
         return gappy_covariance(psd, self.present, self.dt, self.averaging)
 
     def _of_other_wavelet(self, psd: PSD, lines: Sequence[tuple[float, float]]) -> FloatArray:
-        from gmwm.variance.wavelet_covariance import wavelet_covariance
+        from gmwm.variance.covariance.daubechies import wavelet_covariance
 
         covariance = wavelet_covariance(
             psd, self.n, self.dt, self.wavelet, self.tau.size, tuple(lines)
@@ -290,9 +290,9 @@ class WaveletVariance:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes."""
-        from gmwm import plot
+        from gmwm import plotting
 
         low, high = np.sqrt(2.0 * self.lower), np.sqrt(2.0 * self.upper)
-        return plot.deviation(
+        return plotting.deviation(
             self.tau, self.allan_deviation, low, high, unit=self.unit, title=self.name, ax=ax
         )

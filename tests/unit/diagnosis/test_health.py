@@ -1,7 +1,6 @@
 """`Health`: what it prints, holds and refuses; and what it finds in real recordings."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,9 @@ from gmwm import Health, InputError
 from gmwm.diagnosis import Finding
 from gmwm.diagnosis.check import _peaks
 from gmwm.diagnosis.findings import SEVERITIES
+from places import SHARED
 
-ADIS = Path(__file__).resolve().parents[4] / "shared/data/adis16405"
+ADIS = SHARED / "data/adis16405"
 needs_adis = pytest.mark.skipif(not ADIS.exists(), reason="ADIS16405 recordings are not here")
 
 
@@ -76,9 +76,9 @@ def test_unknown_channel_lists_those_there_are(sick):
 
 
 def test_progress_is_told(sick):
-    names = []
-    gmwm.health(sick, progress=names.append)
-    assert names == ["gyro_x", "gyro_y"]
+    heard = []
+    gmwm.health(sick, progress=lambda *told: heard.append(told))
+    assert heard == [(0, 2, "gyro_x"), (1, 2, "gyro_y"), (2, 2, "")]
 
 
 def test_the_recording_stays_as_it_is(sick):

@@ -1,27 +1,25 @@
 """Every process obeys the same laws: closed form = spectral integral = mean over simulation."""
 
 import json
-from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.process import CATALOGUE, Process
 from gmwm.process.spectral import haar_gain, haar_variance
 from gmwm.variance.analysis import wavelet_variance
-from gmwm.variance.covariance import (
+from gmwm.variance.covariance.haar import (
     dyadic_levels,
     haar_counts,
     haar_covariance,
     line_covariance,
 )
+from places import GOLDEN
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "haar_wavelet_variance.json"
-CURVES = json.loads(GOLDEN.read_text())["curves"]
+CURVES = json.loads((GOLDEN / "haar_wavelet_variance.json").read_text())["curves"]
 EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]
 LEVELS = 2.0 ** np.arange(20)
 
@@ -222,10 +220,8 @@ def test_resonance_is_exact_at_any_frequency_and_damping(log_frequency, damping,
 class PowerLaw(Process):
     """A user's process that gives a spectrum and nothing else."""
 
-    parameters = (
-        gmwm.Parameter("level", "u", role="scale"),
-        gmwm.Parameter("slope", "-", lower=0.0, upper=1.9),
-    )
+    level: float = gmwm.parameter("u", role="scale")
+    slope: float = gmwm.parameter("-", lower=0.0, upper=1.9)
 
     def psd(self, f, dt):
         return self.level**2 * dt * (2.0 * np.sin(np.pi * f * dt)) ** -self.slope

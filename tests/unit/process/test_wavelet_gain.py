@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.process import CATALOGUE
 from gmwm.process.spectral import wavelet_variance
 from gmwm.process.wavelet_gain import gain_weights, lagrange, pair_weights, unit_legendre
-from gmwm.wavelets import NAMES, wavelet
+from gmwm.process.wavelets import NAMES, wavelet
 
 EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]
 SOME = ("haar", "db2", "db4", "db10", "sym6", "coif1", "coif5")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import gzip
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gmwm._core.units import factor
 from gmwm.readers import csv_table, read
 from gmwm.readers.names import CANONICAL
-from gmwm.units import factor
+from places import SHARED
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 HEADER = ",".join(CANONICAL)
@@ -315,12 +315,9 @@ def test_path_may_be_a_string(write, samples):
     assert_holds(read(str(write(samples, HEADER)), rate=1, units=SI), samples)
 
 
-SHARED = Path(__file__).resolve().parents[3].parent / "shared" / "data"
-
-
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data are not beside the repository")
 def test_real_recording():
-    path = SHARED / "adis16405" / "adis16405_1.csv.gz"
+    path = SHARED / "data" / "adis16405" / "adis16405_1.csv.gz"
     recording = read(path, rate=100, units={"gyro": "deg/s", "accel": "g"})
     assert recording.names == CANONICAL
     assert recording.n == 1_000_000

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.report.validation_page import write_validation_report
+from gmwm.report.validation import write_validation_report
 
 
 def text_of(path: Path) -> str:

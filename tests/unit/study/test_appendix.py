@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.study import appendix
-from gmwm.study.appendix import allan_least_squares, converge, expectation, text
+from gmwm.study.appendix import allan_least_squares, converge, convergence_table, expectation
 
 
 def test_lines_are_exact_where_each_process_is_alone():
@@ -34,6 +34,6 @@ def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
     last = rows[-1]
     assert np.all(np.abs(last.gmwm - truth) < 4.0 * last.gmwm_error)
     assert np.all(last.allan - truth > 4.0 * last.allan_error)
-    report = text(rows)
+    report = convergence_table(rows)
     assert max(map(len, report.splitlines())) <= 80
     assert "sigma2_RW, truth 0.0004" in report

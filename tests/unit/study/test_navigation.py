@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration import Calibration
+from gmwm.calibration.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.estimate.methods import fit
-from gmwm.ins.sensors import AXES
+from gmwm.estimate.entrance import fit
+from gmwm.ins.imu.sensors import AXES
 from gmwm.process import BiasInstability
-from gmwm.recording import Recording
+from gmwm.readers.recording import Recording
 from gmwm.study import navigation
 from gmwm.study.navigation import TABLE_5, TABLE_6, Calibrated, experiment, reproduce_figure
 from gmwm.variance.analysis import wavelet_variance

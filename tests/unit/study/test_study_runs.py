@@ -6,9 +6,8 @@ import pytest
 
 from gmwm import InputError, RandomWalk, WhiteNoise
 from gmwm.study import runs as engine
-from gmwm.study.catalogue import SCENARIOS
 from gmwm.study.runs import one_run, run_scenario
-from gmwm.study.scenario import Quantity, Scenario
+from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
 
 SMALL = Scenario(
     name="small",
@@ -89,7 +88,7 @@ def test_an_interrupted_study_goes_on_where_it_stopped(tmp_path, monkeypatch):
     again = run_scenario(
         SMALL, tmp_path / "part", runs=6, resume=True, progress=lambda *a: seen.append(a)
     )
-    assert seen[0] == (3, 6) and seen[-1] == (6, 6)
+    assert seen[0] == (3, 6, "") and seen[-1] == (6, 6, "")
     same(again, whole)
 
 

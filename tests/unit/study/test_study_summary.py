@@ -5,9 +5,8 @@ import pyarrow as pa
 import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
-from gmwm.study.catalogue import SCENARIOS
 from gmwm.study.figures import boxplots
-from gmwm.study.scenario import FIGURES, Quantity, Scenario
+from gmwm.study.scenario import FIGURES, SCENARIOS, Quantity, Scenario
 from gmwm.study.summary import summarise
 
 WHITE = Scenario(

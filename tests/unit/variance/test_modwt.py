@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 import pywt
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from gmwm import InputError
+from gmwm.process.wavelets import NAMES, wavelet
 from gmwm.variance.modwt import coefficients, imodwt, modwt
-from gmwm.wavelets import NAMES, wavelet
 
 SOME = ("haar", "db2", "db5", "db10", "sym8", "coif2", "coif5")
 

@@ -1,11 +1,8 @@
 """The robust variance and its covariance: roots, contamination, and simulated sampling laws."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import fftconvolve
@@ -14,13 +11,14 @@ from scipy.stats import binom, chi2, norm
 
 import gmwm
 from gmwm.errors import InputError
-from gmwm.variance.covariance import dyadic_levels, haar_counts, haar_covariance
+from gmwm.variance.covariance.haar import dyadic_levels, haar_counts, haar_covariance
+from gmwm.variance.covariance.robust import excess_series, pair_shares, robust_covariance
 from gmwm.variance.kernels import cumulative, haar_coefficients
 from gmwm.variance.robust import consistency, robust_variance, tuning_constant
-from gmwm.variance.robust_covariance import excess_series, pair_shares, robust_covariance
 from gmwm.variance.robust_kernels import middle_bin
+from places import SHARED
 
-MTIG = Path(__file__).resolve().parents[4] / "shared/data/mtig/mtig_contaminated_gyro_x.csv.gz"
+MTIG = SHARED / "data/mtig/mtig_contaminated_gyro_x.csv.gz"
 EFFICIENCIES = [0.1, 0.3, 0.6, 0.9, 0.99]
 
 

@@ -1,18 +1,15 @@
 """The wavelet variance of a series against allantools, real recordings, and bad input."""
 
 import json
-from pathlib import Path
 
 import allantools
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.stats import binom
 
 import gmwm
-
-SHARED = Path(__file__).resolve().parents[4] / "shared"
+from places import SHARED
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)

@@ -1,0 +1,60 @@
+from . import ins as ins
+from .budget import ErrorBudget as ErrorBudget, ErrorRow as ErrorRow, error_budget as error_budget
+from .calibration import Calibration as Calibration, calibrate as calibrate, load as load
+from .diagnosis import Health as Health, health as health
+from .errors import (
+    FitWarning as FitWarning,
+    InputError as InputError,
+    MissingNameError as MissingNameError,
+)
+from .estimate import (
+    EM as EM,
+    GMWM as GMWM,
+    MLE as MLE,
+    AllanLines as AllanLines,
+    Bootstrap as Bootstrap,
+    CramerRao as CramerRao,
+    Estimate as Estimate,
+    Fit as Fit,
+    JointFit as JointFit,
+    SimulatedMoments as SimulatedMoments,
+    Whittle as Whittle,
+    bootstrap as bootstrap,
+    bootstrap_test as bootstrap_test,
+    cramer_rao as cramer_rao,
+    fit as fit,
+)
+from .process import (
+    AR as AR,
+    ARIMA as ARIMA,
+    ARMA as ARMA,
+    MA as MA,
+    BiasInstability as BiasInstability,
+    GaussMarkov as GaussMarkov,
+    Model as Model,
+    Parameter as Parameter,
+    Process as Process,
+    QuantizationNoise as QuantizationNoise,
+    RandomWalk as RandomWalk,
+    RateRamp as RateRamp,
+    Resonance as Resonance,
+    Sinusoid as Sinusoid,
+    StateSpace as StateSpace,
+    WhiteNoise as WhiteNoise,
+    parameter as parameter,
+    simulate as simulate,
+)
+from .readers import Channel as Channel, Recording as Recording, read as read
+from .selection import Selection as Selection, select as select
+from .variance import (
+    Deviations as Deviations,
+    Modwt as Modwt,
+    WaveletVariance as WaveletVariance,
+    deviations as deviations,
+    haar_covariance as haar_covariance,
+    imodwt as imodwt,
+    modwt as modwt,
+    wavelet_variance as wavelet_variance,
+)
+
+__version__: str

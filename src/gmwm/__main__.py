@@ -1,0 +1,5 @@
+"""``python -m gmwm``."""
+
+from gmwm.cli import main
+
+main()

@@ -1,0 +1,120 @@
+"""Values that the user gave: what they must be, or one sentence that says so."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+
+_SHORTEST, _LONGEST = 1e-9, 1e6  # sampling interval, s
+_MOST = 10**11  # samples: 800 GB
+
+
+def shown(value: Any) -> str:
+    """A value as messages quote it: one short line."""
+    return textwrap.shorten(repr(value), 60, placeholder=" ...")
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite real number; a truth value is none."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        return False
+    try:
+        return bool(np.isfinite(float(value)))
+    except OverflowError:
+        return False
+
+
+def positive(name: str, value: Any, mend: str = "give a positive number") -> float:
+    """A number above zero.
+
+    Raises
+    ------
+    InputError
+        For anything else; so do all functions of this module.
+    """
+    if not is_number(value) or not value > 0.0:
+        raise InputError(f"{name} = {shown(value)}: {mend}")
+    return float(value)
+
+
+def whole(name: str, value: Any, least: int, mend: str = "") -> int:
+    """A whole number, which may be written as 1e6, not below the least one."""
+    if not is_number(value) or value != int(value) or value < least:
+        raise InputError(
+            f"{name} = {shown(value)}: {mend or f'give a whole number, {least} or more'}"
+        )
+    return int(value)
+
+
+def share(name: str, value: Any, example: float) -> float:
+    """A number between 0 and 1, neither included."""
+    if not is_number(value) or not 0.0 < value < 1.0:
+        raise InputError(
+            f"{name} = {shown(value)}: give a number between 0 and 1, e.g. {example:g}"
+        )
+    return float(value)
+
+
+def choice(name: str, value: Any, known: Sequence[str]) -> str:
+    """One of the words that are known."""
+    if not isinstance(value, str) or value not in known:
+        raise InputError(f"{name} = {shown(value)}: known are {', '.join(known)}")
+    return value
+
+
+def truth(name: str, value: Any) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {shown(value)}: give True or False")
+    return bool(value)
+
+
+def samples(value: Any, least: int = 1) -> int:
+    """A number of samples ``n`` that a computer can hold."""
+    mend = "give a positive whole number of samples"
+    if least > 1:
+        mend = f"give a whole number of samples, {least} or more"
+    n = whole("n", value, least, mend)
+    if n > _MOST:
+        raise InputError(f"n = {shown(value)}: that is too long, give at most {_MOST:,} samples")
+    return n
+
+
+def sampling_interval(value: Any) -> float:
+    """A sampling interval ``dt`` that a sensor may have, s."""
+    mend = "give a positive sampling interval in seconds"
+    dt = positive("dt", value, mend)
+    if not _SHORTEST <= dt <= _LONGEST:
+        raise InputError(f"dt = {shown(value)}: {mend}, {_SHORTEST:g} to {_LONGEST:g}")
+    return dt
+
+
+def generator(seed: Any) -> np.random.Generator:
+    """A random generator as it is, or a new one of a seed."""
+    try:
+        return np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"seed = {shown(seed)}: give a whole number, zero or more, or a numpy.random.Generator"
+        ) from None
+
+
+def real_numbers(values: Any, where: str) -> FloatArray:
+    """An array of real numbers."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "cmM":
+            kind = "complex numbers" if array.dtype.kind == "c" else "dates or durations"
+            raise InputError(f"{where} holds {kind}: give real numbers in the sensor's unit")
+        return np.asarray(array, dtype=float)
+    except InputError:
+        raise
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{where} holds something that is not a number") from None

@@ -1,0 +1,121 @@
+"""Results as JSON documents that say what they are."""
+
+from __future__ import annotations
+
+import json
+import os
+from abc import abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from gmwm._core.files import written
+from gmwm.errors import InputError
+
+
+class Document:
+    """A result that can be saved, and comes back from its file by `load_document`.
+
+    A subclass names its ``SCHEMA`` and gives ``content`` and ``from_content``.
+    """
+
+    SCHEMA: ClassVar[str] = ""
+    SCHEMA_VERSION: ClassVar[int] = 1
+
+    _kinds: ClassVar[dict[str, type[Document]]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "SCHEMA" in vars(cls):
+            Document._kinds[cls.SCHEMA] = cls
+
+    @abstractmethod
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, in JSON types."""
+
+    @classmethod
+    @abstractmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`; errors of missing or wrong parts are those of Python."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, in JSON types; see `from_dict`."""
+        return {
+            "schema": self.SCHEMA,
+            "schema_version": self.SCHEMA_VERSION,
+            **self.content(),
+        }
+
+    @classmethod
+    def from_dict(cls, content: Any) -> Self:
+        """Inverse of `to_dict`.
+
+        Raises
+        ------
+        InputError
+            If the content is of another schema or version, or damaged.
+        """
+        what = cls.SCHEMA.rpartition(".")[2]
+        if not isinstance(content, Mapping) or content.get("schema") != cls.SCHEMA:
+            raise InputError(f"this is not a {what}: give a file that was saved from one")
+        version = content.get("schema_version")
+        if version != cls.SCHEMA_VERSION:
+            raise InputError(
+                f"schema version {version!r} is not known here (known is {cls.SCHEMA_VERSION}): "
+                f"make the {what} again or update gmwm"
+            )
+        try:
+            return cls.from_content(content)
+        except InputError as error:
+            raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise InputError(f"the {what} is damaged ({error!r}): make it again") from None
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything as JSON; the file appears whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        with written(path) as stream:
+            json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
+            stream.write("\n")
+        return Path(path)
+
+
+def read_json(path: str | os.PathLike[str]) -> Any:
+    """Content of a JSON file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or is not JSON.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is not JSON ({error}): give a file that was saved") from None
+
+
+def load_document(path: str | os.PathLike[str]) -> Any:
+    """A result from the file that its ``save`` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not JSON, or holds no result of a kind known here.
+    """
+    content = read_json(path)
+    schema = content.get("schema") if isinstance(content, Mapping) else None
+    kind = Document._kinds.get(schema) if isinstance(schema, str) else None
+    if kind is None:
+        known = ", ".join(sorted(Document._kinds))
+        raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")
+    try:
+        return kind.from_dict(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,41 @@
+"""What results hold does not change: arrays and dictionaries that can be read only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class FrozenDict(dict[K, V]):
+    """A dictionary that does not change; `types.MappingProxyType` cannot be pickled."""
+
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
+        raise TypeError("a result does not change: make a dict of it first")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FrozenDict, (dict(self),)
+
+
+def frozen(value: Any) -> Any:
+    """An array as a view, or a mapping as a copy, that cannot be written to; others as they are."""
+    if isinstance(value, np.ndarray):
+        view = value.view()
+        view.flags.writeable = False
+        return view
+    if isinstance(value, Mapping) and not isinstance(value, FrozenDict):
+        return FrozenDict(value)
+    return value
+
+
+def freeze(instance: Any, *names: str) -> None:
+    """Make fields of a frozen dataclass read-only, from its ``__post_init__``."""
+    for name in names:
+        object.__setattr__(instance, name, frozen(getattr(instance, name)))

@@ -1,0 +1,41 @@
+"""Text for people: lines of 80 columns, sizes in usual units."""
+
+from __future__ import annotations
+
+import textwrap
+
+from gmwm._core.units import factor
+
+WIDTH = 80
+
+_UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}
+_LARGE = 1000.0
+
+
+def spoken(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
+    """A number in deg/s, mg or g; in its own unit where that is another.
+
+    Parameters
+    ----------
+    value : float
+        In ``unit``.
+    unit : str
+        Of the channel, SI.
+    sign : bool, optional
+        Whether a plus is written.
+    digits : int, optional
+    """
+    for name in _UNITS.get(unit, (unit,)):
+        shown = value if name == unit else value / factor(name, unit)
+        if abs(shown) < _LARGE:
+            break
+    plus = "+" if sign else ""
+    return f"{shown:{plus}.{digits}g} {name}".rstrip()
+
+
+def wrapped(text: str, first: str = "", indent: int = 0) -> list[str]:
+    """Lines of a text after ``first``, the second and later ones indented."""
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=first, subsequent_indent=" " * indent,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip

@@ -1,8 +1,0 @@
-"""Array types used in annotations."""
-
-from __future__ import annotations
-
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]

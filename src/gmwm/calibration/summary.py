@@ -1,0 +1,140 @@
+"""What a fitted model means: equivalent noise density, floor, and sentences for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.units import field_units
+from gmwm.errors import InputError
+from gmwm.estimate import fit
+from gmwm.estimate.result import Fit
+from gmwm.process import Process, RandomWalk, WhiteNoise
+
+_REFERENCE = 1.0  # s, the averaging time at which white noise is read off an Allan plot
+_WHITE_RATIO = 0.6  # of wavelet variances at 2 s and 1 s, below which a term acts as white noise
+_PLATEAU = np.sqrt(2.0 * np.log(2.0) / np.pi)
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Lowest point of the Allan deviation.
+
+    Attributes
+    ----------
+    deviation : float
+        SI.
+    tau : float
+        Averaging time, s.
+    """
+
+    deviation: float
+    tau: float
+
+    @property
+    def bias_instability(self) -> float:
+        """The B that would make a plateau of this height, by the convention of IEEE Std 952."""
+        return float(self.deviation / _PLATEAU)
+
+
+def white_density(fitted: Fit) -> float:
+    """Density of the white noise that acts like the fast terms at averaging times of 1 s and more.
+
+    White and quantization noise and Gauss-Markov processes of short correlation time all average
+    out; together they count for what a filter with white noise alone would be given.
+
+    Returns
+    -------
+    float
+        In u/sqrt(Hz); zero if no term of the model is fast.
+    """
+    tau = np.array([1.0, 2.0]) * max(_REFERENCE, 4.0 * fitted.wv.dt)
+    total = 0.0
+    for term in fitted.model.terms:
+        first, second = term.haar_variance(tau, fitted.wv.dt)
+        if first > 0.0 and second < _WHITE_RATIO * first:
+            total += 2.0 * tau[0] * first
+    return float(np.sqrt(total))
+
+
+def floor(fitted: Fit) -> Floor:
+    """Lowest point of the fitted Allan deviation at averaging times with data."""
+    deviation = np.sqrt(2.0 * fitted.implied)
+    lowest = int(np.argmin(deviation))
+    return Floor(float(deviation[lowest]), float(fitted.wv.tau[lowest]))
+
+
+@dataclass(frozen=True)
+class Level:
+    """A noise level, or how large it may be.
+
+    Attributes
+    ----------
+    value : float
+        In the unit of the parameter.
+    found : bool
+        Whether the model has it; otherwise ``value`` is an upper bound of 95 %.
+    """
+
+    value: float
+    found: bool
+
+
+def noise_density(fitted: Fit) -> Level:
+    """`white_density`, or the upper bound of a white noise where no term is fast."""
+    density = white_density(fitted)
+    return (
+        Level(density, True) if density > 0.0 else Level(_bound(fitted, WhiteNoise(), "N"), False)
+    )
+
+
+def random_walk(fitted: Fit) -> Level:
+    """The random walk of a model, or its upper bound where it has none."""
+    present = fitted.params.get("K", 0.0)
+    if present > 0.0 and "K" not in fitted.upper_bounds:
+        return Level(present, True)
+    return Level(_bound(fitted, RandomWalk(), "K"), False)
+
+
+def _bound(fitted: Fit, process: Process, key: str) -> float:
+    """Upper bound of a term added to the model and fitted together with it.
+
+    Raises
+    ------
+    InputError
+        If the data do not bound it.
+    """
+    opened = fitted.model.opened()
+    again = fit(opened if key in fitted.params else opened + process, fitted.wv)
+    bound = float(again.interval()[key][1])
+    if not np.isfinite(bound):
+        raise InputError(
+            f"channel {fitted.wv.name!r}: {key} cannot be bounded by this record: record longer"
+        )
+    return bound
+
+
+def sentence(fitted: Fit) -> str:
+    """What the model means for who integrates this sensor, in one or two sentences."""
+    density, low = white_density(fitted), floor(fitted)
+    quantity = fitted.wv.quantity
+    if quantity == "gyro":
+        angle = np.degrees(density) * np.sqrt(60.0)
+        noise = (
+            "Integrated for a minute, the white noise alone gives an angle error of "
+            f"{angle:.2g} deg (1 sigma)"
+        )
+    elif quantity == "accel":
+        noise = (
+            "Integrated for a minute, the white noise alone gives a velocity error of "
+            f"{density * np.sqrt(60.0):.2g} m/s (1 sigma)"
+        )
+    else:
+        noise = f"White noise of {density:.3g} {fitted.wv.unit}/sqrt(Hz)"
+    unit = field_units("u", quantity)
+    floor_text = f"{low.deviation:.3g} {fitted.wv.unit}"
+    if unit:
+        floor_text = f"{low.deviation * unit[0].per_si:.3g} {unit[0].unit}"
+    end = "" if low.tau < fitted.wv.tau[-1] else " (still falling at the end of the record)"
+    return f"{noise}. Averaging helps up to {low.tau:.4g} s, down to {floor_text}{end}."

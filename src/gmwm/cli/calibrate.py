@@ -1,0 +1,148 @@
+"""``gmwm calibrate``: a recording in, an error model for every channel out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
+from gmwm.cli.options import read_recording, reading_options
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from gmwm.calibration import Calibration
+
+
+def output_option(default: str) -> Callable[[Any], Any]:
+    return click.option(
+        "-o",
+        "--output",
+        type=click.Path(path_type=Path),
+        default=Path(default),
+        show_default=True,
+        help="Folder for calibration.json, report.html, imu.yaml.",
+    )
+
+
+@click.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
+@output_option("gmwm-out")
+@reading_options
+@click.option("--leave", "left", multiple=True,
+              type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
+              metavar="WHAT",
+              help="Leave events, lines, resonances, outliers or all as they are: samples of "
+                   "knocks are masked otherwise, lines and resonances are terms that a model may "
+                   "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+def calibrate(
+    files: tuple[Path, ...],
+    output: Path,
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+    left: tuple[str, ...],
+    jobs: int,
+) -> None:
+    """Calibrate every channel of a static recording, or of several of one sensor.
+
+    FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
+    Empty fields, NaN and rows that the time column jumps over are missing samples.
+    For each channel an error model is selected and estimated; the table shows it in the units of
+    the field, the files hold everything in SI units. Several recordings of one sensor have one
+    model, with a test whether they agree.
+
+    \b
+    Examples:
+      gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
+      gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
+    """
+    from gmwm._core.files import folder_to_fill
+    from gmwm.calibration import REMEDIES, calibrate as run
+
+    with folder_to_fill(output) as folder:
+        recordings = [
+            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
+            for file in files
+        ]
+        with progress_bar("calibrating", "channels") as bar:
+            chosen = () if "all" in left else [name for name in REMEDIES if name not in left]
+            result = run(recordings, remedies=chosen, jobs=jobs, progress=bar)
+        # The files first: who pipes the table into head must not lose them.
+        written = write_files(result, folder)
+    show(result)
+    click.echo(written)
+
+
+def show(result: Calibration) -> None:
+    from gmwm.estimate.result import JointFit
+    from gmwm.report import duration_text
+
+    console = new_console()
+    console.print(
+        f"{result.source}: {duration_text(result.duration)} at {result.rate:g} Hz, "
+        f"{result.n:,} samples a channel",
+        highlight=False,
+    )
+    print_whole(console, _table(result))
+    for note in (*result.notes, *result.warnings):
+        console.print(f"- {note}", highlight=False)
+    for name, why in result.skipped.items():
+        console.print(f"- {name} skipped: {why}", highlight=False)
+    for name, fit in result.fits.items():
+        if isinstance(fit, JointFit):
+            console.print(f"- {name}: {fit.agreement}", highlight=False)
+        for notice in fit.notices:
+            console.print(f"- {name}: {notice}", highlight=False)
+
+
+def _table(result: Calibration) -> Table:
+    table = new_table("channel", "parameter", ">estimate", "95 % interval", "unit")
+    for name, fit in result.fits.items():
+        rows = fit.estimates
+        for i, row in enumerate(rows):
+            usual = row.usual
+            cells = [name if i == 0 else "", row.key]
+            if row.kind == "bound":
+                cells += [f"{usual.value:.3g}", f"below {usual.upper:.3g}", usual.unit]
+            elif row.kind == "estimated":
+                interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
+                cells += [f"{usual.value:.4g}", interval, usual.unit]
+            else:
+                cells += [f"{usual.value:.4g}", row.kind, usual.unit]
+            if i == 1 and not fit.valid:
+                cells[0] = "not valid"
+            last = i == len(rows) - 1
+            table.add_row(*cells, end_section=last and (fit.valid or i > 0))
+        if len(rows) == 1 and not fit.valid:
+            table.add_row("not valid", "", "", "", "", end_section=True)
+    return table
+
+
+def write_files(result: Calibration, folder: Path) -> str:
+    """Write the files; returns what to say of them."""
+    from gmwm._core.files import replaceable
+    from gmwm.export import write_kalibr
+
+    paths = [replaceable(folder / name) for name in ("calibration.json", "report.html")]
+    kalibr = replaceable(folder / "imu.yaml")
+    quantities = {fit.wv.quantity for fit in result.fits.values()}
+    lines = []
+    if {"gyro", "accel"} <= quantities:
+        try:
+            paths.append(write_kalibr(result, kalibr))
+        except InputError as error:
+            lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
+    elif kalibr.exists():
+        lines = [f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer"]
+    result.report(paths[1])
+    result.save(paths[0])
+    return "\n".join([f"wrote {path}" for path in paths] + lines)

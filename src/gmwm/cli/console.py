@@ -1,0 +1,66 @@
+"""What the terminal shows: tables, a bar of progress."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from gmwm._core.typing import Progress
+
+
+def new_console(width: int | None = None) -> Console:
+    from rich.console import Console
+
+    # Piped output is as wide as a terminal that people use, not as rich guesses.
+    return Console(width=width or (None if sys.stdout.isatty() else 80))
+
+
+def print_whole(console: Console, table: Table) -> None:
+    """Print a table at the width that it needs: a number that is cut off is a wrong number."""
+    from rich.measure import Measurement
+
+    needed = Measurement.get(console, console.options.update(width=10_000), table).maximum
+    new_console(max(console.width, needed)).print(table)
+
+
+def new_table(*columns: str) -> Table:
+    """A plain table; ``>`` before a title puts the column to the right."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for title in columns:
+        justify: Literal["left", "right"] = "right" if title.startswith(">") else "left"
+        table.add_column(title.removeprefix(">"), justify=justify, no_wrap=True)
+    return table
+
+
+@contextmanager
+def progress_bar(title: str, unit: str) -> Iterator[Progress]:
+    """A bar with the time that is left, on a terminal only."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress as Bar,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(),
+               TextColumn(unit + " {task.description}"), TimeRemainingColumn(),
+               TextColumn("left"))  # fmt: skip
+    console = Console(stderr=True)
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+
+        def advance(done: int, total: int, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=what)
+
+        yield advance

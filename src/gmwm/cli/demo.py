@@ -1,0 +1,82 @@
+"""``gmwm demo``: a simulated recording, calibrated and compared with the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gmwm.cli.calibrate import output_option, write_files
+from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
+
+if TYPE_CHECKING:
+    from gmwm.calibration import Calibration
+    from gmwm.process import Model
+
+
+@click.command()
+@output_option("gmwm-demo")
+@click.option("--hours", type=click.FloatRange(0.01, 100.0), default=1.0, show_default=True,
+              help="Length of the simulated recording in hours.")  # fmt: skip
+@click.option("--seed", type=int, default=1, show_default=True)
+def demo(output: Path, hours: float, seed: int) -> None:
+    """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
+
+    The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
+
+    \b
+    Example:
+      gmwm demo --hours 4 --seed 2
+    """
+    from gmwm._core.files import folder_to_fill
+    from gmwm.calibration import calibrate as run
+    from gmwm.report import duration_text
+    from gmwm.study import simulated_imu
+
+    with folder_to_fill(output) as folder:
+        recording, truth = simulated_imu(3600.0 * hours, seed)
+        forms = {name: model.opened() for name, model in truth.items()}
+        with progress_bar("fitting", "channels") as bar:
+            fitted = run(recording, forms, progress=bar)
+        with progress_bar("selecting", "channels") as bar:
+            selected = run(recording, progress=bar)
+        written = write_files(selected, folder)
+    click.echo(f"{recording.source}: {duration_text(recording.duration)} at {recording.rate:g} Hz")
+    click.echo("\nTruth and estimate, the form of each model known:\n")
+    show_truth(fitted, truth)
+    click.echo("\nSelected where the form is not known, as gmwm calibrate does:\n")
+    for name, fit in selected.fits.items():
+        click.echo(f"  {name:8}  {fit.model.title()}")
+    click.echo(f"\n{written}")
+
+
+def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
+    """One table of truth beside estimate."""
+    from gmwm.study import compare
+
+    table = new_table("channel", "param.", ">truth", ">estimate", "95 % interval", "unit")
+    determined = covered = total = 0
+    for name, fit in fitted.fits.items():
+        rows = compare(fit, truth[name])
+        for i, row in enumerate(rows):
+            total += 1
+            determined += row.determined
+            covered += row.determined and row.covered
+            cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
+            if not row.determined:
+                cells = ["-", "too short to tell"]
+            elif row.lower == 0.0:
+                cells = [f"{row.estimate:.3g}", f"below {row.upper:.4g}"]
+            if not row.covered:
+                cells[1] += " *"
+            first = name if i == 0 else ""
+            table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit,
+                          end_section=i == len(rows) - 1)  # fmt: skip
+    console = new_console()
+    print_whole(console, table)
+    console.print(
+        f"{determined} of {total} parameters are determined by this record; {covered} of these "
+        f"{determined} intervals hold the truth (* does not).",
+        highlight=False,
+    )

@@ -1,0 +1,286 @@
+"""``gmwm navigate``: parse, run, print, write."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gmwm.cli.console import progress_bar
+from gmwm.cli.options import reading_options, roles, time_reference
+from gmwm.errors import InputError
+
+_NEEDED = (
+    "gmwm navigate needs a trajectory, a truth and filters: give STUDY.yaml, or --trajectory, "
+    "--truth and --filter; or, for your own data, --imu, --gnss and --sensors (examples: gmwm "
+    "navigate --help)"
+)
+
+_READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time"}
+_OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
+
+
+@click.command()
+@click.argument("file", required=False, type=click.Path(path_type=Path), metavar="[STUDY.yaml]")
+@click.option("--trajectory", metavar="NAME",
+              help="helicopter, car, loiter, or a CSV of time, latitude, longitude, height, roll, "
+                   "pitch, yaw.")  # fmt: skip
+@click.option("--duration", type=float, help="s, of the trajectory.")
+@click.option("--truth", metavar="FILE", help="calibration.json that sensor errors are drawn from.")
+@click.option("--filter", "filters", multiple=True, metavar="NAME=FILE",
+              help="A filter and the calibration.json that it believes; 'truth' for the true "
+                   "models; repeat. The others are compared with the first.")  # fmt: skip
+@click.option("--outage", "outages", multiple=True, metavar="START:LENGTH",
+              help="Seconds without GNSS; repeat.")  # fmt: skip
+@click.option("--runs", type=click.IntRange(min=1), help="Number of runs.  [default: 100]")
+@click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-navigate"),
+              show_default=True, help="Folder for the report, the table and the runs.")  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
+@click.option("--imu", metavar="FILE", help="Your own data: IMU samples, with a header as for gmwm "
+                                            "calibrate; axes forward, right, down.")  # fmt: skip
+@click.option("--gnss", "gnss_fixes", metavar="FILE",
+              help="Fixes: time, latitude, longitude, height, on the IMU's clock.")  # fmt: skip
+@click.option("--sensors", metavar="FILE", help="calibration.json of the IMU.")
+@click.option("--lever-arm", metavar="X,Y,Z",
+              help="m, from the IMU to the antenna: forward, right, down.")  # fmt: skip
+@click.option("--heading", type=float,
+              help="deg, at the first fix; by default from GNSS once it moves.")  # fmt: skip
+@click.option(
+    "--gyro-bias",
+    metavar="VALUE",
+    help="How far a gyro may be off when it is switched on.  [default: 0.1 deg/s]",
+)
+@click.option("--accel-bias", metavar="VALUE",
+              help="The same of an accelerometer.  [default: 0.1 m/s^2]")  # fmt: skip
+@reading_options
+def navigate(
+    file: Path | None,
+    trajectory: str | None,
+    duration: float | None,
+    truth: str | None,
+    filters: tuple[str, ...],
+    outages: tuple[str, ...],
+    runs: int | None,
+    seed: int | None,
+    jobs: int | None,
+    output: Path,
+    resume: bool,
+    imu: str | None,
+    gnss_fixes: str | None,
+    sensors: str | None,
+    lever_arm: str | None,
+    heading: float | None,
+    gyro_bias: str | None,
+    accel_bias: str | None,
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+) -> None:
+    """Prove sensor models by navigating; or filter your own IMU and GNSS.
+
+    INS/GNSS filters, outages, Monte Carlo: errors of the sensors, drawn from the true models or
+    taken from real static recordings, are added to the error-free signals of a trajectory; every
+    filter navigates on the same errors. Printed are the errors at the end of the outages and
+    whether each filter knows how good it is. A YAML file can say more than the options, which go
+    before it; see docs/navigation.md.
+
+    With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
+    written; what the innovations say of the sensor models is printed.
+
+    \b
+    Examples:
+      gmwm navigate study.yaml -o out
+      gmwm navigate --trajectory car --truth cal.json --filter GMWM=cal.json \\
+        --filter AV=av.json --outage 600:60 --outage 900:40
+      gmwm navigate --imu imu.csv --gnss fixes.csv --sensors out/calibration.json
+    """
+    from gmwm.ins.spec import read_document
+
+    options = _given(trajectory, duration, truth, filters, outages, runs, seed)
+    data = _given_data(imu, gnss_fixes, sensors, lever_arm, heading, gyro_bias, accel_bias)
+    if file is None and not options and not data:
+        raise InputError(_NEEDED)
+    content: dict[str, Any] = {} if file is None else read_document(file)
+    content |= options | data
+    folder = Path() if file is None else file.parent
+    reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
+    if _OF_DATA.isdisjoint(content):
+        # The rate is also that of a ready-made trajectory.
+        if "rate" in reading:
+            content["rate"] = reading.pop("rate")
+        if reading:
+            raise InputError(
+                f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
+                "it out"
+            )
+        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume)
+    else:
+        content["imu"] = _with_reading(content.get("imu"), reading)
+        _filter(content, folder, output)
+
+
+def _validate(content: dict[str, Any], base: Path, output: Path, jobs: int, resume: bool) -> None:
+    """Do the runs of a study."""
+    from gmwm._core.files import folder_to_fill, replaceable, written
+    from gmwm.ins.montecarlo import Validation
+    from gmwm.ins.spec import experiment_from
+    from gmwm.report import write_validation_report
+
+    experiment = experiment_from(content, base)
+    with folder_to_fill(output) as folder:
+        store = folder / "runs"
+        table, page = (replaceable(folder / f"validation.{end}") for end in ("txt", "html"))
+        if not resume:
+            _cleared(store)
+        with progress_bar("navigating", "runs") as bar:
+            validation = Validation.of(experiment, jobs=jobs, folder=store, progress=bar)
+        text = str(validation)
+        with written(table) as stream:
+            stream.write(text + "\n")
+        report = write_validation_report(validation, page)
+    click.echo(text)
+    click.echo(f"\nwrote {table}\nwrote {report}")
+
+
+def _filter(content: dict[str, Any], base: Path, output: Path) -> None:
+    """Filter real data."""
+    from gmwm._core.files import folder_to_fill, replaceable
+    from gmwm.ins.field import Measured, Navigated
+    from gmwm.report import write_navigated_report
+
+    measured = Measured.of(content, base)
+    with folder_to_fill(output) as folder:
+        paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
+        navigated = Navigated.of(measured)
+        navigated.write_solution(paths[0])
+        write_navigated_report(navigated, paths[1])
+    click.echo(navigated)
+    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
+
+
+def _given_data(
+    imu: str | None,
+    gnss_fixes: str | None,
+    sensors: str | None,
+    lever_arm: str | None,
+    heading: float | None,
+    gyro_bias: str | None,
+    accel_bias: str | None,
+) -> dict[str, Any]:
+    """The options of real data as the file would have them."""
+    files = {"imu": imu, "gnss_fixes": gnss_fixes, "sensors": sensors}
+    found: dict[str, Any] = {
+        name: _absolute(path) for name, path in files.items() if path is not None
+    }
+    if lever_arm is not None:
+        found["lever_arm"] = _three("--lever-arm", lever_arm)
+    if heading is not None:
+        found["heading"] = f"{heading!r} deg"
+    bias = {"gyro": gyro_bias, "accel": accel_bias}
+    if gyro_bias is not None or accel_bias is not None:
+        found["bias"] = {kind: each for kind, each in bias.items() if each is not None}
+    return found
+
+
+def _three(name: str, text: str) -> list[float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{name} {text}: write X,Y,Z in metres, e.g. 0.5,0,-1.2") from None
+    return [x, y, z]
+
+
+def _reading(
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+) -> dict[str, Any]:
+    """How the IMU's record is to be read, as the file would have it."""
+    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    found = {
+        "rate": rate,
+        "units": units or None,
+        "channels": roles(channels),
+        "time": time_reference(time_column),
+    }
+    return {name: each for name, each in found.items() if each is not None}
+
+
+def _with_reading(imu: Any, reading: dict[str, Any]) -> Any:
+    if not reading:
+        return imu
+    return {**imu, **reading} if isinstance(imu, dict) else {"file": imu, **reading}
+
+
+def _given(
+    trajectory: str | None,
+    duration: float | None,
+    truth: str | None,
+    filters: tuple[str, ...],
+    outages: tuple[str, ...],
+    runs: int | None,
+    seed: int | None,
+) -> dict[str, Any]:
+    """The options as the file would have them; paths are relative to where one is."""
+    found: dict[str, Any] = {
+        "trajectory": trajectory,
+        "duration": duration,
+        "truth": None if truth is None else _absolute(truth),
+        "runs": runs,
+        "seed": seed,
+    }
+    if filters:
+        found["filters"] = _named(filters)
+    if outages:
+        found["outages"] = [_span(text) for text in outages]
+    return {name: each for name, each in found.items() if each is not None}
+
+
+def _named(texts: tuple[str, ...]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in texts:
+        name, path = _pair(text)
+        if name in found:
+            raise InputError(f"--filter {name}=... is given twice: give each a name of its own")
+        found[name] = path
+    return found
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, separator, path = text.partition("=")
+    if not (name and separator and path):
+        raise InputError(f"--filter {text}: write NAME=FILE, e.g. GMWM=out/calibration.json")
+    return name, path if path == "truth" else _absolute(path)
+
+
+def _absolute(path: str) -> str:
+    return str(Path(path).absolute())
+
+
+def _span(text: str) -> list[float]:
+    try:
+        start, length = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--outage {text}: write START:LENGTH in seconds, e.g. 600:60") from None
+    return [start, length]
+
+
+def _cleared(store: Path) -> None:
+    """Forget the runs of an earlier study."""
+    if store.exists() and not store.is_dir():
+        raise InputError(f"{store}: a file of that name is in the way, move it")
+    try:
+        for path in [*store.glob("runs-*.npz"), store / "study.json"]:
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{store}: cannot be cleared ({error.strerror}): choose another place with -o"
+        ) from None

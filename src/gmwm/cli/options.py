@@ -1,0 +1,79 @@
+"""Arguments of the command line that say how a recording is to be read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm.readers import Recording
+
+_OPTIONS = (
+    click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
+    click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
+    click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ..."),
+    click.option("--channel", "channels", multiple=True, metavar="NAME=COLUMN",
+                 help="Role of a column by its name or 0-based number, e.g. gyro_x=wx or "
+                      "accel_z=5; repeat. By default roles are guessed from the column names."),
+    click.option("--time", "time_column", metavar="COLUMN",
+                 help="Time column by name or number; 'none' to ignore it."),
+)  # fmt: skip
+
+
+def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of `read_recording`."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def read_recording(
+    file: Path,
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+) -> Recording:
+    """Read a recording as the options say.
+
+    Raises
+    ------
+    InputError
+        If an option or the file cannot be used.
+    """
+    from gmwm.readers import read
+
+    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    return read(
+        file, rate=rate, units=units, channels=roles(channels), time=time_reference(time_column)
+    )
+
+
+def _column(text: str) -> str | int:
+    return int(text) if text.isascii() and text.isdigit() else text
+
+
+def roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
+    """Channel name -> column, of NAME=COLUMN."""
+    found: dict[str, str | int] = {}
+    for pair in pairs:
+        name, separator, column = pair.partition("=")
+        if not (name and separator and column):
+            raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
+        if name in found:
+            raise InputError(f"--channel {name}=... is given twice: a channel has one column")
+        found[name] = _column(column)
+    return found or None
+
+
+def time_reference(text: str | None) -> str | int | bool | None:
+    """A column of time stamps; ``False`` for "none"."""
+    if text is None:
+        return None
+    return False if text.lower() == "none" else _column(text)

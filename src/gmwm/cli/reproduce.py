@@ -1,0 +1,187 @@
+"""``gmwm reproduce``: parse, run, print, write."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gmwm.cli.console import progress_bar
+from gmwm.cli.options import read_recording, reading_options
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from gmwm.readers import Recording
+    from gmwm.study import Scenario
+
+EXPERIMENTS = (
+    "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
+    "fig5", "fig6", "fig7", "fig8", "fig9", "selection",
+    "weights2", "weights3", "weights4",
+)  # fmt: skip
+
+
+NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
+
+
+@click.command()
+@click.argument("experiment", type=click.Choice(EXPERIMENTS), metavar="EXPERIMENT")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-study"),
+              show_default=True, help="Folder for tables, figures and raw estimates.")  # fmt: skip
+@click.option("--runs", type=click.IntRange(min=2), help="Number of simulated series.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
+@click.option("--method", "methods", multiple=True, metavar="NAME",
+              help="Only this method, e.g. GMWM; repeat. By default all of the table.")  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
+@click.option("--cluster", metavar="ADDRESS",
+              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
+@click.option("--recording", "recordings", multiple=True, type=click.Path(path_type=Path),
+              metavar="FILE",
+              help="fig5 to fig9: a real static recording in place of a simulated one; the first "
+                   "is calibrated, the others are navigated with; repeat.")  # fmt: skip
+@reading_options
+def reproduce(
+    experiment: str,
+    output: Path,
+    runs: int | None,
+    seed: int,
+    jobs: int | None,
+    methods: tuple[str, ...],
+    resume: bool,
+    cluster: str | None,
+    recordings: tuple[Path, ...],
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+) -> None:
+    """Repeat an experiment of Stebler et al. (2012), or our own harder one.
+
+    table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
+    bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
+    the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
+    shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
+    wavelets of the method of moments; selection counts how often the true model is chosen. fig5
+    and fig6 show one gyro with lines and with the fitted model; fig7 and fig8 navigate a
+    helicopter, fig9 a car, with GNSS outages, by filters that believe different calibrations.
+    Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
+
+    \b
+    Example:
+      gmwm reproduce table2 --runs 200 -o study
+      gmwm reproduce fig2 --runs 200 -o study --resume
+      gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
+        --gyro-unit deg/s --accel-unit g
+    """
+    from gmwm._core.files import folder_to_fill
+
+    processes = jobs or os.cpu_count() or 1
+    if experiment in NAVIGATION:
+        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
+        given = [
+            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
+            for file in recordings
+        ]
+        with folder_to_fill(output) as folder:
+            _navigation(experiment, folder, runs, seed, processes, given)
+        return
+    _check_alone(experiment, {"--recording": recordings})
+    if experiment in ("appendix-a", "selection"):
+        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
+        with folder_to_fill(output) as folder:
+            _alone(experiment, folder, runs, seed, processes)
+        return
+    from gmwm.study import FIGURES, SCENARIOS, run_scenario
+
+    scenario = FIGURES.get(experiment) or SCENARIOS[experiment]
+    with folder_to_fill(output) as folder:
+        try:
+            with progress_bar(scenario.name, "runs") as bar:
+                table = run_scenario(
+                    scenario, folder, runs=runs or scenario.runs, seed=seed,
+                    methods=methods or None, jobs=processes, resume=resume, cluster=cluster,
+                    progress=bar,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+            raise
+        written = [_raw(experiment, table, folder)]
+        if experiment in FIGURES:
+            from gmwm.study import boxplots
+
+            written += boxplots(scenario, table, folder / experiment)
+        else:
+            written += _tables(scenario, table, seed, folder)
+    click.echo("\n".join(f"wrote {path}" for path in written))
+
+
+def _check_alone(experiment: str, options: Mapping[str, object]) -> None:
+    for name, given in options.items():
+        if given:
+            raise InputError(f"{experiment} has no option {name}: leave it out")
+
+
+def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:
+    import pyarrow.parquet as pq
+
+    from gmwm._core.files import moved_into_place
+
+    target = folder / f"{experiment}.parquet"
+    with moved_into_place(target) as temporary:
+        pq.write_table(table, temporary)
+    return target
+
+
+def _tables(scenario: Scenario, table: pa.Table, seed: int, folder: Path) -> list[Path]:
+    from gmwm._core.files import written
+    from gmwm.study import summarise
+
+    summary = summarise(scenario, table, seed)
+    targets = [folder / f"{scenario.name}.txt", folder / f"{scenario.name}.md"]
+    for target, text in zip(targets, (str(summary), summary.markdown()), strict=True):
+        with written(target) as stream:
+            stream.write(text + "\n")
+    click.echo(f"{summary}\n")
+    return targets
+
+
+def _alone(experiment: str, folder: Path, runs: int | None, seed: int, jobs: int) -> None:
+    """An experiment that is a table of its own kind."""
+    from gmwm._core.files import written
+    from gmwm.study import choice_study, choice_table, converge, convergence_table
+
+    if experiment == "selection":
+        report = choice_table(choice_study(runs or 100, seed, jobs))
+    else:
+        report = convergence_table(converge(runs or 200, seed, jobs))
+    target = folder / f"{experiment}.txt"
+    with written(target) as stream:
+        stream.write(report + "\n")
+    click.echo(f"{report}\n\nwrote {target}")
+
+
+def _navigation(
+    experiment: str,
+    folder: Path,
+    runs: int | None,
+    seed: int,
+    jobs: int,
+    recordings: list[Recording],
+) -> None:
+    """Figures 5 to 9."""
+    from gmwm.study import reproduce_figure
+
+    with progress_bar(experiment, "runs") as bar:
+        text, paths = reproduce_figure(
+            experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
+            progress=bar,
+        )  # fmt: skip
+    click.echo(text)
+    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))

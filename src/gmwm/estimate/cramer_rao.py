@@ -1,0 +1,404 @@
+"""Lower bounds on the covariance of estimates: of any, and of those by wavelet variances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numba
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.documents import Document
+from gmwm._core.frozen import freeze
+from gmwm._core.text import wrapped
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.likelihood import (
+    Columns,
+    Regression,
+    filtered,
+    regular_inverse,
+    stacked,
+    whitened,
+)
+from gmwm.estimate.problem import (
+    Coordinates,
+    Slope,
+    detrended_covariance,
+    drift_key,
+    in_model_order,
+    spectral_information,
+    weight_root,
+)
+from gmwm.process import (
+    Model,
+    Process,
+    StateSpace,
+    as_model,
+    model_from_list,
+)
+from gmwm.variance import MIN_SAMPLES
+from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
+
+_MOST_WORK = 1e9  # multiplications of the exact recursion, some seconds
+_VAGUE = 1e6  # variance of the unknown constant, in variances of the series
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CramerRao(Document):
+    """How well the parameters of a model can be known from a record.
+
+    Attributes
+    ----------
+    model : Model
+    n : int
+        Samples of the record.
+    dt : float
+        Sampling interval, s.
+    keys : tuple of str
+        The parameters.
+    covariance : (p, p) ndarray
+        Lower bound (Cramer-Rao) on the covariance of any unbiased estimate, in products of the
+        parameters' SI units. An unknown constant offset is allowed for.
+    wavelet_covariance : (p, p) ndarray
+        The same for estimates from the Haar wavelet variances alone (and a generalized
+        least-squares slope).
+    exact : bool
+        Whether ``covariance`` is from the exact Gaussian information; from the spectral
+        approximation if not.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.cramer-rao"
+
+    model: Model
+    n: int
+    dt: float
+    keys: tuple[str, ...]
+    covariance: FloatArray
+    wavelet_covariance: FloatArray
+    exact: bool
+
+    def __post_init__(self) -> None:
+        freeze(self, "covariance", "wavelet_covariance")
+
+    def __repr__(self) -> str:
+        return f"<CramerRao of {self.model!r}, n = {self.n:,}, dt = {self.dt:g} s>"
+
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, in JSON types."""
+        return {
+            "model": [term.to_dict() for term in self.model.terms],
+            "n": self.n,
+            "dt_s": self.dt,
+            "keys": list(self.keys),
+            "covariance": self.covariance.tolist(),
+            "wavelet_covariance": self.wavelet_covariance.tolist(),
+            "exact": self.exact,
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`."""
+        keys = tuple(map(str, content["keys"]))
+        shape = (len(keys), len(keys))
+        return cls(
+            model=model_from_list(content["model"]),
+            n=int(content["n"]),
+            dt=float(content["dt_s"]),
+            keys=keys,
+            covariance=np.array(content["covariance"], dtype=float).reshape(shape),
+            wavelet_covariance=np.array(content["wavelet_covariance"], dtype=float).reshape(shape),
+            exact=bool(content["exact"]),
+        )
+
+    @property
+    def stderr(self) -> dict[str, float]:
+        """Smallest standard error of each parameter, SI."""
+        return self._by_key(self.covariance)
+
+    @property
+    def wavelet_stderr(self) -> dict[str, float]:
+        """Smallest standard error of each parameter from wavelet variances, SI."""
+        return self._by_key(self.wavelet_covariance)
+
+    def _by_key(self, covariance: FloatArray) -> dict[str, float]:
+        return dict(zip(self.keys, map(float, np.sqrt(np.diag(covariance))), strict=True))
+
+    def __str__(self) -> str:
+        how = "exact Gaussian information" if self.exact else "spectral information"
+        lines = [
+            *wrapped(self.model.title(), indent=2),
+            f"{self.n:,} samples at {1.0 / self.dt:g} Hz; {how}",
+            "",
+            f"{'parameter':<14} {'value':>11} {'Cramer-Rao':>12} {'wavelet var.':>13} {'ratio':>7}",
+        ]
+        params, best, moments = self.model.params, self.stderr, self.wavelet_stderr
+        for key in self.keys:
+            value = float(params[key] or 0.0)
+            unit = abs(value) if value else 1.0
+            lines.append(
+                f"{key:<14} {value:>11.5g} {100 * best[key] / unit:>10.3g} % "
+                f"{100 * moments[key] / unit:>11.3g} % {moments[key] / best[key]:>7.3f}"
+            )
+        lines += ["", "bounds are standard errors in per cent of the value"]
+        return "\n".join(lines)
+
+
+def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
+    """Lower bound on the covariance of any unbiased estimate of a model's parameters.
+
+    Parameters
+    ----------
+    model : Process or Model
+        With all parameters given; all of them count as unknown.
+    n : int
+        Samples of the record, 8 or more.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    CramerRao
+
+    Raises
+    ------
+    InputError
+        If a parameter is open or an amplitude is zero, for a `Sinusoid` (a line is no random
+        process) and for a record or interval that is none.
+
+    Notes
+    -----
+    Exact for short records of models with a finite state space, from derivatives of the Kalman
+    filter's innovations; otherwise the spectral integral of Whittle (1953) from 1/(4 n dt) to
+    1/(2 dt). That is an approximation, good to 1 % where a parameter shows at many frequencies;
+    for one that shows at the lowest few alone (a bound of half its value or more) it may be off
+    by 10 %, and then an estimate may be that much better than "best". For wavelet variances of
+    covariance Sigma with derivatives D the bound is (D' Sigma^-1 D)^-1, where the information is
+    held to that of the whole series: no wavelet standard error is below the Cramer-Rao one.
+
+    Examples
+    --------
+    >>> import gmwm
+    >>> truth = gmwm.WhiteNoise(N=0.2) + gmwm.RandomWalk(K=0.02)
+    >>> bound = gmwm.cramer_rao(truth, n=6000, dt=1.0)
+    >>> round(bound.stderr["N"], 5), round(bound.stderr["K"], 5)
+    (0.00192, 0.00117)
+    """
+    model = as_model(model)
+    n, dt = checks.samples(n, MIN_SAMPLES), checks.sampling_interval(dt)
+    _check(model)
+    coordinates = Coordinates(model.opened())
+    processes = tuple(model.terms[term.place] for term in coordinates.terms)
+    exact = _is_short(coordinates, processes, n, dt)
+    if exact:
+        information = _exact_information(coordinates, processes, n, dt)
+    else:
+        information = spectral_information(coordinates, processes, n, dt)
+    try:
+        slope = _slope(model, processes, n, dt)
+    except MemoryError:
+        raise InputError(f"n = {n:,}: too long for the bound of a ramp, give less") from None
+    moments = _held_to(information, _wavelet_information(coordinates, processes, n, dt, slope))
+    transform = coordinates.jacobian(processes)
+    keys = coordinates.fitted(processes)[1]
+    if slope is not None:
+        keys.append(str(drift_key(model)))
+    found = []
+    for matrix in (information, moments):
+        covariance = transform @ regular_inverse(matrix) @ transform.T
+        if slope is not None:
+            covariance = np.pad(covariance, (0, 1))
+            covariance[-1, -1] = slope.variance
+        ranked, ordered = in_model_order(model, keys, covariance)
+        found.append(ordered)
+    return CramerRao(model, int(n), float(dt), ranked, found[0], found[1], exact)
+
+
+def _check(model: Model) -> None:
+    if model.is_open:
+        raise InputError(f"{model!r} has open parameters: a bound needs values")
+    for item in model.parameters:
+        if item.parameter.linear and not (item.value or 0.0) > 0.0:
+            raise InputError(f"{item.key} is zero: leave its process out")
+    if any(term.is_line for term in model.terms):
+        raise InputError("a Sinusoid is a line, not a random process: leave it out")
+
+
+def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float) -> bool:
+    """Whether the exact recursion exists (flicker noise has no finite state) and is quick."""
+    if not all(process.has_finite_state_space for process in processes):
+        return False
+    try:
+        states = stacked(processes, dt).n_states + 1
+    except InputError:
+        return False
+    return n * (states * (1 + len(coordinates.owners))) ** 3 <= _MOST_WORK
+
+
+def _slope(model: Model, processes: Sequence[Process], n: int, dt: float) -> Slope | None:
+    """The ramp's slope with the variance of its generalized least-squares estimate."""
+    ramps = [term for term in model.terms if term.is_drift]
+    if not ramps:
+        return None
+    return Slope(ramps[0].drift_rate(), _slope_variance(processes, n, dt))
+
+
+def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
+    """Of the generalized least-squares slope, (u/s)^2."""
+    columns = Columns(np.zeros(n), dt, None, True)
+    innovations, _, _ = whitened(columns, processes)
+    return columns.slope(Regression.of(innovations.T @ innovations))[1]
+
+
+def _wavelet_information(
+    coordinates: Coordinates,
+    processes: Sequence[Process],
+    n: int,
+    dt: float,
+    slope: Slope | None,
+) -> FloatArray:
+    """Information of the coordinates in the Haar wavelet variances, (d, d).
+
+    Removing an estimated slope takes r^2 var(slope) from each, for r = tau/2, and that depends on
+    the noise too.
+    """
+    tau = dyadic_levels(n) * dt
+    noise = Model(tuple(processes))
+    covariance = haar_covariance(noise.psd, n, dt)
+    if slope is not None:
+        means = mean_covariance(noise.psd, n, dt)
+        covariance = detrended_covariance(covariance, means, 0.5 * tau, slope)
+    z = coordinates.pack(processes)
+    columns = []
+    for k, (i, is_amplitude) in enumerate(coordinates.owners):
+        ends = [coordinates.processes(z + step, processes) for step in _steps(z.size, k)]
+        if is_amplitude:
+            column = processes[i].haar_variance(tau, dt)
+        else:
+            pair = [end[i].haar_variance(tau, dt) for end in ends]
+            column = (pair[0] - pair[1]) / (2.0 * _STEP)
+        if slope is not None:
+            up, down = (_slope_variance(end, n, dt) for end in ends)
+            column = column - (0.5 * tau) ** 2 * (up - down) / (2.0 * _STEP)
+        columns.append(column)
+    slopes = weight_root(covariance) @ np.stack(columns, axis=1)
+    return np.asarray(slopes.T @ slopes)
+
+
+def _held_to(most: FloatArray, information: FloatArray) -> FloatArray:
+    """The information less what of it exceeds ``most`` in any direction, (d, d).
+
+    A statistic knows no more than the series, which approximate covariances of coarse levels do
+    not heed.
+    """
+    root = np.linalg.cholesky(regular_inverse(most))
+    values, vectors = np.linalg.eigh(root.T @ information @ root)
+    back = np.linalg.solve(root.T, vectors)
+    return np.asarray((back * np.minimum(values, 1.0)) @ back.T)
+
+
+def _exact_information(
+    coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
+) -> FloatArray:
+    """Expected information of the coordinates in n Gaussian samples, (d, d).
+
+    The sum over samples of E (d v)(d v)'/s + (d s)(d s)'/(2 s^2) for innovations v of variance s
+    (Schweppe 1965, *IEEE Trans. Information Theory* 11, 61-70).
+    """
+    z = coordinates.pack(processes)
+    level = float(np.mean(stacked(processes, dt).output_variance(min(n, 256))))
+
+    def run(at: FloatArray) -> tuple[StateSpace, FloatArray, FloatArray]:
+        space = _with_constant(stacked(coordinates.processes(at, processes), dt), level * _VAGUE)
+        p = space.n_states
+        _, _, gain, _, variance = filtered(
+            space.transition, space.process_noise, space.output, space.measurement_noise,
+            space.initial_covariance, np.zeros((n, 1)), np.zeros((1, p)), np.zeros((1, p)),
+        )  # fmt: skip
+        return space, gain, variance
+
+    space, gain, variance = run(z)
+    slopes = []
+    for k in range(z.size):
+        up, down = (run(z + step) for step in _steps(z.size, k))
+        slopes.append(
+            [
+                (a - b) / (2.0 * _STEP)
+                for a, b in (
+                    (up[0].transition, down[0].transition),
+                    (up[0].output, down[0].output),
+                    (up[1], down[1]),
+                    (up[2], down[2]),
+                )
+            ]
+        )
+    d_transition, d_output, d_gain, d_variance = (
+        np.stack(part) for part in zip(*slopes, strict=True)
+    )
+    return _accumulate(
+        space.transition, space.output, gain, variance, d_transition, d_output, d_gain, d_variance
+    )
+
+
+def _steps(size: int, k: int) -> tuple[FloatArray, FloatArray]:
+    step = np.zeros(size)
+    step[k] = _STEP
+    return step, -step
+
+
+def _with_constant(space: StateSpace, variance: float) -> StateSpace:
+    """The state space with an unknown constant as its last state."""
+    return StateSpace.stack([space, StateSpace.scalar("constant", 1.0, 0.0, variance)])
+
+
+@numba.njit(cache=True, nogil=True)
+def _accumulate(
+    F: FloatArray,
+    h: FloatArray,
+    G: FloatArray,
+    s: FloatArray,
+    dF: FloatArray,
+    dh: FloatArray,
+    dG: FloatArray,
+    ds: FloatArray,
+) -> FloatArray:
+    """Information from gains G (n, p), variances s (n,) and their derivatives (d, ...).
+
+    The predicted state and its d derivatives follow one linear system driven by the innovations;
+    its covariance is propagated.
+    """
+    n, p = G.shape
+    d = dF.shape[0]
+    size = p * (1 + d)
+    information = np.zeros((d, d))
+    covariance = np.zeros((size, size))
+    A = np.zeros((size, size))
+    b = np.zeros(size)
+    rows = np.zeros((d, size))  # d v of each parameter as a row over the joint state
+    for i in range(d):
+        for q in range(p):
+            rows[i, q] = -dh[i, q]
+            rows[i, p * (1 + i) + q] = -h[q]
+    for k in range(n):
+        moved = rows @ covariance @ rows.T
+        for i in range(d):
+            for j in range(d):
+                information[i, j] += moved[i, j] / s[k]
+                information[i, j] += 0.5 * ds[i, k] * ds[j, k] / s[k] ** 2
+        A[:, :] = 0.0
+        for q in range(p):
+            b[q] = G[k, q]
+            for r in range(p):
+                A[q, r] = F[q, r]
+        for i in range(d):
+            start = p * (1 + i)
+            for q in range(p):
+                b[start + q] = dG[i, k, q]
+                for r in range(p):
+                    A[start + q, r] = dF[i, q, r] - G[k, q] * dh[i, r]
+                    A[start + q, start + r] = F[q, r] - G[k, q] * h[r]
+        covariance = A @ covariance @ A.T + s[k] * np.outer(b, b)
+    return information

@@ -1,0 +1,275 @@
+"""Kalman filter and smoother of one series, compiled.
+
+The state-space form is ``y[k] = h' x[k] + v[k]``, ``x[k+1] = F x[k] + w[k]`` with ``x[0]`` of
+covariance P0 (`gmwm.StateSpace`). Several columns are filtered at once with the same
+gains: the series, and regressors (a constant, a ramp) whose coefficients are profiled out
+afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-428; de Jong 1991,
+*Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+
+_STEADY = 1e-13  # relative change of the predicted covariance from sample to sample
+
+
+@numba.njit(cache=True, nogil=True)
+def _innovation(P: FloatArray, h: FloatArray, r: float, Ph: FloatArray) -> float:
+    """Variance of the innovation; ``Ph`` receives P h."""
+    s = r
+    for i in range(h.size):
+        Ph[i] = 0.0
+        for j in range(h.size):
+            Ph[i] += P[i, j] * h[j]
+        s += h[i] * Ph[i]
+    return s
+
+
+@numba.njit(cache=True, nogil=True)
+def _propagate(
+    F: FloatArray, Q: FloatArray, P: FloatArray, half: FloatArray, new: FloatArray
+) -> None:
+    """``new`` receives F P F' + Q."""
+    p = F.shape[0]
+    for i in range(p):
+        for j in range(p):
+            half[i, j] = 0.0
+            for q in range(p):
+                half[i, j] += F[i, q] * P[q, j]
+    for i in range(p):
+        for j in range(i + 1):
+            value = Q[i, j]
+            for q in range(p):
+                value += half[i, q] * F[j, q]
+            new[i, j] = value
+            new[j, i] = value
+
+
+@numba.njit(cache=True, nogil=True)
+def whiten(
+    F: FloatArray, Q: FloatArray, h: FloatArray, r: float, P0: FloatArray, Y: FloatArray
+) -> tuple[FloatArray, float, int]:
+    """Innovations of the columns of ``Y`` (n, m) over their standard deviation.
+
+    Returns them with zero rows for missing samples, the sum of the logarithms of the innovation
+    variances, and the number of samples. Once the predicted covariance has settled, the gain is
+    kept until a sample is missing.
+    """
+    n, m = Y.shape
+    p = h.size
+    E = np.zeros((n, m))
+    x = np.zeros((m, p))
+    ahead = np.zeros(p)
+    P = P0.copy()
+    updated = np.zeros((p, p))
+    half = np.zeros((p, p))
+    before = np.zeros(p)
+    Ph = np.zeros(p)
+    gain = np.zeros(p)
+    total = 0.0
+    count = 0
+    steady = False
+    root = 1.0
+    log_s = 0.0
+    for k in range(n):
+        missing = np.isnan(Y[k, 0])
+        if not (missing or steady):
+            s = _innovation(P, h, r, Ph)
+            for i in range(p):
+                gain[i] = Ph[i] / s
+            root = np.sqrt(s)
+            log_s = np.log(s)
+        if not missing:
+            total += log_s
+            count += 1
+        for c in range(m):
+            if not missing:
+                v = Y[k, c]
+                for i in range(p):
+                    v -= h[i] * x[c, i]
+                E[k, c] = v / root
+                for i in range(p):
+                    x[c, i] += gain[i] * v
+            for i in range(p):
+                ahead[i] = 0.0
+                for j in range(p):
+                    ahead[i] += F[i, j] * x[c, j]
+            for i in range(p):
+                x[c, i] = ahead[i]
+        if missing or not steady:
+            for i in range(p):
+                for j in range(p):
+                    updated[i, j] = P[i, j]
+                    if not missing:
+                        updated[i, j] -= gain[i] * Ph[j]
+            steady = not missing
+            for i in range(p):
+                before[i] = P[i, i]
+            _propagate(F, Q, updated, half, P)
+            for i in range(p):
+                if abs(P[i, i] - before[i]) > _STEADY * P[i, i]:
+                    steady = False
+    return E, total, count
+
+
+@numba.njit(cache=True, nogil=True)
+def filtered(
+    F: FloatArray,
+    Q: FloatArray,
+    h: FloatArray,
+    r: float,
+    P0: FloatArray,
+    Y: FloatArray,
+    A0: FloatArray,
+    U: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """One-step predictions and what the smoother needs of the filter.
+
+    Returns predicted states (n, m, p) and covariances (n, p, p), gains F P h / s (n, p),
+    innovations (n, m) and their variances (n,), infinite where the sample is missing.
+    """
+    n, m = Y.shape
+    p = h.size
+    X = np.zeros((n, m, p))
+    PP = np.zeros((n, p, p))
+    G = np.zeros((n, p))
+    V = np.zeros((n, m))
+    S = np.full(n, np.inf)
+    P = P0.copy()
+    updated = np.zeros((p, p))
+    half = np.zeros((p, p))
+    Ph = np.zeros(p)
+    x = A0.copy()
+    for k in range(n):
+        missing = np.isnan(Y[k, 0])
+        s = _innovation(P, h, r, Ph)
+        for i in range(p):
+            for c in range(m):
+                X[k, c, i] = x[c, i]
+            for j in range(p):
+                PP[k, i, j] = P[i, j]
+                updated[i, j] = P[i, j]
+                if not missing:
+                    updated[i, j] -= Ph[i] * Ph[j] / s
+        if not missing:
+            S[k] = s
+            for i in range(p):
+                for j in range(p):
+                    G[k, i] += F[i, j] * Ph[j] / s
+        for c in range(m):
+            if not missing:
+                V[k, c] = Y[k, c]
+                for i in range(p):
+                    V[k, c] -= h[i] * X[k, c, i]
+            for i in range(p):
+                x[c, i] = U[c, i] + G[k, i] * V[k, c]
+                for j in range(p):
+                    x[c, i] += F[i, j] * X[k, c, j]
+        _propagate(F, Q, updated, half, P)
+    return X, PP, G, V, S
+
+
+@numba.njit(cache=True, nogil=True)
+def smooth(
+    F: FloatArray,
+    Q: FloatArray,
+    h: FloatArray,
+    r: float,
+    P0: FloatArray,
+    Y: FloatArray,
+    A0: FloatArray,
+    U: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Smoothed states given all samples, with their covariances at lags zero and one.
+
+    The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives what that of Rauch, Tung
+    and Striebel does without inverting a covariance.
+
+    Parameters
+    ----------
+    F, Q : (p, p) ndarray
+    h : (p,) ndarray
+    r : float
+    P0 : (p, p) ndarray
+    Y : (n, m) ndarray
+        Columns; NaN in the first one is a missing sample.
+    A0, U : (m, p) ndarray
+        Initial mean and constant input of each column.
+
+    Returns
+    -------
+    X : (n, m, p) ndarray
+        Smoothed states of each column.
+    C : (n, p, p) ndarray
+        Their covariance.
+    D : (n - 1, p, p) ndarray
+        Covariance of state k+1 with state k.
+    V, S : ndarray
+        Innovations (n, m) and their variances (n,), infinite where missing.
+    """
+    n, m = Y.shape
+    p = h.size
+    X, C, G, V, S = filtered(F, Q, h, r, P0, Y, A0, U)
+    D = np.zeros((max(n - 1, 0), p, p))
+    R = np.zeros((m, p))
+    N = np.zeros((p, p))
+    L = np.zeros((p, p))
+    NL = np.zeros((p, p))
+    PN = np.zeros((p, p))
+    LP = np.zeros((p, p))
+    back = np.zeros(p)
+    predicted = np.zeros((p, p))
+    later = np.zeros((p, p))  # predicted covariance at k + 1
+    for step in range(n):
+        k = n - 1 - step
+        for i in range(p):
+            for j in range(p):
+                predicted[i, j] = C[k, i, j]
+                L[i, j] = F[i, j] - G[k, i] * h[j]
+        if step > 0:
+            for i in range(p):
+                for j in range(p):
+                    LP[i, j] = 0.0
+                    PN[i, j] = 1.0 if i == j else 0.0
+                    for q in range(p):
+                        LP[i, j] += L[i, q] * predicted[q, j]
+                        PN[i, j] -= later[i, q] * N[q, j]
+            for i in range(p):
+                for j in range(p):
+                    for q in range(p):
+                        D[k, i, j] += PN[i, q] * LP[q, j]
+        for c in range(m):
+            for i in range(p):
+                back[i] = h[i] * V[k, c] / S[k]
+                for j in range(p):
+                    back[i] += L[j, i] * R[c, j]
+            for i in range(p):
+                R[c, i] = back[i]
+            for i in range(p):
+                for j in range(p):
+                    X[k, c, i] += predicted[i, j] * R[c, j]
+        for i in range(p):
+            for j in range(p):
+                NL[i, j] = 0.0
+                for q in range(p):
+                    NL[i, j] += N[i, q] * L[q, j]
+        for i in range(p):
+            for j in range(p):
+                N[i, j] = h[i] * h[j] / S[k]
+                for q in range(p):
+                    N[i, j] += L[q, i] * NL[q, j]
+        for i in range(p):
+            for j in range(p):
+                PN[i, j] = 0.0
+                for q in range(p):
+                    PN[i, j] += predicted[i, q] * N[q, j]
+        for i in range(p):
+            for j in range(p):
+                for q in range(p):
+                    C[k, i, j] -= PN[i, q] * predicted[q, j]
+        later[:, :] = predicted
+    return X, C, D, V, S

@@ -1,0 +1,226 @@
+"""Maximum likelihood: exact by the Kalman filter, or Whittle's for long series."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate import tuning
+from gmwm.estimate.likelihood.conclusion import conclude_likelihood
+from gmwm.estimate.likelihood.likelihood import (
+    Columns,
+    KalmanLikelihood,
+    Regression,
+    defined,
+    objective_of,
+    whitened,
+)
+from gmwm.estimate.likelihood.scoring import (
+    Objective,
+    deviations,
+    gradient,
+    maximise,
+    observed_information,
+    regular_inverse,
+)
+from gmwm.estimate.likelihood.series import Series
+from gmwm.estimate.likelihood.starts import candidates
+from gmwm.estimate.likelihood.vanishing import Top, redundant_term, upper_bound
+from gmwm.estimate.likelihood.whittle import WhittleLikelihood
+from gmwm.estimate.problem import Coordinates, Slope, spectral_information
+from gmwm.estimate.result import Estimates, Fit
+from gmwm.process import Model, Process, as_model
+from gmwm.readers import Channel
+
+_SEGMENT = 1 << 16  # samples whose likelihood is computed exactly, for the beginning
+
+Climb = Callable[[Coordinates, tuple[Process, ...]], Top]
+
+
+@dataclass(frozen=True)
+class MLE:
+    """Exact maximum likelihood by the Kalman filter, ``method="mle"``.
+
+    Parameters
+    ----------
+    start : Process or Model, optional
+        The same model with starting values; by default the estimates of the method of moments.
+
+    Raises
+    ------
+    InputError
+        If ``start`` is not a model.
+    """
+
+    start: Process | Model | None = None
+
+    name: ClassVar[str] = "mle"
+
+    def __post_init__(self) -> None:
+        if self.start is not None:
+            as_model(self.start)
+
+    def estimate(self, model: Model, channel: Channel) -> Fit:
+        """Fit the open parameters of a model to samples, some of which may be missing."""
+        if any(term.is_line and term.is_open for term in model.terms):
+            raise InputError(
+                'method = "mle" knows no open Sinusoid (its amplitude and frequency are not '
+                'parameters of a spectrum): give it values, or take method = "gmwm"'
+            )
+        series = Series.of(model, channel, self.start, gaps=True)
+        columns = series.columns
+        likelihood = KalmanLikelihood(columns)
+
+        def climb(coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
+            information = spectral_information(coordinates, first, columns.n, columns.dt)
+            objective = objective_of(likelihood, coordinates, first)
+            found = maximise(objective, coordinates.pack(first), information)
+            observed = observed_information(objective, found.z, information)
+            return Top(coordinates.processes(found.z, first), found, observed, likelihood)
+
+        return _fit(series, climb, self.name)
+
+
+@dataclass(frozen=True)
+class Whittle(MLE):
+    """The debiased Whittle likelihood by FFT, for long series, ``method="whittle"``.
+
+    Parameters
+    ----------
+    start
+        As of `MLE`.
+    """
+
+    name: ClassVar[str] = "whittle"
+
+    def estimate(self, model: Model, channel: Channel) -> Fit:
+        """Fit the open parameters of a model to samples, all of which must exist."""
+        if any(term.is_line for term in model.terms):
+            raise InputError('method = "whittle" knows no Sinusoid: take method = "gmwm"')
+        series = Series.of(model, channel, self.start, gaps=False)
+
+        def climb(coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
+            return _climb_whittle(series.columns, coordinates, first)
+
+        return _fit(series, climb, self.name)
+
+
+def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
+    """Maximise, and whiten anew with the estimates, until they stay.
+
+    The beginning of a series, which has no past to be predicted from, is no stationary filter's;
+    the gradient of the difference to the exact likelihood of a first part makes up for that.
+    """
+    information = spectral_information(coordinates, first, columns.n, columns.dt)
+    deviation = np.sqrt(np.diag(regular_inverse(information)))
+    alone = deviations(information)
+    processes = first
+    for _ in range(tuning.PREWHITENING_ROUNDS):
+        whittle = WhittleLikelihood(columns, processes)
+        z = coordinates.pack(processes)
+        residual = columns.matrix[:_SEGMENT, 0] - columns.matrix[:_SEGMENT, 1:] @ (
+            whittle.regression.beta
+        )
+        part = Columns.without_regressors(residual, columns.dt)
+        exact = objective_of(KalmanLikelihood(part), coordinates, processes)
+        spectral = objective_of(WhittleLikelihood(part, processes), coordinates, processes)
+        tilt = gradient(exact, z, alone) - gradient(spectral, z, alone)
+        objective = _tilted(objective_of(whittle, coordinates, processes), z, tilt)
+        found = maximise(objective, z, information)
+        processes = coordinates.processes(found.z, processes)
+        if np.all(np.abs(found.z - z) < tuning.PREWHITENING_SETTLED * deviation):
+            break
+    observed = observed_information(objective, found.z, information)
+    return Top(processes, found, observed, whittle)
+
+
+def _tilted(objective: Objective, origin: FloatArray, tilt: FloatArray) -> Objective:
+    return lambda z: objective(z) + float(tilt @ (z - origin))
+
+
+def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
+    """The top, or the one reached from another candidate that lies above it already.
+
+    None is looked for where the start describes the data.
+    """
+    if series.start_is_sound:
+        return top
+    likelihood = KalmanLikelihood(series.columns)
+    reached = defined(likelihood, top.processes)
+    places = [_rescaled(point, series) for point in candidates(series)]
+    height, best = max(places, key=lambda place: place[0], default=(-np.inf, ()))
+    if not height > reached:
+        return top
+    other = climb(series.coordinates, best)
+    return other if defined(likelihood, other.processes) > reached else top
+
+
+def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:
+    """The terms with all variances times the factor of highest likelihood, and that likelihood.
+
+    Innovations keep their proportions when all variances grow alike, so that the factor is their
+    mean square. Where an amplitude is given nothing is changed.
+    """
+    coordinates, columns = series.coordinates, series.columns
+    amplitudes = np.array([is_amplitude for _, is_amplitude in coordinates.owners])
+    if np.sum(amplitudes) < len(processes):
+        return defined(KalmanLikelihood(columns), processes), processes
+    try:
+        with np.errstate(all="ignore"):
+            innovations, log_variance, count = whitened(columns, processes)
+            regression = Regression.of(innovations.T @ innovations)
+            free = count - regression.beta.size
+            log_factor = np.log(regression.residual / free)
+            z = coordinates.pack(processes)
+            z[amplitudes] += log_factor
+            moved = coordinates.processes(z, processes)
+    except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+        return -np.inf, processes
+    height = -0.5 * (
+        free * (np.log(2.0 * np.pi) + 1.0 + log_factor) + log_variance + regression.log_determinant
+    )
+    return float(height) if np.isfinite(height) else -np.inf, moved
+
+
+def _fit(series: Series, climb: Climb, method: str) -> Fit:
+    coordinates, processes = series.coordinates, list(series.start)
+    absent: list[int] = []
+    while True:
+        present = [i for i in range(len(processes)) if i not in absent]
+        part = coordinates.without(absent)
+        top = climb(part, tuple(processes[i] for i in present))
+        if not absent:
+            top = _or_higher(top, series, climb)
+        for i, process in zip(present, top.processes, strict=True):
+            processes[i] = process
+        redundant = redundant_term(part, top.processes, top.likelihood)
+        if redundant is None:
+            break
+        absent.append(present[redundant])
+    notices = []
+    if not top.maximum.converged:
+        text = "the maximum of the likelihood was not reached"
+        notices.append(Notice("not-converged", "bad", "", text))
+    if np.any(np.linalg.eigvalsh(top.information) <= 0.0):
+        text = "the likelihood has no curvature in some direction: too many parameters"
+        notices.append(Notice("no-curvature", "bad", "", text))
+    slope = None
+    if series.columns.drift_is_free:
+        regression = KalmanLikelihood(series.columns).regression(top.processes)
+        slope = Slope(*series.columns.slope(regression))
+    found = Estimates(
+        coordinates=coordinates,
+        processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
+        covariance=regular_inverse(top.information),
+        absent={i: upper_bound(processes[i], part, top, series.columns) for i in absent},
+        slope=slope,
+    )
+    return conclude_likelihood(
+        series, found, method=method, log_likelihood=top.maximum.value, notices=notices
+    )

@@ -1,0 +1,124 @@
+"""From the minimum of the method of moments to a result."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.estimate.moments.checks import level_notices, limit_notices, redundant_notices
+from gmwm.estimate.moments.design import Design
+from gmwm.estimate.moments.profile import Point
+from gmwm.estimate.moments.weights import Weights
+from gmwm.estimate.problem import Moments, weight_root
+from gmwm.estimate.result import (
+    Comparison,
+    Estimates,
+    Fit,
+    conclude,
+    misfit_notices,
+    quantile_above_zero,
+)
+
+
+def conclude_moments(
+    design: Design,
+    moments: Moments,
+    covariance: FloatArray,
+    point: Point,
+    basis: FloatArray,
+    weights: Weights,
+    method: str,
+    discrepancy: float,
+) -> Fit:
+    """Make the `Fit` of a minimum.
+
+    Parameters
+    ----------
+    design : Design
+    moments : Moments
+        What was fitted.
+    covariance : (J, J) ndarray
+        Of the moments under the fitted model, with the discrepancy, u^4.
+    point : Point
+        The minimum.
+    basis : (J,) ndarray
+        The wavelet variances to which ``covariance`` belongs, u^2.
+    weights : Weights
+    method : str
+    discrepancy : float
+        Relative error allowed for at each level, part of ``covariance``.
+    """
+    target = moments.target
+    curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
+    implied = curves @ amplitudes
+    absent = [i for i in design.linear if amplitudes[i] == 0.0]
+    jacobian = _jacobian(design, point, curves, absent)
+    found = Estimates(
+        coordinates=design.coordinates,
+        processes=design.fitted_processes(point.x, point.shapes),
+        covariance=_sandwich(jacobian, covariance, weights),
+        absent={
+            i: _upper_amplitude(jacobian, curves[:, i], target - implied, covariance)
+            ** (1.0 / design.terms[i].linear.power)
+            for i in absent
+        },
+        slope=moments.slope if moments.slope_is_free else None,
+    )
+    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1])
+    notices = [
+        *limit_notices(design, point.shapes, point.x),
+        *redundant_notices(design, point, target, covariance),
+        *level_notices(target.size, design.n_free),
+    ]
+    if discrepancy > 0.0:
+        statistical = np.diag(covariance) - (discrepancy * target) ** 2
+        notices += misfit_notices(moments.wv, target, implied, statistical, discrepancy)
+    return conclude(
+        found, comparison, moments.wv, method=method, weights=weights.name,
+        discrepancy=discrepancy, notices=notices,
+    )  # fmt: skip
+
+
+def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:
+    """Derivative of the moments by the coordinates of the terms that have an amplitude, (J, d)."""
+    amplitudes = design.amplitudes(point.x)
+    slopes = iter((design.shape_derivatives(point.shapes) * amplitudes[design.owners()]).T)
+    columns = [np.zeros((0, curves.shape[0]))]
+    for i, is_amplitude in design.coordinates.owners:
+        column = curves[:, i] * amplitudes[i] if is_amplitude else next(slopes)
+        if i not in absent:
+            columns.append(column[None, :])
+    return np.concatenate(columns).T
+
+
+def _sandwich(jacobian: FloatArray, covariance: FloatArray, weights: Weights) -> FloatArray:
+    """B V B' with B = (D' Omega D)^-1 D' Omega, on parameters scaled to be of like size."""
+    if jacobian.shape[1] == 0:
+        return np.zeros((0, 0))
+    root = weights.root(covariance)
+    weighted = root @ jacobian
+    length = np.sqrt(np.sum(weighted**2, axis=0))
+    length[length == 0.0] = 1.0
+    estimator = np.linalg.pinv(weighted / length, rcond=1e-10) @ root / length[:, None]
+    return np.asarray(estimator @ covariance @ estimator.T)
+
+
+def _upper_amplitude(
+    jacobian: FloatArray, curve: FloatArray, residual: FloatArray, covariance: FloatArray
+) -> float:
+    """95 % upper bound of a non-negative amplitude whose estimate is zero.
+
+    The quantile of the normal distribution of the unconstrained estimate, cut at zero.
+    """
+    root = weight_root(covariance)
+    column, others = root @ curve, root @ jacobian
+    if others.shape[1]:
+        length = np.sqrt(np.sum(others**2, axis=0))
+        basis, _ = np.linalg.qr(others / np.where(length > 0.0, length, 1.0))
+        column = column - basis @ (basis.T @ column)
+    information = float(column @ column)
+    if information <= 0.0:
+        return float("inf")
+    deviation = 1.0 / np.sqrt(information)
+    centre = float(column @ (root @ residual)) / information
+    return quantile_above_zero(centre, deviation)

@@ -1,0 +1,219 @@
+"""A model as the estimator sees it: linear amplitudes times curves of non-linear shapes.
+
+The wavelet variance of a model is ``offset(z) + U(z) x``: the columns of U are the curves of the
+terms at unit amplitude, x >= 0 their free squared scales (or variances), z the free shape
+parameters mapped to the real line, and the offset holds the terms of fixed amplitude. Rate ramps
+take no part: they are deterministic, see `gmwm.estimate.problem.ramp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import Coordinates, Scales, Term, shape_of
+from gmwm.process import Model, Process, Shape
+
+_STEP = 1e-5  # of central differences in z, whose natural scale is 1
+_SIMULATED_STEP = 0.05  # where a simulation may move in jumps
+
+
+class Design:
+    """The moment curves of a model over the free parameters.
+
+    Parameters
+    ----------
+    model : Model
+        With open parameters.
+    scales : Scales
+
+    Attributes
+    ----------
+    coordinates : Coordinates
+    linear : tuple of int
+        Noise terms of free amplitude.
+    shaped : tuple of int
+        Noise terms of which some shape parameter is free.
+
+    Raises
+    ------
+    InputError
+        If the model has no noise, or a process that cannot be fitted in part is fixed in part.
+    """
+
+    def __init__(self, model: Model, scales: Scales) -> None:
+        self.coordinates, self.scales = Coordinates(model), scales
+        for term in self.terms:
+            if 0 < term.n_shapes < term.free_shape.size and not term.process.separable_shape:
+                raise InputError(
+                    f"{term.process!r} has some coefficients given and some open: give all or none"
+                )
+        self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
+        self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
+        self._grids: dict[int, list[Shape]] = {}
+        self._curves: dict[int, FloatArray] = {}
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The noise terms."""
+        return self.coordinates.terms
+
+    @property
+    def model(self) -> Model:
+        """With open parameters."""
+        return self.coordinates.model
+
+    @property
+    def n_free(self) -> int:
+        """Number of free parameters of the stochastic part."""
+        return len(self.coordinates.owners)
+
+    # -- one term ---------------------------------------------------------------------------------
+
+    def at_shape(self, i: int, shape: Shape) -> Process:
+        """Term ``i`` at a shape, with unit amplitude where that is free."""
+        term = self.terms[i]
+        names = [p.name for p in term.process.shape_parameters]
+        values: dict[str, float | None] = dict(zip(names, shape, strict=True))
+        if term.free_scale:
+            values[term.linear.name] = 1.0
+        return term.process.with_values(**values)
+
+    def curve(self, i: int, shape: Shape) -> FloatArray:
+        """Wavelet variance of `at_shape`, (J,)."""
+        if self.terms[i].free_scale:
+            return self.scales.unit_curve(self.terms[i].process, shape)
+        return self.scales.curve(self.at_shape(i, shape))
+
+    def grid(self, i: int) -> list[Shape]:
+        """Starting shapes of term ``i``; terms that are alike share one list."""
+        first = self._alike(i)
+        if first not in self._grids:
+            self._grids[first] = self._new_grid(self.terms[first])
+        return self._grids[first]
+
+    def grid_curves(self, i: int) -> FloatArray:
+        """Curves of term ``i`` on its grid, (J, G)."""
+        first = self._alike(i)
+        if first not in self._curves:
+            columns = [self.curve(first, shape) for shape in self.grid(first)]
+            self._curves[first] = np.stack(columns, axis=1)
+        return self._curves[first]
+
+    def _alike(self, i: int) -> int:
+        return next(j for j in range(i + 1) if self.terms[j].process == self.terms[i].process)
+
+    def _new_grid(self, term: Term) -> list[Shape]:
+        """Starting shapes; fixed parameters have their value in all of them."""
+        own = shape_of(term.process)
+        if not term.n_shapes:
+            return [own]
+        shapes = term.process.shape_grid(self.scales.dt, self.scales.n)
+        filled = {
+            tuple(v if free else o for v, o, free in zip(s, own, term.free_shape, strict=True))
+            for s in shapes
+        }
+        return sorted(filled)
+
+    def fixed_shapes(self) -> list[Shape | None]:
+        """The shape of each term, ``None`` where something of it is free."""
+        return [None if term.n_shapes else shape_of(term.process) for term in self.terms]
+
+    # -- z <-> shapes -----------------------------------------------------------------------------
+
+    def pack(self, shapes: Sequence[Shape]) -> FloatArray:
+        """The free shape parameters of all terms on the real line."""
+        parts = [
+            self.terms[i].process.shape_to_free(shapes[i])[self.terms[i].free_shape]
+            for i in self.shaped
+        ]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def unpack(self, z: FloatArray, template: Sequence[Shape]) -> list[Shape]:
+        """Shapes of all terms; fixed parameters are taken from ``template``."""
+        shapes = list(template)
+        start = 0
+        for i in self.shaped:
+            count = self.terms[i].n_shapes
+            shapes[i] = self.terms[i].moved(template[i], z[start : start + count])
+            start += count
+        return shapes
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """How far z may go: `_REACH` beyond the grids."""
+        low, high = [], []
+        for i in self.shaped:
+            term = self.terms[i]
+            free = np.array([term.process.shape_to_free(shape) for shape in self.grid(i)])
+            low.append((free.min(axis=0) - tuning.SEARCH_REACH)[term.free_shape])
+            high.append((free.max(axis=0) + tuning.SEARCH_REACH)[term.free_shape])
+        if not low:
+            return np.zeros(0), np.zeros(0)
+        return np.concatenate(low), np.concatenate(high)
+
+    # -- curves -----------------------------------------------------------------------------------
+
+    def curves(self, shapes: Sequence[Shape]) -> FloatArray:
+        """Curves of all terms at unit free amplitude, (J, terms)."""
+        return np.stack([self.curve(i, shape) for i, shape in enumerate(shapes)], axis=1)
+
+    def amplitudes(self, x: FloatArray) -> FloatArray:
+        """Amplitudes of all terms, 1 where fixed, (terms,)."""
+        result = np.ones(len(self.terms))
+        result[list(self.linear)] = x
+        return result
+
+    def shape_derivatives(self, shapes: Sequence[Shape]) -> FloatArray:
+        """Derivative of each term's curve by its own z, at unit free amplitude, (J, z)."""
+        columns = []
+        for i in self.shaped:
+            term = self.terms[i]
+            z = term.process.shape_to_free(shapes[i])
+            width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
+            for k in np.flatnonzero(term.free_shape):
+                pair = []
+                for step in (width, -width):
+                    moved = z.copy()
+                    moved[k] += step
+                    pair.append(self.curve(i, term.process.shape_from_free(moved)))
+                columns.append((pair[0] - pair[1]) / (2.0 * width))
+        return np.stack(columns, axis=1) if columns else np.zeros((self.scales.tau.size, 0))
+
+    def owners(self) -> list[int]:
+        """For each element of z, the term it belongs to."""
+        return [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+
+    # -- models -----------------------------------------------------------------------------------
+
+    def fitted_processes(self, x: FloatArray, shapes: Sequence[Shape]) -> list[Process]:
+        """The terms with estimated values."""
+        result: list[Process] = []
+        pairs = zip(self.amplitudes(x), _distinct(self.terms, shapes), strict=True)
+        for i, (amplitude, shape) in enumerate(pairs):
+            process = self.at_shape(i, shape)
+            free = self.terms[i].free_scale
+            result.append(process.with_amplitude(float(amplitude)) if free else process)
+        return result
+
+    def fitted_noise(self, x: FloatArray, shapes: Sequence[Shape]) -> Model:
+        """The model of the terms that have an amplitude; of the first one if none has."""
+        fitted = self.fitted_processes(x, shapes)
+        amplitude = self.amplitudes(x)
+        present = [process for process, a in zip(fitted, amplitude, strict=True) if a > 0.0]
+        return Model(tuple(present or fitted[:1]))
+
+
+def _distinct(terms: Sequence[Term], shapes: Sequence[Shape]) -> list[Shape]:
+    """Shapes with those moved apart that came out equal, as terms without amplitude do."""
+    seen: set[tuple[type, Shape]] = set()
+    result = []
+    for term, shape in zip(terms, shapes, strict=True):
+        while shape and (type(term.process), shape) in seen:
+            shape = (shape[0] * (1.0 + 1e-9), *shape[1:])
+        seen.add((type(term.process), shape))
+        result.append(shape)
+    return result

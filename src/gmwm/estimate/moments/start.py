@@ -1,0 +1,239 @@
+"""Starting values, found among a dictionary of shapes; the user gives none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate import tuning
+from gmwm.estimate.moments.design import Design
+from gmwm.estimate.moments.discrepancy import suffices
+from gmwm.estimate.moments.profile import Point, Profile
+from gmwm.estimate.problem import Scales, solve_nonnegative, weight_root
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    Shape,
+    WhiteNoise,
+)
+from gmwm.variance import WaveletVariance
+
+_BISECTIONS = 14
+
+
+def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
+    """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
+
+    Each term with free shapes is first placed where on its grid it lowers the objective most,
+    all shapes are then refined together; at the end each term in turn is taken out and placed
+    anew. A model that extends another one is never worse, if started from that one's shapes.
+
+    Parameters
+    ----------
+    profile : Profile
+    known : list of Shape or None, optional
+        Shapes to start with, ``None`` for the terms still to be placed.
+    """
+    design = profile.design
+    shapes = list(known) if known is not None else design.fixed_shapes()
+    missing = [i for i in design.shaped if shapes[i] is None]
+    point = _present(profile, shapes)
+    for i in missing:
+        shapes = list(point.shapes)
+        point = _refine_present(profile, _place(profile, shapes, i))
+    if len(design.shaped) < 2:
+        return point
+    for _ in range(tuning.EXCHANGES):
+        before = point.objective
+        for i in design.shaped:
+            shapes = list(point.shapes)
+            shapes[i] = None
+            moved = _place(profile, shapes, i)
+            if moved.objective < point.objective * (1.0 + tuning.IMPROVEMENT):
+                moved = _refine_present(profile, moved)
+                point = min(point, moved, key=lambda p: p.objective)
+        if point.objective > before * (1.0 - tuning.IMPROVEMENT):
+            break
+    return point
+
+
+def _columns(profile: Profile, shapes: Sequence[Shape | None]) -> tuple[FloatArray, FloatArray]:
+    """Weighted columns of the placed terms of free amplitude, and the weighted target."""
+    design = profile.design
+    target = profile.target.copy()
+    columns = []
+    for i, shape in enumerate(shapes):
+        if shape is None:
+            continue
+        curve = design.curve(i, shape)
+        if i in design.linear:
+            columns.append(profile.root @ curve)
+        else:
+            target -= curve
+    matrix = np.stack(columns, axis=1) if columns else np.zeros((target.size, 0))
+    return matrix, profile.root @ target
+
+
+def _present(profile: Profile, shapes: Sequence[Shape | None]) -> Point:
+    matrix, y = _columns(profile, shapes)
+    x, residual = solve_nonnegative(matrix, y)
+    return Point(cast("Sequence[Shape]", shapes), x, float(residual @ residual))
+
+
+def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
+    """Put term ``i`` at the grid shape that lowers the objective most."""
+    design = profile.design
+    matrix, y = _columns(profile, shapes)
+    candidates = profile.root @ design.grid_curves(i)
+    objective = np.empty(candidates.shape[1])
+    for g in range(candidates.shape[1]):
+        column = candidates[:, g]
+        if i in design.linear:
+            residual = solve_nonnegative(np.column_stack([matrix, column]), y)[1]
+        else:
+            residual = solve_nonnegative(matrix, y - column)[1]
+        objective[g] = residual @ residual
+    filled = list(shapes)
+    filled[i] = design.grid(i)[int(np.argmin(objective))]
+    return _present(profile, filled)
+
+
+def _refine_present(profile: Profile, point: Point) -> Point:
+    """Refine the shapes of the terms placed so far."""
+    design = profile.design
+    if all(shape is not None for shape in point.shapes):
+        return profile.refine(point)
+    present = [i for i, shape in enumerate(point.shapes) if shape is not None]
+    part = Model(tuple(design.terms[i].process for i in present))
+    reduced = Profile(Design(part, design.scales), profile.target, profile.root)
+    found = reduced.refine(reduced.at([point.shapes[i] for i in present]))
+    shapes = list(point.shapes)
+    for i, shape in zip(present, found.shapes, strict=True):
+        shapes[i] = shape
+    return Point(shapes, found.x, found.objective)
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A rich mixture fitted to the wavelet variances.
+
+    Attributes
+    ----------
+    mixture : Model
+    covariance : (J, J) ndarray
+        Of the wavelet variances under it, u^4.
+    curve : (J,) ndarray
+        Its wavelet variances, u^2.
+    discrepancy : float
+        Relative error that even this mixture needs, see `gmwm.estimate.moments.discrepancy`.
+    """
+
+    mixture: Model
+    covariance: FloatArray
+    curve: FloatArray
+    discrepancy: float
+
+    def weights(self, target: FloatArray, discrepancy: float) -> FloatArray:
+        """Covariance of the wavelet variances with a discrepancy, u^4, (J, J)."""
+        return self.covariance + np.diag((discrepancy * target) ** 2)
+
+
+def dictionary_fit(
+    wv: WaveletVariance, target: FloatArray, extra: tuple[Process, ...] = ()
+) -> Reference:
+    """Non-negative least-squares fit of a dictionary of processes.
+
+    White, quantization and random-walk noise, a grid of Gauss-Markov processes and the kinds of
+    ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
+    first weights, whatever model is to be fitted, and what it cannot follow no such model can.
+    """
+    # Lines to be found are left out: a comb of them follows anything. Those at given frequencies
+    # follow one thing only, which no other process can.
+    lines = tuple(p for p in extra if p.is_line and p.values["frequency"] is not None)
+    # Simulated processes are too: they take their time, and the mixture does without them.
+    kinds = {type(p): p for p in extra if not p.is_line and p.has_spectrum()}
+    kinds.pop(GaussMarkov, None)
+    processes: tuple[Process, ...] = (
+        WhiteNoise(),
+        QuantizationNoise(),
+        RandomWalk(),
+        GaussMarkov(),
+    )
+    processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
+    processes += tuple(line.with_values(amplitude=None) for line in lines)
+    design = Design(Model(processes), Scales.of(wv))
+    atoms = [
+        (i, shape)
+        for i in design.linear
+        for shape in _denser(design.grid(i), bool(design.terms[i].process.ordered_by))
+    ]
+    columns = [design.curve(i, shape) for i, shape in atoms]
+    matrix = np.stack(columns, axis=1)
+    covariance, discrepancy = wv.covariance, 0.0
+    for _ in range(tuning.REWEIGHTINGS):
+        discrepancy = _needed(matrix, target, covariance)
+        x = _amplitudes(matrix, target, covariance, discrepancy)
+        mixture = [
+            design.at_shape(i, shape).with_amplitude(float(value))
+            for (i, shape), value in zip(atoms, x, strict=True)
+            if value > 0.0
+        ]
+        if all(process.is_line for process in mixture):
+            raise InputError(
+                f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
+                "line or a pattern): check the data"
+            )
+        whole = Model(tuple(mixture))
+        covariance = wv.covariance_under(whole.psd, whole.lines())
+    return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
+
+
+def _denser(shapes: list[Shape], wanted: bool) -> list[Shape]:
+    """Shapes of one parameter with their geometric means in between.
+
+    The finest levels of long records are known to a thousandth, and the mixture must not fail on
+    account of its grid.
+    """
+    if not wanted:
+        return shapes
+    values = np.array([shape[0] for shape in shapes])
+    middle = np.sqrt(values[1:] * values[:-1])
+    return [(float(v),) for v in np.sort(np.concatenate([values, middle]))]
+
+
+def _amplitudes(
+    matrix: FloatArray, target: FloatArray, covariance: FloatArray, discrepancy: float
+) -> FloatArray:
+    root = weight_root(covariance + np.diag((discrepancy * target) ** 2))
+    return solve_nonnegative(root @ matrix, root @ target)[0]
+
+
+def _needed(matrix: FloatArray, target: FloatArray, covariance: FloatArray) -> float:
+    """Smallest discrepancy under which the best mixture passes for right.
+
+    The mixture is fitted anew for each value tried: with more allowance it follows the fine
+    levels less closely, and residuals of a loose fit would ask for ever more.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        value = low if high == 1.0 and low == 0.0 else float(np.sqrt(max(low, 1e-4) * high))
+        x = _amplitudes(matrix, target, covariance, value)
+        curve = matrix @ x
+        dof = max(target.size - int(np.sum(x > 0.0)), 3)
+        if suffices(value, target - curve, covariance, target, curve, dof):
+            if value == 0.0:
+                return 0.0
+            high = value
+        else:
+            low = max(value, 1e-4)
+        if high < 1.05 * low:
+            break
+    return high

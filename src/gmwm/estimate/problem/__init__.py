@@ -1,0 +1,54 @@
+"""What is estimated from what: parameters as coordinates, moments, their covariance."""
+
+from gmwm.estimate.problem.information import (
+    density,
+    error_growth,
+    frequency_nodes,
+    slope_dof,
+    spectral_information,
+)
+from gmwm.estimate.problem.parameters import (
+    Coordinates,
+    Term,
+    drift_key,
+    in_model_order,
+    keys_by_term,
+    shape_of,
+)
+from gmwm.estimate.problem.ramp import (
+    Slope,
+    bias_of_detrending,
+    detrended_covariance,
+    gls_slope,
+    ols_slope,
+)
+from gmwm.estimate.problem.scales import Scales
+from gmwm.estimate.problem.simulation import Simulation
+from gmwm.estimate.problem.targets import FittedMoments, Moments
+from gmwm.estimate.problem.whitening import chi_square, solve_nonnegative, weight_root
+
+__all__ = [
+    "Coordinates",
+    "FittedMoments",
+    "Moments",
+    "Scales",
+    "Simulation",
+    "Slope",
+    "Term",
+    "bias_of_detrending",
+    "chi_square",
+    "density",
+    "detrended_covariance",
+    "drift_key",
+    "error_growth",
+    "frequency_nodes",
+    "gls_slope",
+    "in_model_order",
+    "keys_by_term",
+    "ols_slope",
+    "shape_of",
+    "slope_dof",
+    "solve_nonnegative",
+    "spectral_information",
+    "weight_root",
+]

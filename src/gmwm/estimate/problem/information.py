@@ -1,0 +1,193 @@
+"""Fisher information of the parameters, from the spectrum.
+
+For a Gaussian series of n samples with spectrum S the information matrix tends to
+``n int_0^{1/2} (d log S / d z) (d log S / d z)' df`` (Whittle 1953, *Arkiv for Matematik* 2,
+423-434). What is below some lowest frequency belongs to the unknown constant. With 1/(4 n dt) the
+information on a random walk, beside white noise or not, is the exact one to 1 % from a thousand
+samples on; with 1/(2 n dt) a walk that is just seen loses a third.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.estimate import tuning
+from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
+from gmwm.process import Model, Process, evaluated, legendre
+
+_STEP = 1e-5
+_PANELS_PER_OCTAVE = 8
+_NODES = 8
+_SINGULAR = 1e10
+
+
+def frequency_nodes(n: int, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes (Hz) from 1/(4 n dt) to 1/(2 dt), and their weights times n dt."""
+    octaves = np.log2(n * 0.5 / tuning.LOWEST_FREQUENCY)
+    panels = int(np.ceil(octaves * _PANELS_PER_OCTAVE))
+    x, w = legendre(_NODES)
+    edges = np.linspace(-octaves, 0.0, panels + 1)
+    half = 0.5 * np.diff(edges)[:, None]
+    middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
+    frequency = 0.5 * np.exp2((middle + half * x).ravel())
+    weight = (half * w).ravel() * np.log(2.0) * frequency
+    return frequency / dt, n * weight
+
+
+def density(processes: Sequence[Process], f: FloatArray, dt: float) -> FloatArray:
+    """Spectrum of a sum of processes at ``f`` (Hz), u^2/Hz."""
+    total = np.zeros_like(f)
+    for process in processes:
+        total += evaluated(process.psd, f, dt)
+    return total
+
+
+def log_slopes(
+    coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
+) -> FloatArray:
+    """Slopes d log S / d z at ``f`` (Hz), shape (len(f), d)."""
+    z = coordinates.pack(processes)
+    total = density(processes, f, dt)
+    columns = []
+    for k, (i, is_amplitude) in enumerate(coordinates.owners):
+        if is_amplitude:
+            columns.append(processes[i].psd(f, dt) / total)
+            continue
+        pair = []
+        for step in (_STEP, -_STEP):
+            moved = z.copy()
+            moved[k] += step
+            pair.append(coordinates.processes(moved, processes)[i].psd(f, dt))
+        columns.append((pair[0] - pair[1]) / (2.0 * _STEP) / total)
+    return np.reshape(columns, (len(columns), f.size)).T
+
+
+def spectral_information(
+    coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
+) -> FloatArray:
+    """Expected information of z, (d, d)."""
+    f, weight = frequency_nodes(n, dt)
+    slopes = log_slopes(coordinates, processes, f, dt)
+    return np.asarray(slopes.T @ (weight[:, None] * slopes))
+
+
+def slope_dof(
+    model: Model, keys: Sequence[str], covariance: FloatArray, n: int, dt: float
+) -> float:
+    """Degrees of freedom of the variance of a ramp's estimated slope.
+
+    That variance is computed from estimated noise; one of relative error r has 2/r^2 degrees of
+    freedom (Satterthwaite 1946, *Biometrics Bulletin* 2, 110-114). By the spectrum it is the
+    inverse of ``int |T|^2 / S df`` with T the Fourier transform of the ramp.
+
+    Parameters
+    ----------
+    model : Model
+        With the estimates.
+    keys : sequence of str
+        The estimated parameters of its noise.
+    covariance : (d, d) ndarray
+        Of these.
+    n : int
+    dt : float
+        Sampling interval, s.
+    """
+    coordinates, processes, names = _opened(model, keys)
+    if not names or not _have_spectra(processes):
+        return np.inf
+    order = [list(keys).index(name) for name in names]
+    f, weight = frequency_nodes(n, dt)
+    phase = np.pi * f * n * dt
+    ramp = ((np.sin(phase) - phase * np.cos(phase)) / f**2) ** 2
+    total = density(processes, f, dt)
+    if not np.all(total > 0.0):
+        return np.inf
+    share = weight * ramp / total
+    by_z = share @ log_slopes(coordinates, processes, f, dt) / np.sum(share)
+    gradient = np.linalg.solve(coordinates.jacobian(processes).T, by_z)
+    variance = float(gradient @ covariance[np.ix_(order, order)] @ gradient)
+    return 2.0 / variance if variance > 0.0 else np.inf
+
+
+def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[str, float]:
+    """How the relative standard errors of the positive parameters go with their values.
+
+    Between the points half a standard error below and above the estimate, along which the other
+    parameters follow as they are correlated; by the expected information.
+
+    Parameters
+    ----------
+    model : Model
+        With the estimates.
+    keys : sequence of str
+        The estimated parameters of its noise.
+    n : int
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    dict
+        Key -> exponent k of the power law: relative standard error proportional to value^k.
+    """
+    coordinates, processes, names = _opened(model, keys)
+    if not _have_spectra(processes):
+        return {}
+    positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
+    with np.errstate(divide="ignore", invalid="ignore"):  # where there is no noise at all
+        information = spectral_information(coordinates, processes, n, dt)
+    if not names or not _is_regular(information):
+        return {}
+    z = coordinates.pack(processes)
+    covariance = np.linalg.inv(information)
+    result = {}
+    for k, name in enumerate(names):
+        if name not in positive:
+            continue
+        step = tuning.PROFILE_STEP * covariance[:, k] / np.sqrt(covariance[k, k])
+        step /= max(float(np.max(np.abs(step))), 1.0)  # of what is hardly known, too long
+        ends = []
+        for moved in (z - step, z + step):
+            there = coordinates.processes(moved, processes)
+            i, own = coordinates.names[k]
+            value = float(there[i].values[own] or 0.0)
+            error = _relative_error(coordinates, there, k, value, n, dt)
+            ends.append((np.log(value), np.log(error)))
+        rise = (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0])
+        if np.isfinite(rise):
+            result[name] = float(np.clip(rise, -tuning.STEEPEST_GROWTH, tuning.STEEPEST_GROWTH))
+    return result
+
+
+def _opened(model: Model, keys: Sequence[str]) -> tuple[Coordinates, list[Process], list[str]]:
+    """Coordinates of the parameters of these keys, the processes, and the key of each."""
+    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
+    by_term = keys_by_term(model)
+    places = [term.place for term in coordinates.terms]
+    names = [by_term[places[i], name] for i, name in coordinates.names]
+    return coordinates, [model.terms[place] for place in places], names
+
+
+def _have_spectra(processes: Sequence[Process]) -> bool:
+    return all(process.has_spectrum() for process in processes)
+
+
+def _relative_error(
+    coordinates: Coordinates, processes: Sequence[Process], k: int, value: float, n: int, dt: float
+) -> float:
+    information = spectral_information(coordinates, processes, n, dt)
+    if not _is_regular(information):
+        return np.nan
+    slope = coordinates.jacobian(processes)[k, k]
+    return float(np.sqrt(np.linalg.inv(information)[k, k]) * abs(slope) / value)
+
+
+def _is_regular(information: FloatArray) -> bool:
+    """Whether its inverse means anything: a line, or a term of no amplitude, has no spectrum."""
+    deviation = np.sqrt(np.diag(information))
+    if not np.all(np.isfinite(information)) or np.any(deviation == 0.0):
+        return False
+    return bool(np.linalg.cond(information / np.outer(deviation, deviation)) < _SINGULAR)

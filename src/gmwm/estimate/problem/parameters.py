@@ -1,0 +1,244 @@
+"""The free parameters of a model's noise: keys, coordinates, processes and the Jacobian between.
+
+A point of the whole real space stands for the parameters: scales and variances enter as the
+logarithm of the amplitude (the power of the parameter that is a factor of the spectrum), shapes as
+each process maps them. Rate ramps take no part: they are regressors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.errors import InputError
+from gmwm.process import Model, Parameter, Process, Shape
+
+_STEP = 1e-6  # of central differences of a process's own map
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A noise term of a model and what of it is free.
+
+    Attributes
+    ----------
+    process : Process
+        As in the model, with open parameters.
+    place : int
+        Where it stands in the model.
+    free_scale : bool
+        Whether the linear parameter is open.
+    free_shape : (s,) ndarray of bool
+        Which shape parameters are open.
+    """
+
+    process: Process
+    place: int
+    free_scale: bool
+    free_shape: BoolArray
+
+    @classmethod
+    def of(cls, process: Process, place: int) -> Term:
+        linear, values = process.linear_parameter, process.values
+        free_scale = linear is not None and values[linear.name] is None
+        shape = [values[p.name] is None for p in process.shape_parameters]
+        return cls(process, place, free_scale, np.array(shape, dtype=bool))
+
+    @property
+    def linear(self) -> Parameter:
+        """The linear parameter, which every term of free scale has."""
+        return next(p for p in self.process.parameters if p.linear)
+
+    @property
+    def n_shapes(self) -> int:
+        """Number of free shape parameters."""
+        return int(np.sum(self.free_shape))
+
+    @property
+    def free_names(self) -> list[str]:
+        """Names of the free parameters, the amplitude first."""
+        shapes = zip(self.process.shape_parameters, self.free_shape, strict=True)
+        return [self.linear.name] * self.free_scale + [p.name for p, free in shapes if free]
+
+    def moved(self, shape: Shape, free: FloatArray) -> Shape:
+        """A shape with its free part at other coordinates, fixed parameters exactly as they are."""
+        if not free.size:
+            return shape
+        point = self.process.shape_to_free(shape)
+        point[self.free_shape] = free
+        found = self.process.shape_from_free(point)
+        pairs = zip(found, shape, self.free_shape, strict=True)
+        return tuple(new if is_free else old for new, old, is_free in pairs)
+
+    def shape_jacobian(self, shape: Shape) -> FloatArray:
+        """Derivative of the free shape parameters by their coordinates, (s, s)."""
+        z = self.process.shape_to_free(shape)
+        columns = np.flatnonzero(self.free_shape)
+        block = np.empty((columns.size, columns.size))
+        for column, k in enumerate(columns):
+            pair = []
+            for step in (_STEP, -_STEP):
+                point = z.copy()
+                point[k] += step
+                pair.append(np.array(self.process.shape_from_free(point)))
+            block[:, column] = ((pair[0] - pair[1]) / (2.0 * _STEP))[columns]
+        return block
+
+
+def shape_of(process: Process) -> Shape:
+    """Values of the shape parameters, zero where open."""
+    return tuple(float(process.values[p.name] or 0.0) for p in process.shape_parameters)
+
+
+class Coordinates:
+    """Free parameters of the noise terms of a model, in the order of the terms.
+
+    Parameters
+    ----------
+    model : Model
+        With open parameters.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        The noise terms, without rate ramps.
+    owners : list of (int, bool)
+        For each coordinate, its noise term and whether it is the amplitude.
+    names : list of (int, str)
+        For each coordinate, its noise term and the name of the parameter.
+
+    Raises
+    ------
+    InputError
+        If the model has no noise.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.terms = tuple(
+            Term.of(process, place)
+            for place, process in enumerate(model.terms)
+            if not process.is_drift
+        )
+        if not self.terms:
+            raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")
+        self.names = [(i, name) for i, term in enumerate(self.terms) for name in term.free_names]
+        self.owners = [
+            (i, k == 0 and term.free_scale)
+            for i, term in enumerate(self.terms)
+            for k in range(len(term.free_names))
+        ]
+
+    @property
+    def noise(self) -> tuple[Process, ...]:
+        """The noise terms as in the model, with open parameters."""
+        return tuple(term.process for term in self.terms)
+
+    def pack(self, processes: Sequence[Process]) -> FloatArray:
+        """Coordinates of the terms with these values, (d,)."""
+        parts = [np.zeros(0)]
+        for term, process in zip(self.terms, processes, strict=True):
+            if term.free_scale:
+                value = process.values[term.linear.name] or 0.0
+                parts.append(np.array([term.linear.power * np.log(value)]))
+            parts.append(process.shape_to_free(shape_of(process))[term.free_shape])
+        return np.concatenate(parts)
+
+    def processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
+        """The terms at ``z``; fixed parameters are taken from ``like``.
+
+        Raises
+        ------
+        InputError
+            Where a parameter is out of range.
+        """
+        result = []
+        with np.errstate(over="ignore"):
+            for term, process, (scale, shape) in zip(self.terms, like, self._split(z), strict=True):
+                changes: dict[str, float] = {}
+                if scale.size:
+                    changes[term.linear.name] = float(np.exp(scale[0] / term.linear.power))
+                if shape.size:
+                    found = term.moved(shape_of(process), shape)
+                    named = zip(process.shape_parameters, found, term.free_shape, strict=True)
+                    changes.update({p.name: value for p, value, is_free in named if is_free})
+                result.append(process.with_values(**changes))
+        return tuple(result)
+
+    def jacobian(self, processes: Sequence[Process]) -> FloatArray:
+        """Derivative of the parameters by z at these values, (d, d), block diagonal."""
+        matrix = np.zeros((len(self.owners), len(self.owners)))
+        start = 0
+        for term, process in zip(self.terms, processes, strict=True):
+            if term.free_scale:
+                value = float(process.values[term.linear.name] or 0.0)
+                matrix[start, start] = value / term.linear.power
+                start += 1
+            block = slice(start, start + term.n_shapes)
+            if term.n_shapes:
+                matrix[block, block] = term.shape_jacobian(shape_of(process))
+            start += term.n_shapes
+        return matrix
+
+    def without(self, dropped: Sequence[int]) -> Coordinates:
+        """The same for the model less some noise terms (indices into ``terms``)."""
+        places = {self.terms[i].place for i in dropped}
+        kept = (term for place, term in enumerate(self.model.terms) if place not in places)
+        return Coordinates(Model(tuple(kept)))
+
+    def fitted(
+        self, processes: Sequence[Process], slope: float | None = None
+    ) -> tuple[Model, list[str]]:
+        """The whole model with values, its terms in order, and the key of each coordinate.
+
+        Parameters
+        ----------
+        processes : sequence of Process
+            The noise terms with values.
+        slope : float, optional
+            Of the rate ramp, where it is estimated, u/s.
+        """
+        values = {term.place: process for term, process in zip(self.terms, processes, strict=True)}
+        terms = [values.get(place, term) for place, term in enumerate(self.model.terms)]
+        if slope is not None:
+            terms = [
+                t.with_values(**{t.parameters[0].name: slope}) if t.is_drift else t for t in terms
+            ]
+        model = Model(tuple(terms))
+        # Terms that are ordered have changed their places, but are the same objects.
+        moved = {id(term): place for place, term in enumerate(model.terms)}
+        by_term = keys_by_term(model)
+        return model, [
+            by_term[moved[id(terms[self.terms[i].place])], name] for i, name in self.names
+        ]
+
+    def _split(self, z: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Coordinates of the amplitude (none or one) and of the shape, term by term."""
+        start = 0
+        for term in self.terms:
+            middle = start + int(term.free_scale)
+            end = middle + term.n_shapes
+            yield z[start:middle], z[middle:end]
+            start = end
+
+
+def keys_by_term(model: Model) -> Mapping[tuple[int, str], str]:
+    """(Place of a term, name of its parameter) -> key in ``model.params``."""
+    return {(item.term, item.parameter.name): item.key for item in model.parameters}
+
+
+def drift_key(model: Model) -> str | None:
+    """Key of the slope of a model's rate ramp, if it has one."""
+    return next((item.key for item in model.parameters if model.terms[item.term].is_drift), None)
+
+
+def in_model_order(
+    model: Model, keys: Sequence[str], matrix: FloatArray
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Keys and covariance in the order of the model's parameters."""
+    ranked = tuple(key for key in model.params if key in keys)
+    index = [list(keys).index(key) for key in ranked]
+    return ranked, matrix[np.ix_(index, index)]

@@ -1,0 +1,76 @@
+"""At which averaging times, and by which wavelet, a model meets the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.problem.simulation import Simulation
+from gmwm.process import PSD, Model, Process, Shape
+from gmwm.variance import WaveletVariance, pilot_psd
+
+_USUAL = Simulation(10, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """The levels of a wavelet variance, without its values.
+
+    Attributes
+    ----------
+    tau : (J,) ndarray
+        Averaging times, s.
+    dt : float
+        Sampling interval, s.
+    n : int
+        Length of the record, samples.
+    wavelet : str
+    simulation : Simulation
+        How curves that have no closed form are found.
+    simulate_all : bool
+        Whether all are found so.
+    """
+
+    tau: FloatArray
+    dt: float
+    n: int
+    wavelet: str = "haar"
+    simulation: Simulation = _USUAL
+    simulate_all: bool = False
+
+    @classmethod
+    def of(cls, wv: WaveletVariance) -> Scales:
+        return cls(wv.tau, wv.dt, wv.n, wv.wavelet)
+
+    def curve(self, model: Process | Model) -> FloatArray:
+        """Wavelet variance of a model, u^2, (J,)."""
+        if isinstance(model, Model):
+            return np.sum([self.curve(term) for term in model.terms], axis=0)
+        if self.is_simulated(model):
+            return self.simulation.curve(model, self.tau, self.n, self.dt, self.wavelet)
+        return np.asarray(model.wavelet_variance(self.tau, self.dt, self.wavelet), dtype=float)
+
+    def unit_curve(self, process: Process, shape: Shape) -> FloatArray:
+        """That of a process at another shape and unit amplitude, u^2, (J,)."""
+        if self.is_simulated(process):
+            return self.curve(process.at_unit(shape))
+        return process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
+
+    def is_simulated(self, process: Process) -> bool:
+        """Whether its curve is found by simulation."""
+        return self.simulate_all or not process.has_spectrum()
+
+    def spectrum(self, model: Model) -> PSD:
+        """Spectrum of a model, or a smooth one with its wavelet variances if it has none."""
+        if all(term.has_spectrum() for term in model.terms):
+            return model.psd
+        curve = self.curve(model)
+        if not np.any(curve > 0.0):
+            raise InputError(
+                f"{model!r} has no variance when simulated: check its draw, or add WhiteNoise()"
+            )
+        positive = np.maximum(curve, 1e-12 * np.max(curve))
+        return pilot_psd(positive, np.rint(self.tau / self.dt), self.dt)

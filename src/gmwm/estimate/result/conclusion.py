@@ -1,0 +1,183 @@
+"""From estimates of the noise, by whatever method, to a `Fit`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import (
+    Coordinates,
+    Slope,
+    chi_square,
+    drift_key,
+    error_growth,
+    in_model_order,
+    slope_dof,
+    weight_root,
+)
+from gmwm.estimate.result.fit import Fit
+from gmwm.estimate.result.interval import quantile_above_zero
+from gmwm.estimate.result.remarks import (
+    bound_notices,
+    confounded_notices,
+    indistinct_notices,
+    undetermined_notices,
+)
+from gmwm.process import Process
+from gmwm.variance import WaveletVariance
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Estimates of the noise terms of a model.
+
+    Attributes
+    ----------
+    coordinates : Coordinates
+        Of the whole model.
+    processes : sequence of Process
+        Its noise terms with their values, those of zero amplitude included.
+    covariance : (d, d) ndarray
+        Of the coordinates of the terms that have an amplitude.
+    absent : mapping of int to float
+        Noise term of zero amplitude -> 95 % upper bound of its scale.
+    slope : Slope or None
+        Of the rate ramp, where it is estimated.
+    """
+
+    coordinates: Coordinates
+    processes: Sequence[Process]
+    covariance: FloatArray
+    absent: Mapping[int, float]
+    slope: Slope | None
+
+    @property
+    def present(self) -> list[int]:
+        """Coordinates of the terms that have an amplitude."""
+        owners = self.coordinates.owners
+        return [k for k, (i, _) in enumerate(owners) if i not in self.absent]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Agreement of wavelet variances with those of a model.
+
+    Attributes
+    ----------
+    objective : float
+        Weighted sum of squares.
+    chi_square : float
+        The same on cube roots; NaN where it has no meaning.
+    dof : int
+        Levels less parameters.
+    """
+
+    objective: float
+    chi_square: float
+    dof: int
+
+    @classmethod
+    def of(
+        cls,
+        target: FloatArray,
+        implied: FloatArray,
+        covariance: FloatArray,
+        basis: FloatArray,
+        n_free: int,
+    ) -> Comparison:
+        """Compare under a covariance that belongs to the wavelet variances ``basis``."""
+        whitened = weight_root(covariance) @ (target - implied)
+        dof = target.size - n_free
+        statistic = float("nan")
+        if dof > 0 and np.all(basis > 0.0):
+            statistic = chi_square(target, implied, covariance, basis)[1]
+        return cls(float(whitened @ whitened), statistic, dof)
+
+
+def conclude(
+    found: Estimates,
+    comparison: Comparison,
+    wv: WaveletVariance,
+    *,
+    method: str,
+    weights: str = "",
+    discrepancy: float = 0.0,
+    notices: Sequence[Notice] = (),
+    log_likelihood: float = float("nan"),
+    trace: Sequence[float] = (),
+) -> Fit:
+    """Make the `Fit`; see there for the arguments.
+
+    Parameters
+    ----------
+    found : Estimates
+    comparison : Comparison
+    wv : WaveletVariance
+        The data.
+    notices : sequence of Notice
+        Those of the method; what the estimates themselves show is added.
+    """
+    slope = found.slope
+    model, all_keys = found.coordinates.fitted(
+        found.processes, None if slope is None else slope.value
+    )
+    keys = [all_keys[k] for k in found.present]
+    jacobian = found.coordinates.jacobian(found.processes)[np.ix_(found.present, found.present)]
+    matrix = jacobian @ found.covariance @ jacobian.T
+    upper = _upper_bounds(found, all_keys)
+    growth = error_growth(model, keys, wv.n, wv.dt)
+    dof = float("inf")
+    if slope is not None:
+        dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
+        keys.append(str(drift_key(model)))
+        matrix = np.pad(matrix, (0, 1))
+        matrix[-1, -1] = slope.variance
+    ordered, matrix = in_model_order(model, keys, matrix)
+    return Fit(
+        model=model,
+        wv=wv,
+        keys=ordered,
+        covariance=matrix,
+        upper_bounds=upper,
+        objective=comparison.objective,
+        chi_square=comparison.chi_square,
+        dof=comparison.dof,
+        discrepancy=discrepancy,
+        method=method,
+        weights=weights,
+        notices=(
+            *bound_notices(upper),
+            *undetermined_notices(model, ordered, matrix),
+            *indistinct_notices(model, ordered, matrix),
+            *confounded_notices(model, ordered, matrix),
+            *notices,
+        ),
+        log_likelihood=log_likelihood,
+        trace=tuple(trace),
+        slope_dof=dof,
+        error_growth=growth,
+    )
+
+
+def _upper_bounds(found: Estimates, keys: Sequence[str]) -> dict[str, float]:
+    """95 % upper bounds of amplitudes that are zero, or have no shape and are not above zero."""
+    coordinates = found.coordinates
+    bounds = {}
+    rows = {k: row for row, k in enumerate(found.present)}
+    for k, (i, is_amplitude) in enumerate(coordinates.owners):
+        term = coordinates.terms[i]
+        if not is_amplitude:
+            continue
+        if i in found.absent:
+            bounds[keys[k]] = found.absent[i]
+            continue
+        deviation = float(np.sqrt(found.covariance[rows[k], rows[k]]))
+        if not term.n_shapes and deviation > 1.0 / tuning.SIGNIFICANT:
+            value = float(found.processes[i].values[term.linear.name] or 0.0)
+            bounds[keys[k]] = value * quantile_above_zero(1.0, deviation) ** (1 / term.linear.power)
+    return bounds

@@ -1,0 +1,144 @@
+"""One estimated parameter, for people and programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gmwm._core.units import field_units, si_parameter_unit
+from gmwm.process import Model
+
+Kind = Literal["estimated", "bound", "fixed", "undefined"]
+
+HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval':<22} unit"
+
+
+@dataclass(frozen=True)
+class InUnit:
+    """An estimate in a unit of the field.
+
+    Attributes
+    ----------
+    value, lower, upper : float
+        In ``unit``.
+    unit : str
+    """
+
+    value: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of a fitted model.
+
+    Attributes
+    ----------
+    key : str
+        As in ``Fit.params``.
+    kind : {"estimated", "bound", "fixed", "undefined"}
+        "bound": not significantly above zero, ``upper`` is a 95 % bound; "fixed": given, not
+        estimated; "undefined": the term has no amplitude, so that its shape means nothing.
+    value : float
+        SI.
+    stderr : float or None
+        Standard error, SI; ``None`` where it was not estimated, or is zero by the bound.
+    lower, upper : float
+        95 % confidence interval, SI.
+    unit : str
+        SI.
+    meaning : str
+    field : tuple of InUnit
+        The same in the units of the field, the usual one first; empty where SI is usual.
+    """
+
+    key: str
+    kind: Kind
+    value: float
+    stderr: float | None
+    lower: float
+    upper: float
+    unit: str
+    meaning: str
+    field: tuple[InUnit, ...] = ()
+
+    @property
+    def usual(self) -> InUnit:
+        """In the unit that the field uses."""
+        if self.field:
+            return self.field[0]
+        return InUnit(self.value, self.lower, self.upper, self.unit)
+
+    def __str__(self) -> str:
+        """A line under `HEAD`."""
+        error = ""
+        value = "-" if self.kind == "undefined" else f"{self.value:.5g}"
+        if self.kind == "undefined":
+            interval = "term has no amplitude"
+        elif self.kind == "fixed":
+            interval = "fixed"
+        elif self.kind == "bound":
+            interval = f"< {self.upper:.4g}"
+        else:
+            interval = f"{self.lower:.4g} .. {self.upper:.4g}"
+            error = f"{self.stderr:.2g}"
+        # A long name takes the blanks before its value.
+        name = f"{self.key} "
+        return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {interval:<22} {self.unit}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """In JSON types, a column each."""
+        names = ("key", "kind", "value", "stderr", "lower", "upper", "unit", "meaning")
+        return {name: getattr(self, name) for name in names}
+
+
+def estimates_of(
+    model: Model,
+    quantity: str,
+    stderr: Mapping[str, float],
+    intervals: Mapping[str, tuple[float, float]],
+    upper_bounds: Mapping[str, float],
+) -> Iterator[Estimate]:
+    """Every parameter of a fitted model, in order.
+
+    Parameters
+    ----------
+    model : Model
+        With values.
+    quantity : str
+        "gyro", "accel" or empty, for the units.
+    stderr, intervals, upper_bounds : mapping
+        By key, SI.
+    """
+    for item in model.parameters:
+        key, value = item.key, float(item.value or 0.0)
+        low, high = intervals.get(key, (value, value))
+        kind: Kind = "fixed"
+        if key in upper_bounds:
+            kind = "bound"
+        elif key in stderr:
+            kind = "estimated"
+        elif _has_no_amplitude(model, item.term) and item.parameter.role == "shape":
+            kind = "undefined"
+        yield Estimate(
+            key=key,
+            kind=kind,
+            value=value,
+            stderr=stderr.get(key),
+            lower=low,
+            upper=high,
+            unit=si_parameter_unit(item.parameter.unit, quantity),
+            meaning=item.parameter.meaning,
+            field=tuple(
+                InUnit(value * f.per_si, low * f.per_si, high * f.per_si, f.unit)
+                for f in field_units(item.parameter.unit, quantity)
+            ),
+        )
+
+
+def _has_no_amplitude(model: Model, place: int) -> bool:
+    linear = model.terms[place].linear_parameter
+    return linear is not None and model.terms[place].values[linear.name] == 0.0

@@ -1,0 +1,400 @@
+"""The result of an estimation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from gmwm._core import checks
+from gmwm._core.documents import Document
+from gmwm._core.frozen import freeze, frozen
+from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError, MissingNameError
+from gmwm.estimate.problem import FittedMoments, Scales, drift_key
+from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
+from gmwm.estimate.result.goodness import Goodness
+from gmwm.estimate.result.interval import confidence_interval
+from gmwm.estimate.result.region import Region, slope_name
+from gmwm.estimate.result.remarks import REASONS
+from gmwm.estimate.result.serialization import fields_of, fit_content, plain
+from gmwm.process import Model
+from gmwm.variance import WaveletVariance
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+METHOD_NAMES = {
+    "gmwm": "GMWM",
+    "simulated": "simulated moments",
+    "allan": "slopes of the Allan deviation",
+    "em": "EM",
+    "mle": "exact maximum likelihood",
+    "whittle": "debiased Whittle likelihood",
+}
+"""Methods as they are named in tables."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Document):
+    """An estimated error model of one channel.
+
+    ``fit["tau_1"]`` is the `Estimate` of one parameter.
+
+    Attributes
+    ----------
+    model : Model
+        With the estimated (and the fixed) values.
+    wv : WaveletVariance
+        The data.
+    keys : tuple of str
+        Names of the estimated parameters, without those estimated as zero.
+    covariance : (p, p) ndarray
+        Covariance of the estimates, in the order of ``keys``, in products of their SI units.
+    upper_bounds : dict
+        95 % upper bound of each amplitude that is zero or not significantly above it.
+    objective : float
+        Weighted sum of squares (nu_hat - nu)' Sigma^-1 (nu_hat - nu) at the estimate.
+    chi_square : float
+        The same on the cube roots of the wavelet variances, which are close to normal at coarse
+        levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN where
+        there are none, or the method does not minimise it.
+    dof : int
+        Levels less estimated parameters.
+    discrepancy : float
+        Relative error allowed for at each level, as a fraction of the variance; zero where the
+        model describes the data to within their statistical errors.
+    method, weights : str
+        How it was estimated; ``weights`` is empty but for the method of moments.
+    notices : tuple of Notice
+        What makes it invalid ("bad"), and what else there is to know.
+    log_likelihood : float
+        At the estimate, of the methods that maximise it; NaN for the others.
+    trace : tuple of float
+        Log-likelihood after each iteration of EM.
+    slope_dof : float
+        Degrees of freedom of the variance of a ramp's slope.
+    error_growth : dict
+        How the relative standard error of a positive parameter goes with its value: the exponent
+        of a power law, by key.
+    regions : tuple of Region
+        What ``method="allan"`` read the parameters from.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.fit"
+
+    model: Model
+    wv: WaveletVariance
+    keys: tuple[str, ...]
+    covariance: FloatArray
+    upper_bounds: Mapping[str, float]
+    objective: float
+    chi_square: float
+    dof: int
+    discrepancy: float
+    method: str
+    weights: str
+    notices: tuple[Notice, ...]
+    log_likelihood: float = float("nan")
+    trace: tuple[float, ...] = ()
+    slope_dof: float = float("inf")
+    error_growth: Mapping[str, float] = field(default_factory=dict)
+    regions: tuple[Region, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "covariance", "upper_bounds", "error_growth")
+
+    # -- can it be trusted ------------------------------------------------------------------------
+
+    @property
+    def valid(self) -> bool:
+        """Whether every parameter is supported by the data and the model describes them."""
+        return not any(notice.severity == "bad" for notice in self.notices)
+
+    @property
+    def reasons(self) -> Mapping[str, bool]:
+        """What a valid fit has, by name, and whether this one has it."""
+        lacking = {REASONS[notice.code] for notice in self.notices if notice.severity == "bad"}
+        result: Mapping[str, bool] = frozen(
+            {name: name not in lacking for name in REASONS.values()}
+        )
+        return result
+
+    @property
+    def message(self) -> str:
+        """What there is to know about it, in sentences; empty if nothing."""
+        return "; ".join(map(str, self.notices))
+
+    @property
+    def p_value(self) -> float:
+        """Of the chi-square test; NaN where there is none."""
+        if np.isnan(self.chi_square) or self.dof <= 0:
+            return float("nan")
+        return float(chi2.sf(self.chi_square, self.dof))
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Parameter values in SI units; Gauss-Markov terms by rising correlation time."""
+        return {key: float(value or 0.0) for key, value in self.model.params.items()}
+
+    @property
+    def stderr(self) -> dict[str, float]:
+        """Standard errors of the estimated parameters, in SI units."""
+        errors = np.sqrt(np.diag(self.covariance))
+        return dict(zip(self.keys, map(float, errors), strict=True))
+
+    def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Confidence intervals that keep to the parameters' ranges.
+
+        See `gmwm.estimate.result.interval.confidence_interval`. The interval of an amplitude that
+        is not significantly above zero goes from zero to its upper bound (which is one of 95 %).
+
+        Parameters
+        ----------
+        level : float, optional
+
+        Returns
+        -------
+        dict
+            Key -> (lower, upper), in SI units, for every estimated parameter.
+
+        Raises
+        ------
+        InputError
+            If ``level`` is not between 0 and 1.
+        """
+        level = checks.share("level", level, 0.95)
+        params, errors = self.params, self.stderr
+        result = {}
+        for item in self.model.parameters:
+            key, value = item.key, params[item.key]
+            if key in self.upper_bounds:
+                result[key] = (0.0, float(self.upper_bounds[key]))
+            elif key in errors:
+                result[key] = confidence_interval(
+                    item.parameter, value, errors[key], level,
+                    growth=self.error_growth.get(key, 0.0), slope_dof=self.slope_dof,
+                )  # fmt: skip
+        return result
+
+    def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:
+        """Length of record that would give each parameter a relative standard error.
+
+        Errors go with the root of the length. That is too hopeful where a discrepancy was granted
+        to the model, which no length removes.
+
+        Parameters
+        ----------
+        relative_error : float, optional
+
+        Returns
+        -------
+        dict
+            Key -> seconds, of all recordings together, for every estimated parameter but the slope
+            of a ramp; infinite for an amplitude that is not significantly above zero.
+
+        Raises
+        ------
+        InputError
+            If ``relative_error`` is not a positive number.
+        """
+        aim = checks.positive("relative_error", relative_error, "give a positive number, e.g. 0.1")
+        duration, params, errors = self.wv.n_all * self.wv.dt, self.params, self.stderr
+        lengths = {}
+        for item in self.model.parameters:
+            key = item.key
+            if key in self.upper_bounds:
+                lengths[key] = float("inf")
+            elif key in errors and item.parameter.role != "slope":
+                size = abs(params[key])
+                relative = errors[key] / size if size > 0.0 else float("inf")
+                lengths[key] = duration * (relative / aim) ** 2
+        return lengths
+
+    # -- curves -----------------------------------------------------------------------------------
+
+    @property
+    def implied(self) -> FloatArray:
+        """Wavelet variance of the fitted model at the data's averaging times, u^2, (J,)."""
+        return Scales.of(self.wv).curve(self.model)
+
+    @property
+    def components(self) -> dict[str, FloatArray]:
+        """Wavelet variance of each term, u^2, (J,)."""
+        scales = Scales.of(self.wv)
+        curves = [scales.curve(term) for term in self.model.terms]
+        return dict(zip(self.model.term_labels(), curves, strict=True))
+
+    @cached_property
+    def goodness(self) -> Goodness:
+        """How well the model describes the data at each averaging time."""
+        is_tested = all(notice.code != "no-test" for notice in self.notices)
+        return Goodness.of(self.moments, self.wv, is_tested=is_tested)
+
+    @cached_property
+    def moments(self) -> FittedMoments:
+        """The moments of the data and of the model, whatever the method."""
+        slope_error = self.stderr.get(drift_key(self.model) or "", 0.0)
+        return FittedMoments.of(self.model, self.wv, self.keys, slope_error, self.discrepancy)
+
+    def deviation_interval(
+        self, tau: FloatArray, level: float = 0.95
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Allan deviation of the fitted model with its interval, at any averaging times.
+
+        Parameters
+        ----------
+        tau : array_like
+            Averaging times, s.
+        level : float, optional
+
+        Returns
+        -------
+        value, lower, upper : ndarray
+            In u, same shape as ``tau``; by linear propagation of the parameters' covariance to
+            the logarithm of the deviation.
+        """
+        level = checks.share("level", level, 0.95)
+        tau = np.asarray(tau, dtype=float)
+        scales = replace(Scales.of(self.wv), tau=tau)
+        curve = scales.curve(self.model)
+        errors = np.sqrt(np.diag(self.covariance))
+        gradient = np.empty((len(self.keys), tau.size))
+        for i, key in enumerate(self.keys):
+            step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
+            pair = [
+                scales.curve(self.model.with_params({key: self.params[key] + sign * step}))
+                for sign in (1.0, -1.0)
+            ]
+            gradient[i] = ((pair[0] - pair[1]) / (2.0 * step) / (2.0 * curve)).ravel()
+        spread = np.sqrt(np.einsum("ij,ik,kj->j", gradient, self.covariance, gradient))
+        value = np.sqrt(2.0 * curve)
+        ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
+        return value, value / ratio, value * ratio
+
+    # -- looks ------------------------------------------------------------------------------------
+
+    @cached_property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every parameter with its uncertainty, in SI and field units, in the model's order."""
+        return tuple(
+            estimates_of(
+                self.model, self.wv.quantity or "", self.stderr, self.interval(), self.upper_bounds
+            )
+        )
+
+    def __getitem__(self, key: str) -> Estimate:
+        for estimate in self.estimates:
+            if estimate.key == key:
+                return estimate
+        raise MissingNameError(f"the fit has no parameter {key!r}: it has {', '.join(self.params)}")
+
+    def __repr__(self) -> str:
+        verdict = "valid" if self.valid else "not valid"
+        return f"<{type(self).__name__} {self.model!r}, {METHOD_NAMES[self.method]}, {verdict}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        lines = wrapped(f"{self.wv.name or 'series'}: {self.model.title()}", indent=2)
+        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {self._how()}", indent=2)
+        lines += ["", HEAD, *map(str, self.estimates), ""]
+        fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
+        if np.isfinite(self.p_value):
+            fitness += f", p = {self.p_value:.2g}"
+        if np.isfinite(self.log_likelihood):
+            lines.append(f"log-likelihood {self.log_likelihood:.8g}")
+            fitness = f"of the wavelet variances: {fitness}"
+        lines += wrapped(fitness, indent=2)
+        lines += wrapped(self.goodness.sentence, indent=2)
+        lines.append("valid" if self.valid else "NOT VALID")
+        for notice in self.notices:
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join(lines)
+
+    def _size(self) -> str:
+        return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
+
+    def _how(self) -> str:
+        name = METHOD_NAMES[self.method]
+        if self.weights:
+            return f"{name}, {self.weights} weights"
+        return f"{name}, {len(self.trace)} iterations" if self.trace else name
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Allan deviation with error bars, fitted curve and components; returns the axes.
+
+        For ``method="allan"`` the lines and the regions that they were read from take the place of
+        the components.
+        """
+        from gmwm import plotting
+
+        wv = self.wv
+        axes = plotting.deviation(
+            wv.tau,
+            wv.allan_deviation,
+            np.sqrt(2.0 * wv.lower),
+            np.sqrt(2.0 * wv.upper),
+            unit=wv.unit,
+            title=wv.name,
+            ax=ax,
+        )
+        total = np.sqrt(2.0 * self.implied)
+        if self.regions:
+            plotting.curves(axes, wv.tau, total, {}, wv.allan_deviation)
+            plotting.straight_lines(axes, self._lines())
+            return axes
+        components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
+        plotting.curves(axes, wv.tau, total, components, wv.allan_deviation)
+        return axes
+
+    def _lines(self) -> dict[str, tuple[float, float, float, float]]:
+        """Lines of the Allan plot as `gmwm.plotting.straight_lines` takes them."""
+        lines = {}
+        for region in self.regions:
+            found = self[region.key]
+            slope = slope_name(region.slope)
+            label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
+            lines[label] = (region.slope, region.coefficient, region.tau_min, region.tau_max)
+        return lines
+
+    def plot_trace(self, ax: Axes | None = None) -> Axes:
+        """Log-likelihood against the iterations of EM; returns the axes.
+
+        Raises
+        ------
+        InputError
+            If the fit was not made by EM.
+        """
+        from gmwm import plotting
+
+        if not self.trace:
+            raise InputError(f"a fit by {self.method!r} has no iterations to show")
+        return plotting.trace(np.array(self.trace), ax=ax)
+
+    # -- tables and files -------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, and what readers of the file want, in JSON types."""
+        return fit_content(self) | {
+            "params": self.params,
+            "stderr": self.stderr,
+            "p_value": plain(self.p_value),
+            "valid": self.valid,
+            "units": {estimate.key: estimate.unit for estimate in self.estimates},
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`."""
+        return cls(**fields_of(content))

@@ -1,0 +1,145 @@
+"""How well a fitted model describes the data, octave by octave.
+
+With a million samples any model of a real sensor fails a chi-square test: the fine levels are known
+to a tenth of a per cent. What matters is by how much the model misses the Allan deviation, and
+whether that is more than chance at averaging times that count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gmwm._core.text import wrapped
+from gmwm._core.typing import FloatArray
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import FittedMoments, chi_square
+from gmwm.variance import WaveletVariance
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Goodness:
+    """Agreement of model and data at each level, from ``gmwm.Fit.goodness``.
+
+    Attributes
+    ----------
+    tau : (J,) ndarray
+        Averaging times, s.
+    data, model : (J,) ndarray
+        Allan deviations, u; both without the drift where the model has a ramp.
+    misfit : (J,) ndarray
+        ``data / model - 1``.
+    residual : (J,) ndarray
+        Difference of the cube roots of the variances in statistical standard errors, close to
+        standard normal at every level if the model is right (Wilson & Hilferty 1931, *PNAS* 17,
+        684-688). Neighbouring levels are correlated.
+    allowed : (J,) ndarray
+        The same in standard errors that hold the discrepancy too.
+    dof : (J,) ndarray
+        Equivalent degrees of freedom ``2 nu^4 / var(nu_hat^2)`` under the model.
+    name, unit : str
+        Of the channel.
+    is_tested : bool
+        Whether the variances are those of the data: not where gaps had to be bridged.
+    """
+
+    tau: FloatArray
+    data: FloatArray
+    model: FloatArray
+    misfit: FloatArray
+    residual: FloatArray
+    allowed: FloatArray
+    dof: FloatArray
+    name: str = ""
+    unit: str = "u"
+    is_tested: bool = True
+
+    @classmethod
+    def of(cls, at: FittedMoments, wv: WaveletVariance, *, is_tested: bool) -> Goodness:
+        """Compare wavelet variances with those of the model fitted to them."""
+        target = np.maximum(at.target, 0.0)  # less drift than the noise of its slope has
+        level = np.full(target.size, np.nan)
+        misfit, residual, allowed, dof = (level.copy() for _ in range(4))
+        variance = np.diag(at.statistical)
+        has = (at.implied > 0.0) & (variance > 0.0)
+        if np.any(has):
+            block = np.ix_(has, has)
+            implied = at.implied[has]
+            misfit[has] = np.sqrt(target[has] / implied) - 1.0
+            dof[has] = 2.0 * implied**2 / variance[has]
+            residual[has] = chi_square(target[has], implied, at.statistical[block], implied)[0]
+            allowed[has] = chi_square(target[has], implied, at.covariance[block], implied)[0]
+        return cls(
+            tau=wv.tau,
+            data=np.sqrt(2.0 * target),
+            model=np.sqrt(2.0 * at.implied),
+            misfit=misfit,
+            residual=residual,
+            allowed=allowed,
+            dof=dof,
+            name=wv.name,
+            unit=wv.unit or "u",
+            is_tested=is_tested,
+        )
+
+    @property
+    def worst(self) -> tuple[float, float] | None:
+        """Largest misfit, with its sign, and its averaging time (s).
+
+        Among levels of more than 30 degrees of freedom, where chance moves the deviation by less
+        than 13 % (one sigma); None if there is none.
+        """
+        known = np.flatnonzero(self.dof > tuning.WELL_KNOWN_DOF)
+        if not self.is_tested or known.size == 0:
+            return None
+        worst = known[int(np.argmax(np.abs(self.misfit[known])))]
+        return float(self.misfit[worst]), float(self.tau[worst])
+
+    @property
+    def is_excluded(self) -> bool:
+        """Whether the model misses some level by more than 10 % and by four standard errors.
+
+        The errors are those that the model implies itself, with what was allowed for; the
+        chi-square of a fit may have been taken under those of a richer model.
+        """
+        off = (np.abs(self.misfit) > tuning.LARGE_MISFIT) & (np.abs(self.allowed) > tuning.EXCLUDED)
+        return self.is_tested and bool(np.any(off))
+
+    @property
+    def sentence(self) -> str:
+        """The largest misfit in words; empty if no level is known well."""
+        worst = self.worst
+        if worst is None:
+            return ""
+        return (
+            f"largest misfit {100.0 * abs(worst[0]):.2g} % of the deviation at tau = "
+            f"{worst[1]:.3g} s (levels of more than {tuning.WELL_KNOWN_DOF:g} degrees of freedom)"
+        )
+
+    def __str__(self) -> str:
+        head = f"{'tau [s]':>10} {f'data [{self.unit}]':>14} {f'model [{self.unit}]':>14}"
+        lines = [
+            f"{self.name or 'series'}: Allan deviation of data and model",
+            f"{head} {'misfit':>9} {'residual':>9} {'allowed':>8} {'dof':>8}",
+        ]
+        columns = (
+            self.tau, self.data, self.model, self.misfit, self.residual, self.allowed, self.dof
+        )  # fmt: skip
+        for tau, data, model, misfit, residual, allowed, dof in zip(*columns, strict=True):
+            share = f"{100.0 * misfit:+.2f} %" if abs(misfit) < 10.0 else f"{100.0 * misfit:+.2g} %"
+            lines.append(
+                f"{tau:>10.5g} {data:>14.4g} {model:>14.4g} {share:>9} {residual:>+9.2f} "
+                f"{allowed:>+8.2f} {dof:>8.3g}"
+            )
+        return "\n".join([*lines, *wrapped(self.sentence, indent=2)])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Standardised residuals by level, with the misfit told at each; returns the axes."""
+        from gmwm import plotting
+
+        return plotting.residuals(self.tau, self.residual, self.misfit, title=self.name, ax=ax)

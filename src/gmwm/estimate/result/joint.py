@@ -1,0 +1,222 @@
+"""One model for several recordings, and whether they are the same noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import FittedMoments, chi_square
+from gmwm.estimate.result.fit import Fit
+from gmwm.estimate.result.serialization import fields_of, number, plain
+from gmwm.process import Model
+from gmwm.variance import PooledVariance, WaveletVariance
+
+_CELLS = 4  # numbers in a line of the table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointFit(Fit):
+    """A model fitted to several recordings at once.
+
+    Attributes
+    ----------
+    parts : tuple of Fit
+        The same model fitted to each recording.
+    equality_p : float
+        p-value of the test that the parameters are equal in all recordings; NaN where fewer than
+        two of them determine the parameters.
+    curves_p : float
+        p-value of the test that the wavelet variances of each recording are those of the joint
+        model, to within the discrepancy granted to it; it judges the model too.
+    spread : dict
+        Standard deviation of each parameter between recordings beyond their standard errors, by
+        key: relative for positive parameters, in its SI unit for others.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.joint-fit"
+
+    parts: tuple[Fit, ...] = ()
+    equality_p: float = float("nan")
+    curves_p: float = float("nan")
+    spread: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        freeze(self, "spread")
+
+    def __str__(self) -> str:
+        lines = [super().__str__(), "", self.agreement]
+        lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
+        for key in self.keys:
+            head = f"{key:<20} {self._spread_text(key, self.spread.get(key)):>8}"
+            cells = [f" {part.params.get(key, np.nan):>10.4g}" for part in self.parts]
+            for start in range(0, len(cells), _CELLS):
+                lines.append(f"{head:<29}{''.join(cells[start : start + _CELLS])}")
+                head = ""
+        return "\n".join(lines)
+
+    def _size(self) -> str:
+        pooled = f"{len(self.parts)} recordings, {self.wv.n_all:,} samples in all"
+        return f"{pooled} at {1.0 / self.wv.dt:g} Hz"
+
+    @property
+    def agreement(self) -> str:
+        """How many recordings there are, and whether they agree."""
+        said = f"{len(self.parts)} recordings"
+        if np.isfinite(self.equality_p):
+            return f"{said}, equality of the parameters: p = {self.equality_p:.2g}"
+        return f"{said}, each as the joint model has it: p = {self.curves_p:.2g}"
+
+    def _spread_text(self, key: str, value: float | None) -> str:
+        if value is None:
+            return "-"
+        return f"{100.0 * value:.1f} %" if key in self._positive else f"{value:.2g}"
+
+    @property
+    def _positive(self) -> set[str]:
+        return {i.key for i in self.model.parameters if i.parameter.lower == 0.0}
+
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, in JSON types."""
+        return {
+            **super().content(),
+            "parts": [part.to_dict() for part in self.parts],
+            "equality_p": plain(self.equality_p),
+            "curves_p": plain(self.curves_p),
+            "spread": dict(self.spread),
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`."""
+        parts = tuple(Fit.from_dict(part) for part in content["parts"])
+        fields = fields_of(content) | {"wv": PooledVariance.of([part.wv for part in parts])}
+        return cls(
+            **fields,
+            parts=parts,
+            equality_p=number("equality_p", content["equality_p"]),
+            curves_p=number("curves_p", content["curves_p"]),
+            spread={key: number(key, value) for key, value in content["spread"].items()},
+        )
+
+
+def fit_joint(
+    model: Model,
+    parts: Sequence[WaveletVariance],
+    estimate: Callable[[Model, WaveletVariance], Fit],
+) -> JointFit:
+    """Fit one model to several recordings, and to each.
+
+    Parameters
+    ----------
+    model : Model
+        With open parameters.
+    parts : sequence of WaveletVariance
+    estimate : callable
+        ``estimate(model, wv) -> Fit`` of a method.
+
+    Raises
+    ------
+    InputError
+        If the model has a rate ramp.
+    """
+    pooled = PooledVariance.of(parts)
+    if any(term.is_drift for term in model.terms) and len(parts) > 1:
+        raise InputError(
+            "a rate ramp is an accident of one recording: take it out of the model, or fit the "
+            "recordings one by one"
+        )
+    whole = estimate(model, pooled)
+    each = tuple(estimate(model, part) for part in parts)
+    equality_p, spread = _heterogeneity(whole, each)
+    curves_p = _curves_test(whole, each)
+    values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
+    values["notices"] = (*whole.notices, *_difference_notices(equality_p, curves_p))
+    return JointFit(**values, parts=each, equality_p=equality_p, curves_p=curves_p, spread=spread)
+
+
+def _difference_notices(equality_p: float, curves_p: float) -> list[Notice]:
+    """Whether the recordings are the same noise."""
+    if equality_p < tuning.RECORDINGS_DIFFER:
+        text = (
+            f"the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
+            "values are their mean, see the spread"
+        )
+    elif np.isnan(equality_p) and curves_p < tuning.RECORDINGS_DIFFER:
+        # Where the parameters cannot be compared, the curves can.
+        text = (
+            "the wavelet variances of the recordings are not those of the joint model (p = "
+            f"{curves_p:.2g}): the recordings differ, or the model is wrong"
+        )
+    else:
+        return []
+    values = {"equality_p": equality_p, "curves_p": curves_p}
+    return [Notice("recordings-differ", "bad", "", text, values)]
+
+
+def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
+    """Chi-square test of all recordings' wavelet variances against the joint model."""
+    statistic, levels = 0.0, 0
+    for part in each:
+        found = FittedMoments.of(whole.model, part.wv, whole.keys, 0.0, whole.discrepancy)
+        if np.any(found.implied <= 0.0):
+            return float("nan")
+        statistic += chi_square(found.target, found.implied, found.covariance, found.implied)[1]
+        levels += found.target.size
+    dof = levels - len(whole.keys)
+    return float(chi2.sf(statistic, dof)) if dof > 0 else float("nan")
+
+
+def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:
+    """Test of equality, and the spread of each parameter (DerSimonian & Laird 1986).
+
+    Positive parameters are compared by their logarithm. Only recordings that determine all
+    parameters of the joint fit take part.
+    """
+    keys = [key for key in whole.keys if key not in whole.upper_bounds]
+    positive = {i.key for i in whole.model.parameters if i.parameter.lower == 0.0}
+    points, matrices = [], []
+    for fit in each:
+        if not set(keys) <= set(fit.keys) - set(fit.upper_bounds):
+            continue
+        values = np.array([fit.params[key] for key in keys])
+        logged = np.array([key in positive for key in keys])
+        scale = np.where(logged, values, 1.0)
+        order = [fit.keys.index(key) for key in keys]
+        matrix = fit.covariance[np.ix_(order, order)] / np.outer(scale, scale)
+        if np.linalg.matrix_rank(matrix, hermitian=True) < len(keys):
+            continue
+        matrices.append(matrix)
+        points.append(np.where(logged, np.log(np.where(logged, values, 1.0)), values))
+    if len(points) < 2 or not keys:
+        return float("nan"), {}
+    spread = {
+        key: _between(np.array([p[k] for p in points]), np.array([m[k, k] for m in matrices]))
+        for k, key in enumerate(keys)
+    }
+    information = [np.linalg.inv(matrix) for matrix in matrices]
+    centre = np.linalg.solve(
+        np.sum(information, axis=0),
+        np.sum([i @ p for i, p in zip(information, points, strict=True)], axis=0),
+    )
+    away = [point - centre for point in points]
+    statistic = sum(a @ i @ a for a, i in zip(away, information, strict=True))
+    return float(chi2.sf(statistic, (len(points) - 1) * len(keys))), spread
+
+
+def _between(values: FloatArray, variances: FloatArray) -> float:
+    """Standard deviation between recordings beyond their standard errors."""
+    weight = 1.0 / variances
+    centre = np.sum(weight * values) / np.sum(weight)
+    excess = np.sum(weight * (values - centre) ** 2) - (values.size - 1)
+    scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
+    return float(np.sqrt(max(excess / scale, 0.0)))

@@ -1,0 +1,48 @@
+from .covariance.analysis import Analysis as Analysis, covariance_analysis as covariance_analysis
+from .covariance.reduction import Reduction as Reduction, reduce as reduce
+from .field.fix_file import read_fixes as read_fixes
+from .field.imu_file import read_imu as read_imu
+from .field.measured import Measured as Measured
+from .field.navigated import Navigated as Navigated
+from .filter.aiding import (
+    Aiding as Aiding,
+    Fixes as Fixes,
+    Outage as Outage,
+    barometer as barometer,
+    gnss as gnss,
+    standstills as standstills,
+)
+from .filter.filter import InitialSd as InitialSd, navigate as navigate
+from .filter.mechanization import integrate as integrate
+from .filter.solution import Innovations as Innovations, Solution as Solution
+from .imu.emulation import Imu as Imu, emulate as emulate
+from .imu.recorded import Recorded as Recorded
+from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
+from .montecarlo.consistency import (
+    Consistency as Consistency,
+    at_epoch as at_epoch,
+    innovation_test as innovation_test,
+    over_time as over_time,
+)
+from .montecarlo.experiment import Experiment as Experiment
+from .montecarlo.outage_errors import difference as difference, spread as spread
+from .montecarlo.runs import Runs as Runs
+from .montecarlo.scenario import Scenario as Scenario, Simulated as Simulated
+from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
+from .montecarlo.validation import Validation as Validation
+from .spec.experiment import experiment_from as experiment_from, read_experiment as read_experiment
+from .trajectory.manoeuvres import (
+    Accelerate as Accelerate,
+    Climb as Climb,
+    Stop as Stop,
+    Straight as Straight,
+    Turn as Turn,
+    perform as perform,
+)
+from .trajectory.missions import (
+    car_drive as car_drive,
+    fixed_wing_loiter as fixed_wing_loiter,
+    helicopter_mapping as helicopter_mapping,
+)
+from .trajectory.routes import through as through
+from .trajectory.trajectory import NavState as NavState, Trajectory as Trajectory

@@ -1,0 +1,8 @@
+"""Errors of filters predicted without runs, and small models found by them."""
+
+from gmwm.ins.covariance.reduction import FORMS, reduce
+
+__all__ = [
+    "FORMS",
+    "reduce",
+]

@@ -1,0 +1,258 @@
+"""Reduced sensor models: the best that a filter of few states can believe, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.ins.covariance.analysis import Analysis, Course
+from gmwm.ins.filter import Outage, gnss
+from gmwm.ins.imu import AXES, SensorModels
+from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.trajectory import fixed_wing_loiter
+from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
+
+FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "tau")}
+"""Forms of a reduced model, with their parameters."""
+
+_KINDS = ("gyro", "accel")
+_SETTLING = 120.0  # s, before the first outage and between them
+_JUDGED = slice(0, 6)  # position and velocity
+_WHITE_TAU = 1.0  # s, where white noise is read off an Allan plot
+_PEAK = 0.382  # Allan variance of a Gauss-Markov process at its peak, over its variance
+_SHORTEST = 0.1  # of the correlation time read off, in s
+_DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
+_SLOPE = 3e-3  # of the score over the logarithm of a factor, below which the search ends
+_INERTIA = 1e-3  # keeps a factor near 1 that does not matter
+_STEPS = 60
+
+
+@dataclass(frozen=True)
+class ReducedError:
+    """Horizontal position error at the end of an outage, 1 sigma, m.
+
+    Attributes
+    ----------
+    duration : float
+        Of the outage, s.
+    full : float
+        True error of the filter with the full model.
+    read_off, read_off_predicted : float
+        True and predicted error with the reduced model as it is read off an Allan plot.
+    reduced, reduced_predicted : float
+        The same with the reduced model that was found.
+    nees : float
+        Expected normalised error squared of the position, per degree of freedom, with the reduced
+        model.
+    """
+
+    duration: float
+    full: float
+    read_off: float
+    read_off_predicted: float
+    reduced: float
+    reduced_predicted: float
+    nees: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A reduced model of each sensor.
+
+    Attributes
+    ----------
+    form : str
+    models : SensorModels
+    inflation : dict
+        E.g. ``"gyro N"`` -> factor on what is read off an Allan plot: N where averaging begins, at
+        1 s, K from the line of slope +1/2 through the deviation at the longest outage, sigma and
+        tau from the height and place of its maximum beyond 1 s.
+    errors : tuple of ReducedError
+        One for each outage length.
+    """
+
+    form: str
+    models: SensorModels
+    inflation: dict[str, float]
+    errors: tuple[ReducedError, ...]
+
+    def __str__(self) -> str:
+        factors = ", ".join(f"{name} x {value:.3g}" for name, value in self.inflation.items())
+        lines = [
+            f"Reduced model {self.form}, factors on what an Allan plot shows:",
+            f"  {factors}",
+            "",
+            "Horizontal error at the end of an outage, 1 sigma [m]; in brackets as predicted",
+            f"{'outage':>8} {'full model':>11} {'read off':>21} {'reduced':>21} {'NEES/dof':>9}",
+        ]
+        for row in self.errors:
+            lines.append(
+                f"{row.duration:>6g} s {row.full:>11.4g} "
+                f"{row.read_off:>10.4g} ({row.read_off_predicted:>8.4g}) "
+                f"{row.reduced:>10.4g} ({row.reduced_predicted:>8.4g}) {row.nees:>9.3g}"
+            )
+        return "\n".join(lines)
+
+
+def reduce(
+    models: SensorModels | Calibration | Mapping[str, Any],
+    form: str = "N+K",
+    outages: Sequence[float] = (10.0, 30.0, 60.0),
+    *,
+    scenario: Scenario | None = None,
+    dt: float = 0.01,
+) -> Reduction:
+    """The reduced model that makes a small filter consistent, and as accurate as it can be.
+
+    Parameters
+    ----------
+    models : SensorModels, Calibration or mapping
+        The truth; see `SensorModels.of`.
+    form : {"N+K", "N+GM"}
+        White noise and random walk, or white noise and one Gauss-Markov process, on each axis.
+    outages : sequence of float, optional
+        Lengths for which it shall be good, s.
+    scenario : Scenario, optional
+        Where; its outages in place of ``outages``. By default a loiter with one GNSS position a
+        second of 1 m (vertical 1.5 m).
+    dt : float, optional
+        Sampling interval of the IMU in the default scenario, s.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    InputError
+        If the form is unknown, or there is no outage.
+
+    Notes
+    -----
+    Factors on the parameters, common to the axes of a kind, minimise the expected negative
+    logarithm of the predicted density at the true position and velocity before the first fix after
+    each outage: a proper score, which punishes a covariance that is too small as it does one that
+    is too large. The expectations come from `covariance_analysis`, exact for the truth given.
+    """
+    checks.choice("form", form, list(FORMS))
+    truth = SensorModels.of(models)
+    scenario = _default_scenario(outages, dt) if scenario is None else scenario
+    if not scenario.outages:
+        raise InputError("outages: give one length at least, s")
+    course = Course.of(scenario)
+    longest = max(outage.duration for outage in scenario.outages)
+    start = read_off(truth, form, longest, scenario.trajectory.dt)
+    names = [f"{kind} {name}" for kind in _KINDS for name in FORMS[form]]
+
+    def scaled(logs: FloatArray) -> SensorModels:
+        return _scaled(start, dict(zip(names, np.exp(logs), strict=True)))
+
+    def cost(logs: FloatArray) -> float:
+        analysis = course.analyse(truth, scaled(logs))
+        score = analysis.score(_JUDGED)
+        total = float(np.sum([score[analysis.index(o.end)] for o in scenario.outages]))
+        return total + _INERTIA * float(logs @ logs)
+
+    found = minimize(
+        cost,
+        np.zeros(len(names)),
+        method="BFGS",
+        options={"eps": _DIFFERENCE, "gtol": _SLOPE, "maxiter": _STEPS},
+    )
+    best = scaled(found.x)
+    analyses = [course.analyse(truth, each) for each in (truth, start, best)]
+    return Reduction(
+        form=form,
+        models=best,
+        inflation=dict(zip(names, map(float, np.exp(found.x)), strict=True)),
+        errors=tuple(_errors(outage, *analyses) for outage in scenario.outages),
+    )
+
+
+def read_off(models: SensorModels, form: str, longest: float, dt: float) -> SensorModels:
+    """Reduced models as they are read off the Allan deviation of full ones; see `Reduction`.
+
+    Parameters
+    ----------
+    models : SensorModels
+    form : {"N+K", "N+GM"}
+    longest : float
+        Longest outage, s.
+    dt : float
+        Sampling interval, s.
+    """
+    reduced, bias_sd = {}, {}
+    tau = dt * 2.0 ** np.arange(np.ceil(np.log2(10.0 * longest / dt)) + 1)
+    for axis in AXES:
+        model = models.models[axis]
+        deviation = np.sqrt(2.0 * model.haar_variance(tau, dt))
+        white = float(np.interp(np.log(_WHITE_TAU), np.log(tau), deviation)) * np.sqrt(_WHITE_TAU)
+        if form == "N+K":
+            at_end = float(np.interp(np.log(longest), np.log(tau), deviation))
+            reduced[axis] = WhiteNoise(white) + RandomWalk(at_end * np.sqrt(3.0 / longest))
+        else:
+            slow = np.where(tau > _WHITE_TAU, deviation, 0.0)
+            # Without the white noise's own part, the maximum is that of the slow terms.
+            rest = np.sqrt(np.maximum(slow**2 - white**2 / tau, 0.0))
+            top = int(np.argmax(rest))
+            height = float(rest[top]) or float(deviation[-1])
+            reduced[axis] = WhiteNoise(white) + GaussMarkov(
+                height / np.sqrt(_PEAK), max(float(tau[top]) / 1.89, _SHORTEST)
+            )
+        bias_sd[axis] = _initial_sd(models, axis, dt) if form == "N+K" else 0.0
+    return SensorModels(reduced, bias_sd)
+
+
+def _initial_sd(models: SensorModels, axis: str, dt: float) -> float:
+    """Standard deviation of the slow error of a sensor at the start."""
+    form = models.models[axis].state_space(dt)
+    slow = float(form.output @ form.initial_covariance @ form.output)
+    return float(np.sqrt(slow + models.bias_sd[axis] ** 2))
+
+
+def _default_scenario(lengths: Sequence[float], dt: float) -> Scenario:
+    outages = []
+    start = _SETTLING
+    for length in lengths:
+        outages.append(Outage(start, checks.positive("outage length", length)))
+        # Ends at a fix: those of one second.
+        start = float(np.ceil(start + length + _SETTLING))
+    trajectory = fixed_wing_loiter(duration=max(start, 2.0 * _SETTLING), dt=dt)
+    return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=_SETTLING)
+
+
+def _scaled(models: SensorModels, factors: Mapping[str, float]) -> SensorModels:
+    changed: dict[str, Model] = {}
+    for axis, model in models.models.items():
+        kind = axis.partition("_")[0]
+        values = {
+            key: float(value or 0.0) * factors[f"{kind} {key}"]
+            for key, value in model.params.items()
+        }
+        changed[axis] = model.with_params(values)
+    return replace(models, models=changed)
+
+
+def _errors(outage: Outage, full: Analysis, read: Analysis, reduced: Analysis) -> ReducedError:
+    index = full.index(outage.end)
+
+    def horizontal(sd: FloatArray) -> float:
+        return float(np.hypot(sd[index, 0], sd[index, 1]))
+
+    return ReducedError(
+        duration=outage.duration,
+        full=horizontal(full.sd),
+        read_off=horizontal(read.sd),
+        read_off_predicted=horizontal(read.predicted_sd),
+        reduced=horizontal(reduced.sd),
+        reduced_predicted=horizontal(reduced.predicted_sd),
+        nees=float(reduced.nees()[index]),
+    )

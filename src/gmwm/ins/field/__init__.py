@@ -1,0 +1,9 @@
+"""Navigation of real IMU and GNSS logs."""
+
+from gmwm.ins.field.measured import Measured
+from gmwm.ins.field.navigated import Navigated
+
+__all__ = [
+    "Measured",
+    "Navigated",
+]

@@ -1,0 +1,290 @@
+"""GNSS logs: positions and velocities in a delimited text, one row an epoch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.logs import (
+    POSITION_WORDS,
+    angle_factor,
+    angle_unit,
+    check_angles,
+    check_rising,
+    is_time,
+    length_factor,
+    open_log,
+    place,
+    unit_of,
+    words_of,
+)
+from gmwm.readers import TIME, CsvTable, label, meaning
+
+POSITION_SD = (1.0, 1.0, 1.5)
+"""Of fixes that say none, to the north, east and down, m."""
+
+VELOCITY_SD = (0.1, 0.1, 0.15)
+"""The same of velocities, m/s."""
+
+_POSITION = ("latitude", "longitude", "height")
+_VELOCITY = ("velocity north", "velocity east", "velocity down")
+_DIRECTIONS = {"north": "north", "n": "north", "east": "east", "e": "east", "down": "down",
+               "d": "down", "up": "up", "u": "up"}  # fmt: skip
+_OF_POSITION = {"latitude": "north", "longitude": "east", "height": "down"}
+_OF_VELOCITY = frozenset({"velocity", "vel", "v", "speed"})
+_OF_SD = frozenset({"sd", "std", "stdev", "sigma", "accuracy", "acc"})
+_SPEED_UNIT = frozenset({"m", "s", "mps", "ms", "per", "sec"})
+_BOTH = {"horizontal": ("north", "east"), "vertical": ("down",)}
+_PASSED_OVER = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"})
+
+
+@dataclass(frozen=True, eq=False)
+class FixLog:
+    """GNSS fixes as a file says them.
+
+    Attributes
+    ----------
+    time : (E,) ndarray
+        On the receiver's clock, s.
+    position, velocity : (E, 3) ndarray or None
+        Latitude, longitude (rad), height (m); to the north, east and down (m/s); NaN where there
+        is none.
+    position_sd, velocity_sd : (E, 3) ndarray or None
+        To the north, east and down; ``None`` where the file has none.
+    source : str
+    notes : tuple of str
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray | None
+    position_sd: FloatArray | None
+    velocity_sd: FloatArray | None
+    source: str
+    notes: tuple[str, ...] = ()
+
+    def aiding(
+        self,
+        start: float = 0.0,
+        position_sd: Sequence[float] = POSITION_SD,
+        velocity_sd: Sequence[float] = VELOCITY_SD,
+        lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> Aiding:
+        """The fixes on the clock of an IMU.
+
+        Parameters
+        ----------
+        start : float, optional
+            Time of the IMU's first epoch, s.
+        position_sd, velocity_sd : three floats, optional
+            Where the file says none, m and m/s.
+        lever_arm : three floats, optional
+            From the IMU to the antenna, body axes, m.
+        """
+        fixes = []
+        for kind, value, own, usual in (
+            ("position", self.position, self.position_sd, position_sd),
+            ("velocity", self.velocity, self.velocity_sd, velocity_sd),
+        ):
+            if value is None:
+                continue
+            there = np.all(np.isfinite(value), axis=1)
+            sd = np.tile(np.asarray(usual, dtype=float), (len(value), 1)) if own is None else own
+            fixes.append(Fixes(kind, self.time[there] - start, value[there], sd[there]))
+        return Aiding(tuple(fixes), lever_arm)
+
+
+def read_fixes(
+    path: str | os.PathLike[str],
+    *,
+    start: float = 0.0,
+    position_sd: Sequence[float] = POSITION_SD,
+    velocity_sd: Sequence[float] = VELOCITY_SD,
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Aiding:
+    """Read GNSS fixes.
+
+    Parameters
+    ----------
+    path : str or path
+        Delimited text, plain or gzip, with columns time, latitude, longitude and height, and where
+        there are any ``velocity_north``, ``velocity_east``, ``velocity_down`` (or ``_up``), and
+        standard deviations: ``sd_north``, ``sd_east``, ``sd_down`` (m; or ``latitude_sd`` ...) and
+        ``sd_velocity_north`` ... (m/s). Units stand at the end (``latitude_deg``); without one,
+        angles are in degrees if a latitude is beyond pi/2. Empty fields are epochs without a fix.
+    start : float, optional
+        Time of the IMU's first epoch on the same clock, s.
+    position_sd, velocity_sd : three floats, optional
+        To the north, east and down, where the file says none, m and m/s.
+    lever_arm : three floats, optional
+        From the IMU to the antenna, body axes, m.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used; the message names the line.
+    """
+    return read_fix_log(path).aiding(start, position_sd, velocity_sd, lever_arm)
+
+
+def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
+    """Read GNSS fixes on the receiver's own clock; see `read_fixes`."""
+    table = open_log(Path(path))
+    columns, unused = _columns(table)
+    values = table.load(sorted(set(columns.values())))
+    found = {name: values[column] for name, column in columns.items()}
+    _check_clock(table, columns[TIME], found[TIME])
+    position = _position(table, columns, found)
+    velocity = None
+    if all(name in found for name in _VELOCITY):
+        velocity = np.stack([found[name] for name in _VELOCITY], axis=1)
+    notes = [f"columns not used: {', '.join(unused)}"] if unused else []
+    no_fix = (position[:, 0] == 0.0) & (position[:, 1] == 0.0)
+    if np.any(no_fix):
+        position[no_fix] = np.nan
+        notes.append(f"{np.count_nonzero(no_fix)} positions at 0, 0 are taken for missing")
+    return FixLog(
+        time=found[TIME] * (meaning(table.names[columns[TIME]]).seconds or 1.0),
+        position=position,
+        velocity=velocity,
+        position_sd=_deviations(table, columns, found, "sd ", position),
+        velocity_sd=None
+        if velocity is None
+        else _deviations(table, columns, found, "sd velocity ", velocity),
+        source=table.source,
+        notes=tuple(notes),
+    )
+
+
+def _quantities(name: str) -> tuple[str, ...]:
+    """What a column holds; two for a horizontal standard deviation."""
+    if is_time(name):
+        return (TIME,)
+    words = words_of(name)
+    if not _OF_VELOCITY.isdisjoint(words) or words[:1] in (["vn"], ["ve"], ["vd"], ["vu"]):
+        while len(words) > 1 and words[-1] in _SPEED_UNIT:
+            words.pop()
+    is_sd = not _OF_SD.isdisjoint(words)
+    words = [word for word in words if word not in _OF_SD | _PASSED_OVER]
+    if len(words) == 1 and words[0] in ("vn", "ve", "vd", "vu"):
+        words = ["v", words[0][1]]
+    is_velocity = not _OF_VELOCITY.isdisjoint(words)
+    words = [word for word in words if word not in _OF_VELOCITY]
+    if len(words) != 1:
+        return ()
+    prefix = ("sd " if is_sd else "") + ("velocity " if is_velocity else "")
+    if words[0] in _BOTH and is_sd:
+        return tuple(prefix + each for each in _BOTH[words[0]])
+    position = POSITION_WORDS.get(words[0])
+    if position is not None and not is_velocity:
+        return (prefix + _OF_POSITION[position],) if is_sd else (position,)
+    direction = _DIRECTIONS.get(words[0])
+    if direction is None or not prefix:
+        return ()
+    return (prefix + ("down" if is_sd and direction == "up" else direction),)
+
+
+def _columns(table: CsvTable) -> tuple[dict[str, int], list[str]]:
+    """The column of each quantity, and the names of those that are none."""
+    columns: dict[str, int] = {}
+    unused = []
+    for column, name in enumerate(table.names):
+        found = _quantities(name)
+        if not found:
+            unused.append(name or str(column))
+        for quantity in found:
+            if quantity in columns:
+                raise InputError(
+                    f"{table.source}: columns {label(table.names, columns[quantity])} and "
+                    f"{label(table.names, column)} both look like {quantity}: rename one of them"
+                )
+            columns[quantity] = column
+    missing = [name for name in (TIME, *_POSITION) if name not in columns]
+    if missing:
+        raise InputError(
+            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
+            "like time_s,latitude_deg,longitude_deg,height_m"
+        )
+    for group in (_VELOCITY, tuple(f"sd {each}" for each in ("north", "east", "down")),
+                  tuple(f"sd {each}" for each in _VELOCITY)):  # fmt: skip
+        _check_all(table, columns, group)
+    return columns, unused
+
+
+def _check_all(table: CsvTable, columns: Mapping[str, int], group: Sequence[str]) -> None:
+    """Of three components all or none."""
+    there = [name for name in group if name in columns or _turned(name) in columns]
+    if there and len(there) < len(group):
+        lacking = next(name for name in group if name not in there)
+        raise InputError(
+            f"{table.source} has a column for {there[0]} and none for {lacking}: add it, or leave "
+            "out all three"
+        )
+
+
+def _turned(name: str) -> str:
+    return name.replace("down", "up")
+
+
+def _check_clock(table: CsvTable, column: int, stamps: FloatArray) -> None:
+    bad = np.flatnonzero(np.isnan(stamps))
+    if bad.size:
+        raise InputError(f"{place(table, column, int(bad[0]))}: no time: take the row out")
+    if not stamps.size:
+        raise InputError(f"{table.source} has no fixes: check the file")
+    check_rising(table, column, stamps)
+
+
+def _position(
+    table: CsvTable, columns: Mapping[str, int], found: dict[str, FloatArray]
+) -> FloatArray:
+    """Latitude, longitude, height in SI units, (E, 3); turns an upward velocity down."""
+    common = angle_unit(table.names[columns["latitude"]], found["latitude"])
+    for name in ("latitude", "longitude"):
+        column = columns[name]
+        found[name] = found[name] * angle_factor(table, column, name, common)
+        limit = 0.5 * np.pi if name == "latitude" else 2.0 * np.pi
+        check_angles(table, column, name, found[name], limit * (1.0 + 1e-9))
+    found["height"] = found["height"] * length_factor(table, columns["height"], "height")
+    if "velocity up" in found:
+        found["velocity down"] = -found["velocity up"]
+    return np.stack([found[name] for name in _POSITION], axis=1)
+
+
+def _deviations(
+    table: CsvTable,
+    columns: Mapping[str, int],
+    found: Mapping[str, FloatArray],
+    prefix: str,
+    value: FloatArray,
+) -> FloatArray | None:
+    """Standard deviations of three components, or ``None`` if the file has none."""
+    names = [prefix + each for each in ("north", "east", "down")]
+    if names[0] not in found:
+        return None
+    there = np.all(np.isfinite(value), axis=1)
+    for name in names:
+        column = columns[name]
+        if unit_of(table.names[column]) in ("deg", "rad", "ft"):
+            raise InputError(
+                f"{table.source}, column {label(table.names, column)}: give standard deviations "
+                "in metres"
+            )
+        bad = np.flatnonzero(there & ~(found[name] > 0.0))
+        if bad.size:
+            raise InputError(
+                f"{place(table, column, int(bad[0]))}: a standard deviation of "
+                f"{found[name][bad[0]]:g}: give a number above zero for each fix"
+            )
+    return np.stack([found[name] for name in names], axis=1)

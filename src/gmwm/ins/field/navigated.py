@@ -1,0 +1,350 @@
+"""Real data filtered: the solution, and what its innovations say of the filter's model."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from gmwm._core.files import written
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.field.alignment import Alignment, align, started
+from gmwm.ins.field.measured import Measured
+from gmwm.ins.filter import KINDS, Solution, navigate
+from gmwm.ins.geometry import ned_difference
+from gmwm.ins.imu import AXES
+from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH = 80
+_DOUBT = 0.001  # probability below which innovations contradict the model
+_LOST = 5.0  # times the expected size of innovations
+_MOSTLY_FINE = 1.5  # NIS by the median
+_COLUMNS = (
+    "time_s", "latitude_deg", "longitude_deg", "height_m",
+    "velocity_north_mps", "velocity_east_mps", "velocity_down_mps",
+    "roll_deg", "pitch_deg", "yaw_deg",
+    "sd_north_m", "sd_east_m", "sd_down_m",
+    "sd_velocity_north_mps", "sd_velocity_east_mps", "sd_velocity_down_mps",
+    "sd_tilt_north_deg", "sd_tilt_east_deg", "sd_heading_deg",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hole:
+    """The longest time without a position fix.
+
+    Attributes
+    ----------
+    start, end : float
+        s since the filter's start.
+    sd : tuple of three floats
+        Predicted standard deviations of the position to the north, east and down before the fix
+        at its end, m.
+    distance : float or None
+        Horizontal distance of that fix from where it was expected, m; ``None`` if none follows.
+    """
+
+    start: float
+    end: float
+    sd: tuple[float, float, float]
+    distance: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Navigated:
+    """A solution of real data.
+
+    Attributes
+    ----------
+    measured : Measured
+    alignment : Alignment
+    solution : Solution
+    hole : Hole
+    """
+
+    measured: Measured
+    alignment: Alignment
+    solution: Solution
+    hole: Hole
+
+    @classmethod
+    def of(cls, measured: Measured, interval: float = 1.0) -> Navigated:
+        """Align and filter.
+
+        Parameters
+        ----------
+        measured : Measured
+        interval : float, optional
+            Of the solution, s.
+
+        Raises
+        ------
+        InputError
+            If the initial state cannot be known, or no fix follows it.
+        """
+        alignment = align(
+            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd
+        )
+        imu, aiding = started(measured.imu, measured.aiding, alignment)
+        times = next(each.time for each in aiding.fixes if each.kind == "position")
+        if not times.size:
+            raise InputError("no position fix follows the first one: there is nothing to filter")
+        models = measured.sensors
+        if alignment.gyro_bias_sd is not None:
+            known = {axis: alignment.gyro_bias_sd for axis in AXES[:3]}
+            models = replace(models, bias_sd={**models.bias_sd, **known})
+        ends = np.concatenate([[0.0], times, [imu.n * imu.dt]])
+        longest = int(np.argmax(np.diff(ends)))
+        start, end = float(ends[longest]), float(ends[longest + 1])
+        solution = navigate(
+            imu, alignment.state, models, aiding, initial_sd=alignment.sd, interval=interval,
+            before=(end,),
+        )  # fmt: skip
+        return cls(measured, alignment, solution, _hole(solution, start, end))
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    def test(self, kind: str | None = None) -> InnovationTest:
+        """Size and whiteness of the innovations.
+
+        Parameters
+        ----------
+        kind : {"position", "velocity"}, optional
+            By default both together.
+        """
+        found = [KINDS[kind]] if kind else list(np.unique(self.solution.innovations.kind))
+        innovations = self.solution.innovations
+        parts = [innovations.standard[innovations.kind == each] for each in found]
+        seen = np.concatenate([part[np.isfinite(part)] for part in parts])
+        products = np.concatenate([(part[1:] * part[:-1]).ravel() for part in parts])
+        products = products[np.isfinite(products)]
+        scale = float(np.sqrt(np.sum(products**2)))
+        whiteness = 2.0 * norm.sf(abs(np.sum(products)) / scale) if scale > 0.0 else float("nan")
+        return InnovationTest(chi_square_ratio(seen**2, 1), float(whiteness))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of fixes that were used."""
+        return tuple(
+            each.kind
+            for each in self.measured.aiding.fixes
+            if each.kind in KINDS and each.time.size
+        )
+
+    @property
+    def _usual_size(self) -> float:
+        """NIS per degree of freedom by the median, which a few far ones do not move."""
+        squares = self.solution.innovations.standard**2
+        return float(np.nanmedian(squares) / chi2.median(1))
+
+    @property
+    def farthest(self) -> tuple[float, float]:
+        """Largest innovation in its expected standard deviation, and its time on the clock, s."""
+        size = np.nanmax(np.abs(self.solution.innovations.standard), axis=1, initial=0.0)
+        i = int(np.argmax(size))
+        return float(size[i]), float(self.clock(self.solution.innovations.time[i : i + 1])[0])
+
+    def clock(self, time: FloatArray) -> FloatArray:
+        """Times of the files, s, of times since the filter's start."""
+        imu = self.measured.imu
+        return np.asarray(time + self.measured.start + self.alignment.epoch * imu.dt, dtype=float)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the innovations do not contradict the filter's model."""
+        # Kind by kind: too large positions and too small velocities must not make each other good.
+        return self.solution.diverged_at is None and not self._misfits and self._is_white
+
+    @property
+    def _misfits(self) -> dict[str, float]:
+        """Kinds whose innovations have another size than expected -> how many times it is."""
+        tests = {kind: self.test(kind).nis for kind in self.kinds}
+        tests["all"] = self.test().nis
+        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= _DOUBT}
+        return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
+
+    @property
+    def _is_white(self) -> bool:
+        whiteness = self.test().whiteness
+        return bool(np.isnan(whiteness) or whiteness > _DOUBT)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the filter's model fits these data; only the innovations can tell."""
+        if self.solution.diverged_at is not None:
+            return (
+                "The filter diverged: the sensor models or the initial state are far off, or a "
+                "fix is."
+            )
+        if self.fits:
+            return (
+                "The innovations do not contradict the filter's model: they are as large as it "
+                "expects, and white."
+            )
+        sizes = self._misfits
+        if sizes and max(sizes.values()) > _LOST:
+            return (
+                f"The filter is lost: innovations are {max(sizes.values()):.2g} times as large as "
+                "it expects, and the accuracy that it predicts is not to be believed; look first "
+                "at the heading that it started with, then at the units of the sensors and the "
+                "clock of the fixes."
+            )
+        if sizes:
+            told = " and ".join(
+                f"{size:.2g} times as large{'' if kind == 'all' else f' in {kind}'}"
+                for kind, size in sizes.items()
+            )
+            return f"The filter's model does not fit: innovations are {told} as it expects; " + (
+                self._cause(sizes) + "."
+            )
+        return (
+            "The filter's model does not fit: innovations are as large as it expects, but depend "
+            "on those before; the errors of the fixes are coloured, or a slow error of the "
+            "sensors is missing in their models."
+        )
+
+    def _cause(self, sizes: dict[str, float]) -> str:
+        """What innovations of these sizes may come from."""
+        if min(sizes.values()) < 1.0 < max(sizes.values()):
+            return "the standard deviations of the fixes do not go together"
+        if max(sizes.values()) < 1.0:
+            return (
+                "the sensors are better than their models say, or the fixes than their standard "
+                "deviations"
+            )
+        if self._usual_size < _MOSTLY_FINE:
+            return (
+                "most are not, so that some fixes are outliers, or errors without fixes grow "
+                "faster than the sensor models say"
+            )
+        return (
+            "the sensors are worse than their models say, or the fixes than their standard "
+            "deviations"
+        )
+
+    # -- words and files --------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        solution, imu = self.solution, self.measured.imu
+        length = imu.n * imu.dt - self.alignment.epoch * imu.dt
+        lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
+        lines += [_wrapped(note) for note in (*self.measured.notes, *self.alignment.notes)]
+        if solution.diverged_at is not None:
+            at = float(self.clock(np.array([solution.diverged_at]))[0])
+            lines.append(_wrapped(f"the filter diverged at {at:.10g} s and was stopped"))
+        lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
+        for kind in self.kinds:
+            test = self.test(kind)
+            mark = " " if test.nis.within else "*"
+            lines.append(
+                f"{kind:10} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
+                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
+            )
+        far, at = self.farthest
+        lines += [f"largest: {far:.3g} sigma at {at:.10g} s", "", *self._accuracy(), ""]
+        lines += textwrap.wrap(self.verdict, _WIDTH)
+        return "\n".join(lines)
+
+    def _accuracy(self) -> list[str]:
+        lines = []
+        if self.solution.time.size and self.solution.diverged_at is None:
+            sd = self.solution.sd[-1]
+            doubt = "" if self.fits else " (if its model were right, which it is not)"
+            lines += [
+                f"Predicted accuracy at the end, 1 sigma{doubt}",
+                f"horizontal {np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
+                f"{np.linalg.norm(sd[3:6]):.3g} m/s,",
+                f"tilt {np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "
+                f"{np.degrees(sd[8]):.3g} deg",
+                "",
+            ]
+        hole = self.hole
+        begin, end = self.clock(np.array([hole.start, hole.end]))
+        text = (
+            f"Longest time without a position fix: {hole.end - hole.start:.4g} s, from "
+            f"{begin:.10g} s to {end:.10g} s; predicted error at its end, 1 sigma: horizontal "
+            f"{np.hypot(hole.sd[0], hole.sd[1]):.3g} m, vertical {hole.sd[2]:.3g} m"
+        )
+        if hole.distance is not None:
+            text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
+        return lines + textwrap.wrap(text, _WIDTH)
+
+    def write_solution(self, path: Path) -> Path:
+        """Write the solution as a CSV file.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        kept = ~self.solution.before
+        solution, sd = self.solution, self.solution.sd[kept]
+        angles = np.degrees(solution.lla[kept, :2])
+        angles[:, 1] = (angles[:, 1] + 180.0) % 360.0 - 180.0
+        rpy = np.degrees(solution.rpy[kept])
+        columns = np.column_stack([
+            self.clock(solution.time[kept]), angles, solution.lla[kept, 2], solution.velocity[kept],
+            rpy, sd[:, :6], np.degrees(sd[:, 6:]),
+        ])  # fmt: skip
+        digits = ["%.6f", "%.10f", "%.10f", "%.4f", *["%.5f"] * 3, *["%.5f"] * 3, *["%.4g"] * 9]
+        with written(path) as stream:
+            np.savetxt(stream, columns, digits, delimiter=",", header=",".join(_COLUMNS),
+                       comments="")  # fmt: skip
+        return path
+
+    # -- figures ----------------------------------------------------------------------------------
+
+    def plot_track(self) -> Figure:
+        """The solution's track and the fixes."""
+        from gmwm import plotting
+
+        kept = ~self.solution.before
+        origin = self.alignment.state.lla
+        positions = next(each for each in self.measured.aiding.fixes if each.kind == "position")
+        track = ned_difference(self.solution.lla[kept], origin)[:, 1::-1]
+        fixes = ned_difference(positions.value, origin)[:, 1::-1]
+        inside = self.solution.time[kept]
+        without = (inside >= self.hole.start) & (inside <= self.hole.end)
+        return plotting.measured_track(track, fixes, track[without])
+
+    def plot_innovations(self) -> Figure:
+        """Innovations with the bands that the filter expected."""
+        from gmwm import plotting
+
+        innovations = self.solution.innovations
+        panels = {}
+        for kind in self.kinds:
+            of_kind = innovations.kind == KINDS[kind]
+            unit = "m" if kind == "position" else "m/s"
+            panels[f"{kind} [{unit}]"] = (
+                self.clock(innovations.time[of_kind]),
+                innovations.value[of_kind],
+                innovations.sd[of_kind],
+            )
+        return plotting.innovations(panels)
+
+
+def _wrapped(note: str) -> str:
+    return textwrap.fill(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
+
+
+def _hole(solution: Solution, start: float, end: float) -> Hole:
+    """What was predicted for the end of a time without fixes, and how far off the next one was."""
+    early = np.flatnonzero(solution.before & (np.abs(solution.time - end) < 1e-6))
+    sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
+    innovations = solution.innovations
+    first = np.flatnonzero(
+        (np.abs(innovations.time - end) < 1e-6) & (innovations.kind == KINDS["position"])
+    )
+    distance = None
+    if first.size and np.all(np.isfinite(innovations.value[first[0], :2])):
+        distance = float(np.hypot(*innovations.value[first[0], :2]))
+    return Hole(start, end, (float(sd[0]), float(sd[1]), float(sd[2])), distance)

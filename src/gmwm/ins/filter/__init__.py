@@ -1,0 +1,34 @@
+"""The INS/GNSS filter: mechanization, error states, measurement updates."""
+
+from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, gnss
+from gmwm.ins.filter.covariance_kernels import NAVIGATION, carry, take_in, tilt_squared, transition
+from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, modified, navigate, unmodified
+from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_VELOCITY, measurement_row
+from gmwm.ins.filter.solution import Solution
+from gmwm.ins.filter.states import IntArray, SensorStates
+
+__all__ = [
+    "IS_HEIGHT",
+    "IS_POSITION",
+    "IS_VELOCITY",
+    "KINDS",
+    "NAVIGATION",
+    "Aiding",
+    "Filter",
+    "Fixes",
+    "InitialSd",
+    "IntArray",
+    "Outage",
+    "Outputs",
+    "SensorStates",
+    "Solution",
+    "carry",
+    "gnss",
+    "measurement_row",
+    "modified",
+    "navigate",
+    "take_in",
+    "tilt_squared",
+    "transition",
+    "unmodified",
+]

@@ -1,0 +1,325 @@
+"""What aids an inertial navigator: GNSS fixes, barometric height, standstill; and outages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_STANDSTILL, IS_VELOCITY
+from gmwm.ins.filter.states import IntArray
+from gmwm.ins.geometry import matrix_from_rpy, offset
+from gmwm.ins.imu import Imu
+from gmwm.ins.trajectory import Trajectory
+
+KINDS = {
+    "position": IS_POSITION,
+    "velocity": IS_VELOCITY,
+    "height": IS_HEIGHT,
+    "standstill": IS_STANDSTILL,
+}
+"""Kinds of fixes, with their codes in the kernels."""
+
+_OF_GNSS = ("position", "velocity")
+_STANDSTILL = 1e-3  # m/s
+_SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
+
+
+@dataclass(frozen=True)
+class Outage:
+    """A time without GNSS.
+
+    Attributes
+    ----------
+    start, duration : float
+        s. Fixes at the start are still taken, those at the end are taken again.
+    """
+
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        if not (checks.is_number(self.start) and np.isfinite(self.start) and self.start >= 0.0):
+            raise InputError(
+                f"outage start {checks.shown(self.start)}: give seconds since the first epoch"
+            )
+        checks.positive("outage duration", self.duration, "give seconds above zero")
+
+    @property
+    def end(self) -> float:
+        """S."""
+        return self.start + self.duration
+
+
+@dataclass(frozen=True, eq=False)
+class Fixes:
+    """Measurements of one kind.
+
+    Attributes
+    ----------
+    kind : {"position", "velocity", "height", "standstill"}
+    time : (E,) ndarray
+        s since the first epoch, rising.
+    value : (E, 3) ndarray
+        Latitude, longitude, height (rad, m); velocity to the north, east, down (m/s); height (m)
+        in the first column; zero for a standstill, or how much a simulated one shakes.
+    sd : (E, 3) ndarray
+        Standard deviations to the north, east and down, m or m/s; a component of zero is not used.
+    """
+
+    kind: str
+    time: FloatArray
+    value: FloatArray
+    sd: FloatArray
+
+    def __post_init__(self) -> None:
+        checks.choice("kind", self.kind, list(KINDS))
+        time = checks.real_numbers(self.time, "time of the fixes")
+        value, sd = (checks.real_numbers(each, f"{self.kind} fixes") for each in
+                     (self.value, self.sd))  # fmt: skip
+        if time.ndim != 1 or value.shape != (time.size, 3) or sd.shape != (time.size, 3):
+            raise InputError(
+                f"{self.kind} fixes: give E times and E x 3 values and standard deviations, not "
+                f"{time.shape}, {value.shape}, {sd.shape}"
+            )
+        bad = ~np.isfinite(time) | ~np.all(np.isfinite(value) & np.isfinite(sd), axis=1)
+        if np.any(bad):
+            raise InputError(
+                f"{self.kind} fixes: number {int(np.argmax(bad))} is not finite: leave it out"
+            )
+        if np.any(np.diff(time) < 0.0):
+            late = int(np.argmax(np.diff(time) < 0.0)) + 1
+            raise InputError(
+                f"{self.kind} fixes: number {late} at {time[late]:g} s comes before the one ahead "
+                "of it: sort them by time"
+            )
+        if np.any(sd < 0.0):
+            raise InputError(f"{self.kind} fixes: a standard deviation is negative: give 0 or more")
+        for name, array in (("time", time), ("value", value), ("sd", sd)):
+            object.__setattr__(self, name, array)
+
+    def part(self, kept: npt.NDArray[np.bool_]) -> Fixes:
+        """Some of the fixes."""
+        return replace(self, time=self.time[kept], value=self.value[kept], sd=self.sd[kept])
+
+    def noisy(self, rng: np.random.Generator) -> Fixes:
+        """The fixes with white noise of their standard deviations added."""
+        noise = self.sd * rng.standard_normal(self.sd.shape)
+        return replace(self, value=self.moved(noise))
+
+    def moved(self, by: FloatArray) -> FloatArray:
+        """Values moved by metres or m/s to the north, east and down, (E, 3)."""
+        if self.kind == "position":
+            return offset(self.value, by)
+        if self.kind == "height":
+            return self.value + np.where(np.arange(3) == 0, by, 0.0)
+        return self.value + by
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """Fixes of all kinds in order of time, as the kernels take them.
+
+    Attributes
+    ----------
+    epoch, kind : (E,) ndarray of int
+    value, sd : (E, 3) ndarray
+    """
+
+    epoch: IntArray
+    kind: IntArray
+    value: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Aiding:
+    """All that a navigator is aided by.
+
+    Attributes
+    ----------
+    fixes : tuple of Fixes
+    lever_arm : (3,) ndarray
+        From the IMU to the GNSS antenna, body axes, m.
+    coloured_sd : (3,) ndarray
+        Standard deviation of the coloured noise of GNSS positions to the north, east and down, m: a
+        first-order Gauss-Markov process that the filter has states for; zero for none.
+    coloured_tau : float
+        Its correlation time, s.
+    """
+
+    fixes: tuple[Fixes, ...] = ()
+    lever_arm: FloatArray | Sequence[float] = (0.0, 0.0, 0.0)
+    coloured_sd: FloatArray | Sequence[float] = (0.0, 0.0, 0.0)
+    coloured_tau: float = 100.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lever_arm", _three("lever_arm", self.lever_arm))
+        object.__setattr__(self, "coloured_sd", _three("coloured_sd", self.coloured_sd))
+        if np.any(np.asarray(self.coloured_sd) < 0.0):
+            raise InputError("coloured_sd: give 0 or more metres to the north, east and down")
+        checks.positive("coloured_tau", self.coloured_tau, "give seconds above zero")
+
+    def __add__(self, other: Aiding) -> Aiding:
+        """Both together; the antenna and the coloured noise of the first."""
+        return replace(self, fixes=(*self.fixes, *other.fixes))
+
+    def without(self, outages: Iterable[Outage]) -> Aiding:
+        """The same without the GNSS fixes of the outages."""
+        result = []
+        for fixes in self.fixes:
+            if fixes.kind in _OF_GNSS:
+                out = np.zeros(fixes.time.size, dtype=bool)
+                for outage in outages:
+                    out |= (fixes.time > outage.start + _SAME_TIME) & (
+                        fixes.time < outage.end - _SAME_TIME
+                    )
+                fixes = fixes.part(~out)
+            result.append(fixes)
+        return replace(self, fixes=tuple(result))
+
+    def noisy(self, rng: np.random.Generator) -> Aiding:
+        """The same with noise added to error-free fixes, the coloured one included."""
+        fixes = []
+        for each in self.fixes:
+            drawn = each.noisy(rng)
+            if each.kind == "position" and np.any(self.coloured_sd):
+                slow = _markov(each.time, self.coloured_tau, rng) * self.coloured_sd
+                drawn = replace(drawn, value=drawn.moved(slow))
+            fixes.append(drawn)
+        return replace(self, fixes=tuple(fixes))
+
+    def events(self, dt: float, n: int) -> Events:
+        """Fixes sorted by time, at the nearest epochs of an IMU with ``n`` intervals of ``dt``.
+
+        Raises
+        ------
+        InputError
+            If a fix lies outside the record.
+        """
+        fixes = [each for each in self.fixes if each.time.size]
+        if not fixes:
+            none = np.zeros(0, dtype=np.int64)
+            return Events(none, none, np.zeros((0, 3)), np.zeros((0, 3)))
+        for each in fixes:
+            outside = (each.time < -0.5 * dt) | (each.time > (n + 0.5) * dt)
+            if np.any(outside):
+                raise InputError(
+                    f"{each.kind} fix at {each.time[np.argmax(outside)]:g} s: the IMU record goes "
+                    f"from 0 to {n * dt:g} s; cut the fixes or shift their clock"
+                )
+        epoch = np.concatenate([np.rint(each.time / dt).astype(np.int64) for each in fixes])
+        kind = np.concatenate([np.full(each.time.size, KINDS[each.kind]) for each in fixes])
+        order = np.lexsort((kind, epoch))
+        value = np.concatenate([each.value for each in fixes])
+        sd = np.concatenate([each.sd for each in fixes])
+        return Events(
+            np.clip(epoch, 0, n)[order],
+            kind.astype(np.int64)[order],
+            np.ascontiguousarray(value[order]),
+            np.ascontiguousarray(sd[order]),
+        )
+
+
+def gnss(
+    trajectory: Trajectory,
+    interval: float = 1.0,
+    *,
+    position_sd: float | Sequence[float] | None = (1.0, 1.0, 1.5),
+    velocity_sd: float | Sequence[float] | None = None,
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    coloured_sd: Sequence[float] = (0.0, 0.0, 0.0),
+    coloured_tau: float = 100.0,
+    imu: Imu | None = None,
+) -> Aiding:
+    """Error-free GNSS fixes along a trajectory; see `Aiding.noisy`.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    interval : float, optional
+        s; the first fix is one interval after the first epoch.
+    position_sd, velocity_sd : float or three floats, optional
+        Standard deviations to the north, east and down, m and m/s; ``None`` for no such fixes.
+    lever_arm : three floats, optional
+        From the IMU to the antenna, body axes, m.
+    coloured_sd, coloured_tau : optional
+        See `Aiding`.
+    imu : Imu, optional
+        Error-free, for the antenna's velocity about the IMU; needed with a lever arm and velocity.
+
+    Raises
+    ------
+    InputError
+        If the interval is no multiple of the trajectory's, or a standard deviation not positive.
+    """
+    stride = checks.positive("interval", interval) / trajectory.dt
+    if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:
+        raise InputError(
+            f"interval = {interval:g} s: give a multiple of the trajectory's {trajectory.dt:g} s"
+        )
+    index = np.arange(round(stride), trajectory.n + 1, round(stride))
+    arm = _three("lever_arm", lever_arm)
+    matrix = matrix_from_rpy(trajectory.rpy[index])
+    time = trajectory.time[index]
+    fixes = []
+    if position_sd is not None:
+        antenna = offset(trajectory.lla[index], matrix @ arm)
+        fixes.append(Fixes("position", time, antenna, _deviations(position_sd, index.size)))
+    if velocity_sd is not None:
+        velocity = trajectory.velocity[index]
+        if np.any(arm):
+            if imu is None:
+                raise InputError("velocity fixes with a lever arm: give the error-free imu too")
+            rate = imu.rotation[index - 1] / imu.dt
+            velocity = velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm))
+        fixes.append(Fixes("velocity", time, velocity, _deviations(velocity_sd, index.size)))
+    return Aiding(tuple(fixes), arm, coloured_sd, coloured_tau)
+
+
+def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) -> Aiding:
+    """Error-free heights along a trajectory; see `gnss`."""
+    whole = gnss(trajectory, interval, position_sd=sd).fixes[0]
+    value = np.where(np.arange(3) == 0, whole.value[:, 2:], 0.0)
+    return Aiding((Fixes("height", whole.time, value, whole.sd * [1.0, 0.0, 0.0]),))
+
+
+def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
+    """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
+    whole = gnss(trajectory, interval, position_sd=None, velocity_sd=sd).fixes[0]
+    still = np.linalg.norm(whole.value, axis=1) < _STANDSTILL
+    kept = whole.part(still)
+    return Aiding((Fixes("standstill", kept.time, np.zeros_like(kept.value), kept.sd),))
+
+
+def _three(name: str, values: Any) -> FloatArray:
+    array = checks.real_numbers(values, name)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise InputError(f"{name} = {checks.shown(values)}: give three finite numbers")
+    return array
+
+
+def _deviations(given: float | Sequence[float], count: int) -> FloatArray:
+    each = checks.real_numbers(given, "standard deviation")
+    each = _three("standard deviation", np.full(3, each) if each.ndim == 0 else each)
+    if np.any(each <= 0.0):
+        raise InputError(f"standard deviation = {checks.shown(given)}: give positive numbers")
+    return np.tile(each, (count, 1))
+
+
+def _markov(time: FloatArray, tau: float, rng: np.random.Generator) -> FloatArray:
+    """Three stationary Gauss-Markov series of unit variance at some times, (E, 3)."""
+    noise = rng.standard_normal((time.size, 3))
+    series = np.empty_like(noise)
+    decay = np.exp(-np.diff(time, prepend=-np.inf) / tau)
+    state = np.zeros(3)
+    for i, keep in enumerate(decay):
+        state = keep * state + np.sqrt(1.0 - keep**2) * noise[i]
+        series[i] = state
+    return series

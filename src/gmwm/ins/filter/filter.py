@@ -1,0 +1,312 @@
+"""The navigation filter: an IMU, its error models and what aids it in, a solution out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.ins.filter.aiding import Aiding, Events
+from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
+from gmwm.ins.filter.filter_kernels import IS_POSITION, run
+from gmwm.ins.filter.solution import Innovations, Solution
+from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
+from gmwm.ins.geometry import matrix_from_rpy
+from gmwm.ins.imu import Imu, SensorModels
+from gmwm.ins.trajectory import NavState, check_latitudes
+
+_COVARIANCE_STEP = 0.1  # s
+
+
+@dataclass(frozen=True)
+class InitialSd:
+    """How well the initial state is known, 1 sigma.
+
+    Attributes
+    ----------
+    position : float
+        m, horizontal and vertical.
+    velocity : float
+        m/s.
+    tilt, heading : float
+        rad.
+    """
+
+    position: float = 1.0
+    velocity: float = 0.1
+    tilt: float = np.radians(0.1)
+    heading: float = np.radians(0.5)
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "tilt", "heading"):
+            checks.positive(f"initial {name}", getattr(self, name))
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Of the nine navigation errors, (9,)."""
+        return np.array(
+            [self.position] * 3 + [self.velocity] * 3 + [self.tilt, self.tilt, self.heading]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """An error-state Kalman filter with the states of given sensor models, ready to run.
+
+    Closed loop: after the measurements of an epoch, the estimated errors are taken off position,
+    velocity and attitude; the increments of the IMU are corrected for the estimated sensor errors
+    sample by sample. The covariance is carried in steps of ``stride`` samples, and at every epoch
+    that has a measurement or a result.
+
+    Attributes
+    ----------
+    states : SensorStates
+    dt : float
+        Sampling interval of the IMU, s.
+    stride : int
+        Samples per step of the covariance.
+    coloured : (3,) ndarray of int
+        States of the coloured noise of GNSS positions; -1 for none.
+    lever_arm : (3,) ndarray
+        m.
+    second_order : bool
+        Whether the square of the tilt error is allowed for; without it the filter is linear, and
+        too sure of its vertical channel where gyros are poor and accelerometers good; see
+        `gmwm.ins.filter.covariance_kernels.tilt_squared`.
+    """
+
+    states: SensorStates
+    dt: float
+    stride: int
+    coloured: IntArray
+    lever_arm: FloatArray
+    second_order: bool = True
+
+    @classmethod
+    def of(
+        cls,
+        sensors: SensorModels,
+        aiding: Aiding,
+        dt: float,
+        step: float = _COVARIANCE_STEP,
+        second_order: bool = True,
+    ) -> Filter:
+        """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s)."""
+        stride = max(round(checks.positive("step", step) / dt), 1)
+        states = SensorStates.of(sensors, dt, stride)
+        coloured = np.full(3, -1, dtype=np.int64)
+        sd = np.asarray(aiding.coloured_sd)
+        if np.any(sd):
+            names = [f"GNSS {axis}" for axis, s in zip(("north", "east", "down"), sd, strict=True)
+                     if s > 0.0]  # fmt: skip
+            coloured[sd > 0.0] = states.m + np.arange(len(names))
+            states = states.with_markov(names, sd[sd > 0.0], aiding.coloured_tau, dt)
+        return cls(states, dt, stride, coloured, np.asarray(aiding.lever_arm), second_order)
+
+    @property
+    def size(self) -> int:
+        """Number of states, those of navigation included."""
+        return NAVIGATION + self.states.m
+
+    def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
+        """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
+        P = np.zeros((self.size, self.size))
+        P[:NAVIGATION, :NAVIGATION] = modified(np.diag(sd.deviations**2), initial.velocity)
+        P[NAVIGATION:, NAVIGATION:] = self.states.covariance
+        return P
+
+    def run(
+        self,
+        imu: Imu,
+        initial: NavState,
+        initial_sd: InitialSd,
+        events: Events,
+        outputs: Outputs,
+    ) -> Solution:
+        """Filter a record.
+
+        Parameters
+        ----------
+        imu : Imu
+            Of the filter's sampling interval.
+        initial : NavState
+            Estimate at the first epoch.
+        initial_sd : InitialSd
+        events : Events
+            Measurements.
+        outputs : Outputs
+            Epochs to be kept.
+
+        Raises
+        ------
+        InputError
+            If it starts closer than 1 deg to a pole.
+        """
+        check_latitudes(initial.lla[None, :], "initial")
+        table, m, kept = self.states, self.states.m, outputs.epoch.size
+        C = matrix_from_rpy(initial.rpy)
+        v, lla, x = initial.velocity.copy(), initial.lla.copy(), table.mean.copy()
+        P = self.covariance(initial, initial_sd)
+        nav, matrices, nav_P = np.zeros((kept, 6)), np.zeros((kept, 3, 3)), np.zeros((kept, 9, 9))
+        sensor, sensor_P = np.zeros((kept, 6)), np.zeros((kept, 6, 6))
+        innovation, sd = np.full((2, events.epoch.size, 3), np.nan)
+        axis = table.axis[table.axis != NO_AXIS]
+        first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
+        stopped = run(
+            imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
+            first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
+            table.noise, table.noise_off, table.cross, table.integral, self.coloured,
+            events.epoch, events.kind, events.value, events.sd, self.lever_arm, self.second_order,
+            outputs.epoch, outputs.before,
+            nav, matrices, nav_P, sensor, sensor_P, innovation, sd,
+        )  # fmt: skip
+        done = kept if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
+        return Solution(
+            time=outputs.time(imu.dt)[:done],
+            before=outputs.before[:done] == 1,
+            lla=nav[:done, :3],
+            velocity=nav[:done, 3:],
+            matrix=matrices[:done],
+            covariance=unmodified(nav_P[:done], nav[:done, 3:]),
+            sensor_errors=sensor[:done],
+            sensor_covariance=sensor_P[:done],
+            innovations=Innovations(
+                time=np.asarray(events.epoch * imu.dt, dtype=float),
+                kind=events.kind,
+                value=innovation,
+                sd=sd,
+            ),
+            state_names=table.names,
+            states=x,
+            state_covariance=P[NAVIGATION : NAVIGATION + m, NAVIGATION : NAVIGATION + m],
+            diverged_at=None if stopped < 0 else float(stopped * imu.dt),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """Epochs whose solution is kept.
+
+    Attributes
+    ----------
+    epoch : (K,) ndarray of int
+        In order.
+    before : (K,) ndarray of int
+        1 for the solution before the measurements of the epoch, 0 for that after them.
+    """
+
+    epoch: IntArray
+    before: IntArray
+
+    def time(self, dt: float) -> FloatArray:
+        """Times of the epochs, s, (K,)."""
+        return np.asarray(self.epoch * dt, dtype=float)
+
+    @classmethod
+    def every(
+        cls,
+        interval: float,
+        dt: float,
+        n: int,
+        before: Sequence[float] = (),
+        also: Sequence[float] | FloatArray = (),
+    ) -> Outputs:
+        """Every ``interval`` and ``also`` (s) after the measurements, ``before`` before them."""
+        stride = max(round(checks.positive("interval", interval) / dt), 1)
+        extra = np.clip(np.rint(np.asarray(also, dtype=float) / dt), 0, n).astype(np.int64)
+        after = np.union1d(np.arange(0, n + 1, stride), extra)
+        times = checks.real_numbers(before, "before")
+        outside = ~((times >= -0.5 * dt) & (times <= (n + 0.5) * dt))
+        if np.any(outside):
+            raise InputError(
+                f"before = {times[np.argmax(outside)]:g} s: the IMU record goes from 0 to "
+                f"{n * dt:g} s; give times within it"
+            )
+        early = np.clip(np.rint(times / dt), 0, n).astype(np.int64)
+        epoch = np.concatenate([after, early])
+        flag = np.concatenate([np.zeros(after.size), np.ones(early.size)]).astype(np.int64)
+        order = np.lexsort((-flag, epoch))
+        return cls(epoch[order].astype(np.int64), flag[order])
+
+
+def modified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Covariance with the modified velocity error ``dv - v x phi``, from one with ``dv``."""
+    return _turned(covariance, velocity, -1.0)
+
+
+def unmodified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Covariance with the velocity error ``dv = u + v x phi``, from one with ``u``."""
+    return _turned(covariance, velocity, 1.0)
+
+
+def _turned(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatArray:
+    T = np.zeros(covariance.shape)
+    T[..., range(9), range(9)] = 1.0
+    T[..., VELOCITY:ATTITUDE, ATTITUDE:] = sign * skew(velocity)
+    return T @ covariance @ np.swapaxes(T, -1, -2)
+
+
+def skew(vector: FloatArray) -> FloatArray:
+    """Matrices of the cross product, (..., 3, 3), of vectors (..., 3)."""
+    x, y, z = np.moveaxis(np.asarray(vector), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def navigate(
+    imu: Imu,
+    initial: NavState,
+    sensors: SensorModels | Calibration | Mapping[str, Any],
+    aiding: Aiding,
+    *,
+    initial_sd: InitialSd | None = None,
+    step: float = _COVARIANCE_STEP,
+    interval: float = 1.0,
+    before: Sequence[float] = (),
+    second_order: bool = True,
+) -> Solution:
+    """Integrated navigation: filter IMU increments with sensor models and aiding.
+
+    Parameters
+    ----------
+    imu : Imu
+    initial : NavState
+        Estimate at the first epoch.
+    sensors : SensorModels, Calibration or mapping
+        See `SensorModels.of`.
+    aiding : Aiding
+        Measurements, with their noise.
+    initial_sd : InitialSd, optional
+    step : float, optional
+        Step of the covariance, s.
+    interval : float, optional
+        Of the solution, s.
+    before : sequence of float, optional
+        Times (s) at which the solution before the measurements is wanted too, such as the end of an
+        outage.
+    second_order : bool, optional
+        See `Filter`.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    InputError
+        If sensor models or measurements cannot be used.
+    """
+    models = SensorModels.of(sensors)
+    ready = Filter.of(models, aiding, imu.dt, step, second_order)
+    events = aiding.events(imu.dt, imu.n)
+    if not np.any(events.kind == IS_POSITION) and aiding.fixes and np.any(ready.coloured >= 0):
+        raise InputError("coloured_sd without position fixes: set it to zero")
+    outputs = Outputs.every(interval, imu.dt, imu.n, before)
+    return ready.run(imu, initial, initial_sd or InitialSd(), events, outputs)

@@ -1,0 +1,329 @@
+"""The loop of the navigation filter: mechanization, covariance, measurements, closed loop."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.ins.filter.covariance_kernels import carry, take_in, tilt_squared, transition
+from gmwm.ins.filter.mechanization import step
+from gmwm.ins.filter.states import IntArray
+from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
+
+IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = 0, 1, 2, 3
+"""Kinds of measurements."""
+
+_LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
+_CLEAN_EVERY = 1000  # steps of the covariance: the attitude matrix is brought back to a rotation
+
+
+@numba.njit(cache=True, nogil=True)
+def measurement_row(
+    kind: int, component: int, C: FloatArray, v: FloatArray, rate: FloatArray, lever: FloatArray,
+    h: FloatArray,
+) -> None:  # fmt: skip
+    """Fill the row h (9,) of one component of a measurement.
+
+    Parameters
+    ----------
+    kind, component : int
+    C, v : ndarray
+        Attitude and velocity.
+    rate : (3,) ndarray
+        Angular rate, body axes, rad/s.
+    lever : (3,) ndarray
+        From the IMU to the antenna, body axes, m.
+    """
+    for i in range(9):
+        h[i] = 0.0
+    if kind == IS_HEIGHT:
+        h[2] = -1.0
+        return
+    if kind == IS_POSITION:
+        h[component] = 1.0
+        x, y, z = lever[0], lever[1], lever[2]
+        base = 0.0
+    else:
+        h[3 + component] = 1.0
+        base = 1.0
+        x = rate[1] * lever[2] - rate[2] * lever[1]
+        y = rate[2] * lever[0] - rate[0] * lever[2]
+        z = rate[0] * lever[1] - rate[1] * lever[0]
+        if kind == IS_STANDSTILL:
+            x = y = z = 0.0
+    # An error phi of the attitude moves a vector a by a x phi.
+    a = base * v[0] + C[0, 0] * x + C[0, 1] * y + C[0, 2] * z
+    b = base * v[1] + C[1, 0] * x + C[1, 1] * y + C[1, 2] * z
+    c = base * v[2] + C[2, 0] * x + C[2, 1] * y + C[2, 2] * z
+    if component == 0:
+        h[7], h[8] = -c, b
+    elif component == 1:
+        h[6], h[8] = c, -a
+    else:
+        h[6], h[7] = -b, a
+
+
+@numba.njit(cache=True, nogil=True)
+def residual(
+    kind: int, component: int, value: FloatArray, C: FloatArray, v: FloatArray, lla: FloatArray,
+    rate: FloatArray, lever: FloatArray,
+) -> float:  # fmt: skip
+    """Estimate less measurement, of one component, m or m/s."""
+    if kind == IS_HEIGHT:
+        return lla[2] - value[0]
+    if kind == IS_STANDSTILL:
+        return v[component] - value[component]
+    if kind == IS_VELOCITY:
+        x = rate[1] * lever[2] - rate[2] * lever[1]
+        y = rate[2] * lever[0] - rate[0] * lever[2]
+        z = rate[0] * lever[1] - rate[1] * lever[0]
+        moved = C[component, 0] * x + C[component, 1] * y + C[component, 2] * z
+        return v[component] + moved - value[component]
+    arm = 0.0
+    for i in range(3):
+        arm += C[component, i] * lever[i]
+    if component == 2:
+        return arm - (lla[2] - value[2])
+    meridian, transverse = radii_at(math.sin(lla[0]))
+    if component == 0:
+        return (meridian + lla[2]) * (lla[0] - value[0]) + arm
+    east = lla[1] - value[1]
+    east -= 2.0 * math.pi * math.floor(east / (2.0 * math.pi) + 0.5)
+    return (transverse + lla[2]) * math.cos(lla[0]) * east + arm
+
+
+@numba.njit(cache=True, nogil=True)
+def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> None:
+    """Take estimated errors x off the navigation solution, and set them to zero, in place."""
+    meridian, transverse = radii_at(math.sin(lla[0]))
+    lla[0] -= x[0] / (meridian + lla[2])
+    lla[1] -= x[1] / ((transverse + lla[2]) * math.cos(lla[0]))
+    lla[2] += x[2]
+    # The velocity less u is the true one, turned by the attitude error as the attitude is; to the
+    # second order, for a fast vehicle with a heading in doubt.
+    a, b, c = v[0] - x[3], v[1] - x[4], v[2] - x[5]
+    p, q, r = x[7] * c - x[8] * b, x[8] * a - x[6] * c, x[6] * b - x[7] * a
+    v[0] = a + p + 0.5 * (x[7] * r - x[8] * q)
+    v[1] = b + q + 0.5 * (x[8] * p - x[6] * r)
+    v[2] = c + r + 0.5 * (x[6] * q - x[7] * p)
+    turn_navigation(C, -x[6], -x[7], -x[8])
+    orthonormalise(C)
+    for i in range(9):
+        x[i] = 0.0
+
+
+@numba.njit(cache=True, nogil=True)
+def sample_error(
+    first: IntArray, output: FloatArray, phi: FloatArray, phi_off: FloatArray, partner: IntArray,
+    paired: bool, x: FloatArray, held: FloatArray, error: FloatArray,
+) -> None:  # fmt: skip
+    """Sensor errors (6,) that the states x (m,) predict for a sample; then carry the states.
+
+    Gauss-Markov estimates decay between measurements; without it, they would be believed for ever.
+    """
+    for a in range(6):
+        total = 0.0
+        for i in range(first[a], first[a + 1]):
+            total += output[i] * x[i]
+        error[a] = total
+    if not paired:
+        for i in range(x.size):
+            x[i] *= phi[i]
+        return
+    for i in range(x.size):
+        held[i] = x[i]
+    for i in range(x.size):
+        x[i] = phi[i] * held[i]
+        if partner[i] != i:
+            x[i] += phi_off[i] * held[partner[i]]
+
+
+@numba.njit(cache=True, nogil=True)
+def axis_sums(
+    P: FloatArray, first: IntArray, output: FloatArray, mean: FloatArray, x: FloatArray,
+    covariance: FloatArray,
+) -> None:  # fmt: skip
+    """Estimated error of each sensor (6,) and its covariance (6, 6) from those of its states."""
+    for a in range(6):
+        mean[a] = 0.0
+        for i in range(first[a], first[a + 1]):
+            mean[a] += output[i] * x[i]
+        for b in range(6):
+            total = 0.0
+            for i in range(first[a], first[a + 1]):
+                for j in range(first[b], first[b + 1]):
+                    total += output[i] * output[j] * P[9 + i, 9 + j]
+            covariance[a, b] = total
+
+
+@numba.njit(cache=True, nogil=True)
+def run(
+    rotation: FloatArray, increment: FloatArray, dt: float, stride: int,
+    C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
+    first: IntArray, axis: IntArray, output: FloatArray, partner: IntArray,
+    phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
+    noise_off: FloatArray, cross: FloatArray, integral: FloatArray, coloured: IntArray,
+    event_epoch: IntArray, event_kind: IntArray, event_value: FloatArray, event_sd: FloatArray,
+    lever: FloatArray, second_order: bool, out_epoch: IntArray, out_before: IntArray,
+    out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
+    out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
+) -> int:  # fmt: skip
+    """Filter a record; returns the epoch at which it diverged, or -1.
+
+    Parameters
+    ----------
+    rotation, increment : (N, 3) ndarray
+        IMU increments, rad and m/s.
+    dt : float
+        s.
+    stride : int
+        Samples per step of the covariance.
+    C, v, lla, P, x : ndarray
+        Attitude, velocity, position, covariance (9 + m, 9 + m) and sensor states (m,) at the first
+        epoch; those at the last one after the call.
+    first : (7,) ndarray of int
+        Range of the states of each sensor.
+    axis, ..., integral : ndarray
+        As in `gmwm.ins.filter.states.SensorStates`.
+    coloured : (3,) ndarray of int
+        State of the coloured noise of the north, east and down position; -1 for none.
+    event_epoch, event_kind : (E,) ndarray of int
+        Measurements in order of time.
+    event_value, event_sd : (E, 3) ndarray
+    lever : (3,) ndarray
+    second_order : bool
+        Whether the square of the tilt error is allowed for; see
+        `gmwm.ins.filter.covariance_kernels.tilt_squared`.
+    out_epoch : (K,) ndarray of int
+        Epochs to be kept, in order of time.
+    out_before : (K,) ndarray of int
+        1 for the state before the measurements of the epoch, 0 for that after them; at one epoch
+        those before come first.
+    out_nav : (K, 6), out_C : (K, 3, 3), out_P : (K, 9, 9), out_sensor : (K, 6), \
+out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
+        Results; position and velocity, attitude, covariance, sums of sensor states and their
+        covariance; innovations of the components, each given those before it, with their standard
+        deviation.
+    """
+    n, m = P.shape[0], x.size
+    n_samples, n_events, n_out = rotation.shape[0], event_epoch.size, out_epoch.size
+    paired = False
+    for i in range(m):
+        paired = paired or partner[i] != i
+    F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
+    S, T, U = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6))
+    row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
+    estimated, held = np.zeros(n), np.zeros(m)
+    C_mid, v_mid, lla_mid, rate = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3)
+    ax = ay = az = fx = fy = fz = 0.0
+    epoch = event = out = steps = 0
+    gathered = 0.0
+    while True:
+        # What is asked for at this epoch: results before, measurements, results after.
+        while out < n_out and out_epoch[out] == epoch and out_before[out] == 1:
+            _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
+                  out_sensor_P)  # fmt: skip
+            out += 1
+        measured = of_gnss = False
+        if event < n_events and event_epoch[event] == epoch:
+            measured = True
+            if epoch > 0:
+                rate[0], rate[1], rate[2] = ax / dt, ay / dt, az / dt
+            elif n_samples > 0:
+                for i in range(3):
+                    rate[i] = rotation[0, i] / dt
+        while event < n_events and event_epoch[event] == epoch:
+            kind = event_kind[event]
+            of_gnss = of_gnss or kind in (IS_POSITION, IS_VELOCITY)
+            components = 1 if kind == IS_HEIGHT else 3
+            for component in range(components):
+                sd = event_sd[event, component]
+                if not sd > 0.0:
+                    continue
+                measurement_row(kind, component, C, v, rate, lever, h)
+                z = residual(kind, component, event_value[event], C, v, lla, rate, lever)
+                state = -1
+                if kind == IS_POSITION and coloured[component] >= 0:
+                    state = 9 + coloured[component]
+                    z += x[coloured[component]]
+                found, variance = take_in(P, h, state, sd * sd, z, estimated, K)
+                innovation[event, component] = found
+                innovation_sd[event, component] = math.sqrt(variance)
+            event += 1
+        if measured:
+            for i in range(m):
+                x[i] += estimated[9 + i]
+                estimated[9 + i] = 0.0
+            correct(C, v, lla, estimated)
+            if of_gnss:
+                gathered = 0.0
+        while out < n_out and out_epoch[out] == epoch:
+            _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
+                  out_sensor_P)  # fmt: skip
+            out += 1
+        if epoch >= n_samples:
+            return -1
+        # One step of the covariance, cut short at the next epoch that something is asked for.
+        stop = min(epoch + stride, n_samples)
+        if event < n_events:
+            stop = min(stop, event_epoch[event])
+        if out < n_out:
+            stop = min(stop, out_epoch[out])
+        samples = stop - epoch
+        for j in range(samples):
+            if j == samples // 2:
+                for a in range(3):
+                    v_mid[a], lla_mid[a] = v[a], lla[a]
+                    for b in range(3):
+                        C_mid[a, b] = C[a, b]
+            sample_error(first, output, phi[1], phi_off[1], partner, paired, x, held, error)
+            i = epoch + j
+            bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
+            ax, ay = rotation[i, 0] - error[0] * dt, rotation[i, 1] - error[1] * dt
+            az, fx = rotation[i, 2] - error[2] * dt, increment[i, 0] - error[3] * dt
+            fy, fz = increment[i, 1] - error[4] * dt, increment[i, 2] - error[5] * dt
+            if i == 0:
+                bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
+            step(C, v, lla, ax, ay, az, fx, fy, fz, bx, by, bz, gx, gy, gz, dt)
+            if 2 * j + 1 == samples:
+                # The middle of the step lies within this sample.
+                for a in range(3):
+                    v_mid[a], lla_mid[a] = 0.5 * (v_mid[a] + v[a]), 0.5 * (lla_mid[a] + lla[a])
+                    for b in range(3):
+                        C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
+        epoch = stop
+        transition(v_mid, lla_mid, C_mid, samples * dt, F, A, B)
+        carry(P, A, B, axis, partner, phi[samples], phi_off[samples], gain[samples],
+              noise[samples], noise_off[samples], cross[samples], integral[samples],
+              S, T, U, row)  # fmt: skip
+        if second_order:
+            mean, gathered = tilt_squared(P, gravity(lla[0], lla[2]), samples * dt, gathered)
+            v[2] -= mean
+        steps += 1
+        if steps % _CLEAN_EVERY == 0:
+            orthonormalise(C)
+        if not (
+            P[0, 0] + P[1, 1] + P[2, 2] < _LARGEST_POSITION_VARIANCE
+            and abs(lla[0]) < 1.5533
+            and abs(lla[2]) < 1e7
+        ):
+            return epoch
+
+
+@numba.njit(cache=True, nogil=True)
+def _keep(
+    k: int, C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
+    first: IntArray, output: FloatArray, out_nav: FloatArray, out_C: FloatArray,
+    out_P: FloatArray, out_sensor: FloatArray, out_sensor_P: FloatArray,
+) -> None:  # fmt: skip
+    for i in range(3):
+        out_nav[k, i], out_nav[k, 3 + i] = lla[i], v[i]
+        for j in range(3):
+            out_C[k, i, j] = C[i, j]
+    for i in range(9):
+        for j in range(9):
+            out_P[k, i, j] = P[i, j]
+    axis_sums(P, first, output, out_sensor[k], x, out_sensor_P[k])

@@ -1,0 +1,223 @@
+"""Sensor states of a navigation filter: what carries the coloured errors of six axes.
+
+Every term of a model is a block of one or two states. Over k samples a block is carried exactly:
+its transition, its noise, the angle or velocity that it adds to the integrals of the sensor, and
+the covariance of that with the states. So a correlation time may be shorter than the step of the
+covariance, as that of an analogue filter in front of the sampler is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.imu import AXES, SensorModels
+from gmwm.process import StateSpace
+
+IntArray = npt.NDArray[np.int64]
+
+_LARGEST_BLOCK = 2
+NO_AXIS = -1
+"""Axis of a state that adds to no inertial sensor."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorStates:
+    """m states of the six sensors, and what k samples do to them, for k = 0..k_max.
+
+    Attributes
+    ----------
+    names : tuple of str
+        E.g. ``"gyro_x: Gauss-Markov"``.
+    axis : (m,) ndarray of int
+        Sensor of `AXES` that each state adds to; `NO_AXIS` for none.
+    output : (m,) ndarray
+        Share of the state in the error of its sensor.
+    partner : (m,) ndarray of int
+        The other state of its block; itself if there is none.
+    mean : (m,) ndarray
+        Before the first sample.
+    covariance : (m, m) ndarray
+    phi, phi_off : (k_max + 1, m) ndarray
+        ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
+    gain : (k_max + 1, m) ndarray
+        Integral of the sensor's error over k samples per unit of the state, s.
+    noise, noise_off : (k_max + 1, m) ndarray
+        Variance of the noise gathered over k samples, and its covariance with the partner.
+    cross : (k_max + 1, m) ndarray
+        Covariance of that noise with the noise in the integral of the sensor's error.
+    integral : (k_max + 1, 6) ndarray
+        Variance of the noise in the integral of each sensor's error, white noise included.
+    """
+
+    names: tuple[str, ...]
+    axis: IntArray
+    output: FloatArray
+    partner: IntArray
+    mean: FloatArray
+    covariance: FloatArray
+    phi: FloatArray
+    phi_off: FloatArray
+    gain: FloatArray
+    noise: FloatArray
+    noise_off: FloatArray
+    cross: FloatArray
+    integral: FloatArray
+
+    @property
+    def m(self) -> int:
+        """Number of states."""
+        return len(self.names)
+
+    @classmethod
+    def of(cls, sensors: SensorModels, dt: float, k_max: int) -> SensorStates:
+        """States of six models at a sampling interval of ``dt`` (s).
+
+        Raises
+        ------
+        InputError
+            If a term has no state-space form, or one of more than two states.
+        """
+        blocks: list[_Block] = []
+        white = np.zeros(6)
+        for i, axis in enumerate(AXES):
+            blocks += _of_axis(i, axis, sensors, dt, white)
+        return _assembled(blocks, white, dt, k_max)
+
+    def with_markov(
+        self, names: Sequence[str], sigma: FloatArray, tau: float, dt: float
+    ) -> SensorStates:
+        """These states, and some first-order Gauss-Markov ones that add to no inertial sensor.
+
+        Parameters
+        ----------
+        names : sequence of str
+        sigma : ndarray
+            Standard deviation of each.
+        tau, dt : float
+            Correlation time and sampling interval, s.
+        """
+        k = np.arange(len(self.phi))[:, None]
+        extra, zeros = len(names), np.zeros((len(self.phi), len(names)))
+        decay = np.exp(-k * dt / tau) + zeros
+        return SensorStates(
+            names=(*self.names, *names),
+            axis=np.append(self.axis, np.full(extra, NO_AXIS)),
+            output=np.append(self.output, np.zeros(extra)),
+            partner=np.append(self.partner, self.m + np.arange(extra)),
+            mean=np.append(self.mean, np.zeros(extra)),
+            covariance=_padded(self.covariance, np.diag(np.asarray(sigma, dtype=float) ** 2)),
+            phi=np.hstack([self.phi, decay]),
+            phi_off=np.hstack([self.phi_off, zeros]),
+            gain=np.hstack([self.gain, zeros]),
+            noise=np.hstack([self.noise, np.asarray(sigma) ** 2 * (1.0 - decay**2)]),
+            noise_off=np.hstack([self.noise_off, zeros]),
+            cross=np.hstack([self.cross, zeros]),
+            integral=self.integral,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """A term of a model: one or two states of one sensor."""
+
+    axis: int
+    names: tuple[str, ...]
+    form: StateSpace
+
+
+def _of_axis(
+    index: int, axis: str, sensors: SensorModels, dt: float, white: FloatArray
+) -> list[_Block]:
+    """Blocks of one sensor; adds its white noise (variance of a sample) to ``white``."""
+    blocks = []
+    bias = sensors.bias_sd[axis] ** 2
+    for term in sensors.models[axis].terms:
+        form = term.state_space(dt)
+        white[index] += form.measurement_noise
+        if form.n_states > _LARGEST_BLOCK:
+            raise InputError(
+                f"{axis}: {term!r} needs {form.n_states} states in a filter, more than two: "
+                "approximate it by Gauss-Markov processes"
+            )
+        if form.n_states == 0:
+            continue
+        if term.is_walk and bias > 0.0:
+            # A constant and a random walk are one state: the walk starts where the constant is.
+            form = StateSpace.scalar(form.names[0], 1.0, float(form.process_noise[0, 0]), bias)
+            bias = 0.0
+        blocks.append(_Block(index, tuple(f"{axis}: {name}" for name in form.names), form))
+    if bias > 0.0:
+        blocks.append(_Block(index, (f"{axis}: bias",), StateSpace.scalar("bias", 1.0, 0.0, bias)))
+    return blocks
+
+
+def _assembled(blocks: Sequence[_Block], white: FloatArray, dt: float, k_max: int) -> SensorStates:
+    m = sum(block.form.n_states for block in blocks)
+    shape = (k_max + 1, m)
+    phi, phi_off, gain, noise, noise_off, cross = (np.zeros(shape) for _ in range(6))
+    axis, partner = np.zeros(m, dtype=np.int64), np.arange(m)
+    output, mean, covariance = np.zeros(m), np.zeros(m), np.zeros((m, m))
+    integral = np.arange(k_max + 1)[:, None] * (white * dt**2)
+    first = 0
+    for block in blocks:
+        size = block.form.n_states
+        part = slice(first, first + size)
+        axis[part] = block.axis
+        partner[part] = first + np.arange(size)[::-1]
+        output[part], mean[part] = block.form.output, block.form.initial_mean
+        covariance[part, part] = block.form.initial_covariance
+        for k, (transition, added) in enumerate(_carried(block.form, dt, k_max)):
+            phi[k, part] = np.diag(transition)[:size]
+            gain[k, part] = transition[size, :size]
+            noise[k, part] = np.diag(added)[:size]
+            cross[k, part] = added[size, :size]
+            integral[k, block.axis] += added[size, size]
+            if size == _LARGEST_BLOCK:
+                phi_off[k, part] = transition[0, 1], transition[1, 0]
+                noise_off[k, part] = added[0, 1]
+        first += size
+    return SensorStates(
+        names=tuple(name for block in blocks for name in block.names),
+        axis=axis,
+        output=output,
+        partner=partner,
+        mean=mean,
+        covariance=covariance,
+        phi=phi,
+        phi_off=phi_off,
+        gain=gain,
+        noise=noise,
+        noise_off=noise_off,
+        cross=cross,
+        integral=integral,
+    )
+
+
+def _carried(form: StateSpace, dt: float, k_max: int) -> list[tuple[FloatArray, FloatArray]]:
+    """Transition and noise of the states and of the integral of their output, after k samples."""
+    size = form.n_states
+    one = np.eye(size + 1)
+    one[:size, :size] = form.transition
+    one[size, :size] = form.output * dt
+    added = np.zeros_like(one)
+    added[:size, :size] = form.process_noise
+    transition, noise = np.eye(size + 1), np.zeros_like(one)
+    result = [(transition, noise)]
+    for _ in range(k_max):
+        transition = one @ transition
+        noise = one @ noise @ one.T + added
+        result.append((transition, noise))
+    return result
+
+
+def _padded(first: FloatArray, second: FloatArray) -> FloatArray:
+    total = np.zeros((len(first) + len(second),) * 2)
+    total[: len(first), : len(first)] = first
+    total[len(first) :, len(first) :] = second
+    return total

@@ -1,0 +1,153 @@
+"""Error models of the six inertial sensors, as a navigation filter and a simulation take them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.process import Model, Process, as_model
+
+AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+"""The sensors, in the order of all arrays."""
+
+_KINDS = ("gyro", "accel")
+
+
+@dataclass(frozen=True)
+class SensorModels:
+    """One error model an axis, and how well constant biases are known before.
+
+    Attributes
+    ----------
+    models : dict
+        Axis of `AXES` -> model with given parameters, rad/s and m/s^2.
+    bias_sd : dict
+        Axis -> standard deviation of a constant bias, in the axis' unit; zero for none.
+    """
+
+    models: dict[str, Model]
+    bias_sd: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
+
+    @classmethod
+    def of(
+        cls,
+        source: SensorModels | Calibration | Mapping[str, Any],
+        bias_sd: Mapping[str, float] | None = None,
+    ) -> SensorModels:
+        """Models of all six axes from what there is.
+
+        Parameters
+        ----------
+        source : SensorModels, Calibration or mapping
+            A mapping has models by axis (``"gyro_x"``) or by kind (``"gyro"`` and ``"accel"``, the
+            same for its three axes); an axis goes before its kind.
+        bias_sd : mapping of str to float, optional
+            By axis or kind, in rad/s and m/s^2.
+
+        Raises
+        ------
+        InputError
+            If an axis has no model, a parameter is open, or a name is unknown.
+        """
+        if isinstance(source, SensorModels):
+            return source if bias_sd is None else cls(source.models, _by_axis(bias_sd, "bias_sd"))
+        if isinstance(source, Calibration):
+            given: Mapping[str, Any] = {name: fit.model for name, fit in source.fits.items()}
+            given = {name: model for name, model in given.items() if name in AXES}
+        elif isinstance(source, Mapping):
+            given = source
+        else:
+            raise InputError(
+                f"sensor models: {checks.shown(source)}: give a calibration, or models as in "
+                '{"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)}'
+            )
+        models = {axis: _model(axis, each) for axis, each in _spread(given, "models").items()}
+        missing = [axis for axis in AXES if axis not in models]
+        if missing:
+            raise InputError(f"sensor models: {missing[0]} has none: give one to each axis")
+        ordered = {axis: models[axis] for axis in AXES}
+        return cls(ordered, _by_axis(bias_sd or {}, "bias_sd"))
+
+    def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
+        """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.
+
+        Parameters
+        ----------
+        n : int
+        dt : float
+            Sampling interval, s.
+        rng : numpy.random.Generator
+        """
+        total, slow = np.empty((n, 6)), np.zeros((n, 6))
+        for i, axis in enumerate(AXES):
+            for term in self.models[axis].terms:
+                if not term.is_white:
+                    slow[:, i] += term.simulate(n, dt, rng)
+            if self.bias_sd[axis] > 0.0:
+                slow[:, i] += self.bias_sd[axis] * rng.standard_normal()
+            total[:, i] = slow[:, i]
+            density = self.models[axis].white_density()
+            if density > 0.0:
+                total[:, i] += np.sqrt(density / dt) * rng.standard_normal(n)
+        return SensorErrors(total, slow)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorErrors:
+    """Errors of the six sensors along a record.
+
+    Attributes
+    ----------
+    total : (n, 6) ndarray
+        What is measured less what is true, rad/s and m/s^2, mean over each interval.
+    slow : (n, 6) ndarray or None
+        The part that a filter can estimate: all but the white noise; ``None`` where it is not
+        known, as of a real recording.
+    """
+
+    total: FloatArray
+    slow: FloatArray | None = None
+
+
+def _spread(given: Mapping[str, Any], what: str) -> dict[str, Any]:
+    """Values by axis, from values by axis or kind."""
+    for name in given:
+        if name not in AXES and name not in _KINDS:
+            raise InputError(
+                f"{what}: {checks.shown(name)} is no sensor: there are gyro and accel, or "
+                f"{', '.join(AXES)}"
+            )
+    kinds = {axis: axis.partition("_")[0] for axis in AXES}
+    return {
+        axis: given.get(axis, given.get(kind))
+        for axis, kind in kinds.items()
+        if axis in given or kind in given
+    }
+
+
+def _model(axis: str, given: Any) -> Model:
+    if not isinstance(given, (Process, Model)):
+        raise InputError(f"sensor models: {axis} is {checks.shown(given)}: give a process or model")
+    model = as_model(given)
+    missing = [key for key, value in model.params.items() if value is None]
+    if missing:
+        raise InputError(
+            f"sensor models: {axis} has open parameters ({', '.join(missing)}): give them a value, "
+            "or estimate them with gmwm.fit"
+        )
+    return model
+
+
+def _by_axis(given: Mapping[str, float], what: str) -> dict[str, float]:
+    values = dict.fromkeys(AXES, 0.0)
+    for axis, value in _spread(given, what).items():
+        if value != 0.0:
+            values[axis] = checks.positive(f"{what} of {axis}", value)
+    return values

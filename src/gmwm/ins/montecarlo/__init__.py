@@ -1,0 +1,20 @@
+"""Many runs of several filters on the same errors, and what they say."""
+
+from gmwm.ins.montecarlo.consistency import Consistency, InnovationTest, Ratio, chi_square_ratio
+from gmwm.ins.montecarlo.experiment import Experiment
+from gmwm.ins.montecarlo.outage_errors import QUANTITIES
+from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
+from gmwm.ins.montecarlo.validation import Validation
+
+__all__ = [
+    "QUANTITIES",
+    "Consistency",
+    "ErrorSource",
+    "Experiment",
+    "InnovationTest",
+    "Ratio",
+    "Scenario",
+    "Simulated",
+    "Validation",
+    "chi_square_ratio",
+]

@@ -1,0 +1,287 @@
+"""Does a filter know how good it is? NEES, coverage, innovations, and a proper score.
+
+After Bar-Shalom, Li & Kirubarajan (2001), *Estimation with Applications to Tracking and
+Navigation*, sec. 5.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import betaincinv
+from scipy.stats import chi2, norm, t
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.montecarlo.runs import GROUPS, Runs
+
+LEVELS = (0.5, 0.68, 0.95, 0.997)
+"""Levels at which coverage is counted."""
+
+_CONFIDENCE = 0.95
+_FAR = 0.001  # probability below which a filter is called inconsistent
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A statistic that is 1 for a consistent filter.
+
+    Attributes
+    ----------
+    value : float
+    lower, upper : float
+        Band of 95 % in which it lies if the filter is consistent.
+    p_value : float
+        Two-sided probability of a value as far from 1, if it is.
+    """
+
+    value: float
+    lower: float
+    upper: float
+    p_value: float
+
+    @property
+    def within(self) -> bool:
+        """Whether it lies in its band."""
+        return bool(self.lower <= self.value <= self.upper)
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How many errors lay within the predicted interval of a level.
+
+    Attributes
+    ----------
+    level : float
+    share : float
+    lower, upper : float
+        Interval of 95 % of the share: binomial at one epoch (Clopper & Pearson 1934, *Biometrika*
+        26, 404-413), and over a time with as many draws as the scatter between the runs is worth
+        (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
+    """
+
+    level: float
+    share: float
+    lower: float
+    upper: float
+
+    @property
+    def within(self) -> bool:
+        """Whether the interval holds the level."""
+        return bool(self.lower <= self.level <= self.upper)
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How a filter's own covariance agrees with its true errors.
+
+    Attributes
+    ----------
+    nees : dict
+        Group of `gmwm.ins.montecarlo.runs.GROUPS`, or "sensors", -> NEES per degree of freedom.
+    coverage : dict
+        Group -> `Coverage` at each of `LEVELS`, of its components' errors.
+    rms : dict
+        Group -> root mean square of the errors in their predicted standard deviations.
+    score : dict
+        Group -> mean of the negative logarithm of the predicted density at the truth; less is
+        better, and to predict too much or too little costs alike (Gneiting & Raftery 2007, *JASA*
+        102, 359-378).
+    """
+
+    nees: dict[str, Ratio]
+    coverage: dict[str, tuple[Coverage, ...]]
+    rms: dict[str, float]
+    score: dict[str, float]
+
+    @property
+    def consistent(self) -> bool:
+        """Whether no group's NEES is out of question."""
+        return all(ratio.p_value > _FAR / len(self.nees) for ratio in self.nees.values())
+
+
+def at_epoch(runs: Runs, index: int) -> Consistency:
+    """Consistency at one epoch, over independent runs: chi-square bands.
+
+    Parameters
+    ----------
+    runs : Runs
+    index : int
+        Of the epoch; see `Runs.index`.
+    """
+    alive = np.isfinite(runs.error[:, index, 0])
+    nees, coverage, rms, score = {}, {}, {}, {}
+    for i, (name, part) in enumerate(GROUPS.items()):
+        size = part.stop - part.start
+        squares = runs.nees[alive, index, i]
+        nees[name] = chi_square_ratio(squares, size)
+        standard = runs.error[alive, index, part] / runs.sd[alive, index, part]
+        coverage[name] = covered(standard)
+        rms[name] = _rms(standard)
+        score[name] = _score(squares, runs.log_det[alive, index, i], size)
+    if np.any(np.isfinite(runs.sensor_nees[alive, index])):
+        size = int(np.sum(np.all(runs.sensor_sd[alive, index] > 0.0, axis=0)))
+        nees["sensors"] = chi_square_ratio(runs.sensor_nees[alive, index], size)
+        standard = _standard_sensors(runs, alive, slice(index, index + 1))[:, 0]
+        coverage["sensors"], rms["sensors"] = covered(standard), _rms(standard)
+    return Consistency(nees, coverage, rms, score)
+
+
+def over_time(runs: Runs, start: float = 0.0, end: float = np.inf) -> Consistency:
+    """Consistency over a time, averaged run by run: bands from the scatter between the runs.
+
+    The errors of one run are correlated, so that a run counts as one draw; Student's t.
+
+    Parameters
+    ----------
+    runs : Runs
+    start, end : float, optional
+        s.
+
+    Raises
+    ------
+    InputError
+        If no errors were kept in that time.
+    """
+    epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
+    if not epochs.size:
+        raise InputError(
+            f"no errors were kept from {start:g} s to {end:g} s: give a longer time, within "
+            f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
+        )
+    alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
+    nees, coverage, rms, score = {}, {}, {}, {}
+    for i, (name, part) in enumerate(GROUPS.items()):
+        size = part.stop - part.start
+        squares = runs.nees[alive][:, epochs, i]
+        nees[name] = mean_ratio(np.mean(squares, axis=1) / size)
+        standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
+        coverage[name] = _covered_by_run(standard)
+        rms[name] = _rms(standard)
+        score[name] = _score(squares, runs.log_det[alive][:, epochs, i], size)
+    settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
+    if np.any(alive) and settled.size:
+        size = int(np.sum(np.all(runs.sensor_sd[alive][:, settled] > 0.0, axis=(0, 1))))
+        nees["sensors"] = mean_ratio(np.mean(runs.sensor_nees[alive][:, settled], axis=1) / size)
+        standard = _standard_sensors(runs, alive, settled)
+        coverage["sensors"], rms["sensors"] = _covered_by_run(standard), _rms(standard)
+    return Consistency(nees, coverage, rms, score)
+
+
+@dataclass(frozen=True)
+class InnovationTest:
+    """What a filter can be asked where no truth is known.
+
+    Attributes
+    ----------
+    nis : Ratio
+        Normalised innovation squared per degree of freedom.
+    whiteness : float
+        p-value of no correlation from one fix to the next.
+    """
+
+    nis: Ratio
+    whiteness: float
+
+
+def innovation_test(runs: Runs) -> InnovationTest:
+    """Innovations of all runs: their size and their whiteness."""
+    total, count = np.nansum(runs.nis, axis=0)
+    scores = runs.whiteness[np.isfinite(runs.whiteness)]
+    p_value = float("nan")
+    if scores.size:
+        p_value = float(2.0 * norm.sf(abs(np.sum(scores)) / np.sqrt(scores.size)))
+    return InnovationTest(_ratio(total, count), p_value)
+
+
+def chi_square_ratio(squares: FloatArray, size: int) -> Ratio:
+    """Mean of independent normalised errors squared of ``size`` degrees of freedom each."""
+    return _ratio(float(np.sum(squares)), float(size * squares.size))
+
+
+def mean_ratio(values: FloatArray) -> Ratio:
+    """Mean of independent values whose expectation is 1, of a distribution that is not known."""
+    runs = values.size
+    mean = float(np.mean(values)) if runs else float("nan")
+    if runs < 2:
+        return Ratio(mean, float("nan"), float("nan"), float("nan"))
+    error = float(np.std(values, ddof=1) / np.sqrt(runs))
+    width = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1)) * error
+    p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
+    return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
+
+
+def covered(standard: FloatArray) -> tuple[Coverage, ...]:
+    """Coverage of standardised errors (R, d).
+
+    The components of a run are correlated, so that a run counts as one draw.
+    """
+    size = standard.shape[0]
+    shares = _shares(standard[:, None])
+    return tuple(
+        _coverage(level, share, size) for level, share in zip(LEVELS, _means(shares), strict=True)
+    )
+
+
+def _shares(standard: FloatArray) -> FloatArray:
+    """Share of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
+    bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
+    return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds], axis=1)
+
+
+def _means(shares: FloatArray) -> list[float]:
+    return (
+        [float(each) for each in np.mean(shares, axis=0)] if len(shares) else [np.nan] * len(LEVELS)
+    )
+
+
+def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
+    """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
+    runs, shares = len(standard), _shares(standard)
+    result = []
+    for level, mean, each in zip(LEVELS, _means(shares), shares.T, strict=True):
+        draws = float(runs)
+        error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
+        if error > 0.0:
+            few, many = t.ppf(0.5 + 0.5 * _CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
+            draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
+        result.append(_coverage(level, mean, draws))
+    return tuple(result)
+
+
+def _coverage(level: float, share: float, size: float) -> Coverage:
+    """With its binomial interval."""
+    if not size > 0.0:
+        return Coverage(level, float("nan"), float("nan"), float("nan"))
+    hits, tail = share * size, 0.5 * (1.0 - _CONFIDENCE)
+    lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
+    upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
+    return Coverage(level, share, lower, upper)
+
+
+def _ratio(total: float, dof: float) -> Ratio:
+    if not dof > 0.0 or not np.isfinite(total):
+        return Ratio(float("nan"), float("nan"), float("nan"), float("nan"))
+    lower, upper = chi2.ppf([0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE], dof) / dof
+    p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
+    return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
+
+
+def _standard_sensors(
+    runs: Runs, alive: np.typing.NDArray[np.bool_], epochs: slice | np.typing.NDArray[np.intp]
+) -> FloatArray:
+    """Standardised errors of the sensors that have states, (R, K, d)."""
+    error, sd = runs.sensor_error[alive][:, epochs], runs.sensor_sd[alive][:, epochs]
+    known = np.all(sd > 0.0, axis=(0, 1))
+    return np.asarray(error[..., known] / sd[..., known])
+
+
+def _rms(standard: FloatArray) -> float:
+    return float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")
+
+
+def _score(squares: FloatArray, log_det: FloatArray, size: int) -> float:
+    if not squares.size:
+        return float("nan")
+    return float(0.5 * np.mean(squares + log_det + size * np.log(2.0 * np.pi)))

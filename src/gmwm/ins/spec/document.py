@@ -1,0 +1,115 @@
+"""YAML documents that people write: read strictly, so that no line is passed over in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gmwm._core import checks
+from gmwm.errors import InputError
+from gmwm.ins.spec.model_text import value
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Content of a YAML file; keys without a value are left out.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is no YAML, is no mapping, or has a key twice.
+    """
+    import yaml
+
+    try:
+        content = _load(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is no YAML ({_reason(error)}): mend it") from None
+    if content is None:
+        raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
+    if not isinstance(content, Mapping):
+        raise InputError(f"{path}: {checks.shown(content)} is no mapping: write KEY: VALUE lines")
+    return given(content)
+
+
+def given(content: Mapping[Any, Any]) -> dict[str, Any]:
+    """A mapping without the keys that have no value."""
+    return {name: each for name, each in content.items() if each is not None}
+
+
+def mapping(where: str, content: Any, names: Sequence[str]) -> dict[str, Any]:
+    """A mapping of known keys.
+
+    Raises
+    ------
+    InputError
+        If it is none, or has another key.
+    """
+    if not isinstance(content, Mapping):
+        raise InputError(
+            f"{where}: {checks.shown(content)}: write KEY: VALUE; keys are {', '.join(names)}"
+        )
+    for name in content:
+        if name not in names:
+            raise InputError(f"{where}: {checks.shown(name)} is unknown: there are "
+                             f"{', '.join(names)}")  # fmt: skip
+    return given(content)
+
+
+def three(content: Any, si_unit: str, where: str) -> list[float]:
+    """Three numbers in SI units, from three or from one for all.
+
+    Raises
+    ------
+    InputError
+        If they are not.
+    """
+    if isinstance(content, Sequence) and not isinstance(content, str):
+        if len(content) != 3:
+            raise InputError(f"{where}: {checks.shown(content)}: give three numbers")
+        return [value(each, si_unit, where) for each in content]
+    return [value(content, si_unit, where)] * 3
+
+
+def positive(content: Any, si_unit: str, where: str) -> float:
+    """A number above zero in SI units.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    return checks.positive(where, value(content, si_unit, where))
+
+
+def _load(text: str) -> Any:
+    import yaml
+
+    class Strict(yaml.SafeLoader):  # type: ignore[misc,unused-ignore]
+        """YAML lets a later key replace an earlier one; two filters of one name are a slip."""
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            seen: set[str] = set()
+            for key, _ in node.value:
+                name = str(key.value)
+                if key.tag != "tag:yaml.org,2002:merge" and name in seen:
+                    raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
+                seen.add(name)
+            return super().construct_mapping(node, deep)
+
+    return yaml.load(text, Loader=Strict)
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong, and in which line, without the parser's own picture of it."""
+    mark = getattr(error, "problem_mark", None)
+    problem = getattr(error, "problem", None)
+    if mark is None or problem is None:
+        return checks.shown(" ".join(str(error).split())).strip("'\"")
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"

@@ -1,0 +1,410 @@
+"""Manoeuvres, and the trajectories that a list of them gives.
+
+Speed is horizontal speed over ground. Heading is counted from north to the east. Every change
+begins and ends with a ramp of its rate that is smooth in its second derivative, so angular rates
+and specific forces are continuous.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numba
+import numpy as np
+
+from gmwm._core.checks import is_number, positive, sampling_interval, shown
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.geometry import RATE, gravity_at, radii
+from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
+
+Lla = Sequence[float] | FloatArray
+"""Latitude, longitude, rad, and height, m."""
+
+_LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a manoeuvre does, its duration included; ``None`` where nothing changes.
+
+    Attributes
+    ----------
+    duration : float
+        s.
+    speed, heading, height : Pulse or None
+        Changes that begin with the manoeuvre: m/s, rad, m.
+    """
+
+    duration: float
+    speed: Pulse | None = None
+    heading: Pulse | None = None
+    height: Pulse | None = None
+
+
+class Manoeuvre(Protocol):
+    """Something a vehicle does for a while."""
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """Lay it out for a vehicle that comes with some speed, m/s; ramps take ``ramp`` s."""
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Go on with the same speed, heading and height for some time, s."""
+
+    duration: float
+
+    def __post_init__(self) -> None:
+        positive("duration", self.duration)
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """Nothing changes."""
+        return Plan(self.duration)
+
+
+@dataclass(frozen=True)
+class Accelerate:
+    """Come to another speed, m/s, with at most an acceleration, m/s^2."""
+
+    to_speed: float
+    acceleration: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not is_number(self.to_speed) or self.to_speed < 0.0:
+            raise InputError(f"to_speed = {shown(self.to_speed)}: give a speed, zero or more")
+        positive("acceleration", self.acceleration)
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """The speed changes."""
+        pulse = Pulse(self.to_speed - speed, self.acceleration, ramp)
+        return Plan(pulse.duration, speed=pulse)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Brake with at most a deceleration, m/s^2, and stand still for some time, s."""
+
+    duration: float
+    deceleration: float = 1.5
+
+    def __post_init__(self) -> None:
+        positive("duration", self.duration)
+        positive("deceleration", self.deceleration)
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """The speed goes to zero and stays there."""
+        pulse = Pulse(-speed, self.deceleration, ramp)
+        return Plan(pulse.duration + self.duration, speed=pulse)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Change the heading by an angle, rad, positive to the right, with at most a rate, rad/s."""
+
+    angle: float
+    rate: float
+
+    def __post_init__(self) -> None:
+        if not is_number(self.angle):
+            raise InputError(f"angle = {shown(self.angle)}: give a number in rad")
+        positive("rate", self.rate)
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """The heading changes."""
+        pulse = Pulse(self.angle, self.rate, ramp)
+        return Plan(pulse.duration, heading=pulse)
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Change the height by some metres, negative to descend, with at most a rate, m/s."""
+
+    height_change: float
+    rate: float
+
+    def __post_init__(self) -> None:
+        if not is_number(self.height_change):
+            raise InputError(f"height_change = {shown(self.height_change)}: give a number in m")
+        positive("rate", self.rate)
+
+    def plan(self, speed: float, ramp: float) -> Plan:
+        """The height changes."""
+        pulse = Pulse(self.height_change, self.rate, ramp)
+        return Plan(pulse.duration, height=pulse)
+
+
+def perform(
+    manoeuvres: Iterable[Manoeuvre],
+    *,
+    start: Lla,
+    heading: float = 0.0,
+    speed: float = 0.0,
+    dt: float = 0.01,
+    ramp: float = 2.0,
+    flat: bool = False,
+    level: bool = False,
+    duration: float | None = None,
+) -> Trajectory:
+    """The trajectory of a vehicle that does one manoeuvre after the other.
+
+    Parameters
+    ----------
+    manoeuvres : iterable of Straight, Accelerate, Stop, Turn or Climb
+        May go on forever if a duration is given.
+    start : (3,) sequence
+        Latitude, longitude, rad, and height, m.
+    heading, speed : float, optional
+        At the start: rad, m/s.
+    dt : float, optional
+        Sampling interval, s.
+    ramp : float, optional
+        Time in which a rate or an acceleration comes up, s.
+    flat : bool, optional
+        False: turns are banked so that the specific force stays in the body's plane of symmetry.
+        True: roll is zero, as of a car.
+    level : bool, optional
+        False: the body points where it goes, up and down slopes. True: pitch is zero, as of a
+        helicopter that climbs vertically.
+    duration : float, optional
+        Length of the trajectory, s; manoeuvres are cut there, or followed by more of what comes
+        last. By default, as long as they take.
+
+    Returns
+    -------
+    Trajectory
+        The yaw runs on past 180 deg.
+
+    Raises
+    ------
+    InputError
+        If nothing is to be done, a body that is not level climbs at no speed, or the way leads to
+        a pole.
+    """
+    dt, ramp = sampling_interval(dt), positive("ramp", ramp)
+    origin = _origin(start)
+    limit = dt * _LONGEST if duration is None else positive("duration", duration)
+    plans = _plans(manoeuvres, speed, ramp, min(limit, dt * _LONGEST))
+    n = math.floor(
+        (sum(plan.duration for plan in plans) if duration is None else limit) / dt + 1e-6
+    )
+    if not 1 <= n <= _LONGEST:
+        raise InputError(
+            f"a trajectory of {n:,} steps of {dt:g} s: let it have one to {_LONGEST:,} steps"
+        )
+    course = _course(plans, 0.5 * dt * np.arange(2 * n + 1, dtype=float), speed, heading)
+    lla = np.empty((n + 1, 3))
+    _walk(course.speed, course.heading, course.climb, dt, origin, lla)
+    check_latitudes(lla, "manoeuvres")
+    rpy = _attitude(course, lla, flat=flat, level=level)
+    return Trajectory.from_arrays(dt, lla, rpy)
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Speed, heading and rate of climb, and their derivatives, at epochs and half-way."""
+
+    speed: FloatArray
+    acceleration: FloatArray
+    heading: FloatArray
+    turn_rate: FloatArray
+    climb: FloatArray
+    climb_rate: FloatArray
+
+
+def _origin(start: Lla) -> FloatArray:
+    origin = finite_numbers(start, "start")
+    if origin.shape != (3,):
+        raise InputError(f"start = {shown(start)}: give latitude, longitude in rad, height in m")
+    check_latitudes(origin[None, :], "start")
+    return origin
+
+
+def _plans(manoeuvres: Iterable[Manoeuvre], speed: float, ramp: float, limit: float) -> list[Plan]:
+    """What is done until some time, s, or until nothing more is to be done."""
+    if not is_number(speed) or speed < 0.0:
+        raise InputError(f"speed = {shown(speed)}: give a speed, zero or more")
+    plans: list[Plan] = []
+    elapsed = 0.0
+    for manoeuvre in manoeuvres:
+        plan = manoeuvre.plan(speed, ramp)
+        plans.append(plan)
+        elapsed += plan.duration
+        if plan.speed is not None:
+            speed = max(speed + plan.speed.change, 0.0)
+        if elapsed > limit:
+            break
+    return plans
+
+
+def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: float) -> _Course:
+    if not is_number(heading):
+        raise InputError(f"heading = {shown(heading)}: give a number in rad")
+    course = _Course(*(np.zeros(time.size) for _ in range(6)))
+    course.speed[:] = speed
+    course.heading[:] = heading
+    begin = 0.0
+    for plan in plans:
+        first = int(np.searchsorted(time, begin))
+        since = time[first:] - begin
+        if plan.speed is not None:
+            course.speed[first:] += plan.speed.value(since)
+            course.acceleration[first:] += plan.speed.slope(since)
+        if plan.heading is not None:
+            course.heading[first:] += plan.heading.value(since)
+            course.turn_rate[first:] += plan.heading.slope(since)
+        if plan.height is not None:
+            course.climb[first:] += plan.height.slope(since)
+            course.climb_rate[first:] += plan.height.curvature(since)
+        begin += plan.duration
+    # Sums of changes leave rounding errors where a vehicle should stand still.
+    course.speed[course.speed < 1e-12] = 0.0
+    return course
+
+
+def _attitude(course: _Course, lla: FloatArray, *, flat: bool, level: bool) -> FloatArray:
+    """Roll, pitch and yaw at the epochs."""
+    speed, heading, climb = course.speed[::2], course.heading[::2], course.climb[::2]
+    pitch = np.zeros(speed.size)
+    if not level:
+        if np.any((np.abs(climb) > 0.0) & ~(speed > 0.0)):
+            raise InputError(
+                "manoeuvres climb at no speed: accelerate first, or give level=True for a body "
+                "that stays level"
+            )
+        pitch = np.arctan2(climb, speed)
+    roll = np.zeros(speed.size)
+    if not flat:
+        forward, right, down = _specific_force(course, lla)
+        roll = np.arctan2(right, -(forward * np.sin(pitch) + down * np.cos(pitch)))
+    return np.stack([roll, pitch, heading], axis=-1)
+
+
+def _specific_force(course: _Course, lla: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Forward, to the right and down, in a level frame with the body's heading, m/s^2.
+
+    With the Coriolis acceleration of the Earth's rotation, not with that of the curved way, which
+    is 1e-5 of gravity at 30 m/s.
+    """
+    speed, heading, climb = course.speed[::2], course.heading[::2], course.climb[::2]
+    ahead, across = np.cos(lla[:, 0]) * np.cos(heading), -np.cos(lla[:, 0]) * np.sin(heading)
+    below = -np.sin(lla[:, 0])
+    forward = course.acceleration[::2] - 2.0 * RATE * across * climb
+    right = speed * course.turn_rate[::2] + 2.0 * RATE * (below * speed + ahead * climb)
+    gravity: Any = gravity_at.py_func
+    down = -course.climb_rate[::2] - 2.0 * RATE * across * speed - gravity(-below, lla[:, 2])
+    return forward, right, down
+
+
+@numba.njit(cache=True, nogil=True)
+def _walk(
+    speed: FloatArray,
+    heading: FloatArray,
+    climb: FloatArray,
+    dt: float,
+    start: FloatArray,
+    lla: FloatArray,
+) -> None:
+    """Integrate the way over the ellipsoid by the fourth-order Runge-Kutta rule.
+
+    ``speed``, ``heading`` and ``climb`` are given at epochs and half-way.
+    """
+    lla[0] = start
+    for i in range(lla.shape[0] - 1):
+        a, b, c = 2 * i, 2 * i + 1, 2 * i + 2
+        h = lla[i, 2]
+        h_mid = h + dt / 24.0 * (5.0 * climb[a] + 8.0 * climb[b] - climb[c])
+        h_end = h + dt / 6.0 * (climb[a] + 4.0 * climb[b] + climb[c])
+        lat = lla[i, 0]
+        lat_1, lon_1 = _angular_speed(lat, h, speed[a], heading[a])
+        lat_2, lon_2 = _angular_speed(lat + 0.5 * dt * lat_1, h_mid, speed[b], heading[b])
+        lat_3, lon_3 = _angular_speed(lat + 0.5 * dt * lat_2, h_mid, speed[b], heading[b])
+        lat_4, lon_4 = _angular_speed(lat + dt * lat_3, h_end, speed[c], heading[c])
+        lla[i + 1, 0] = lat + dt / 6.0 * (lat_1 + 2.0 * lat_2 + 2.0 * lat_3 + lat_4)
+        lla[i + 1, 1] = lla[i, 1] + dt / 6.0 * (lon_1 + 2.0 * lon_2 + 2.0 * lon_3 + lon_4)
+        lla[i + 1, 2] = h_end
+
+
+@numba.njit(cache=True, nogil=True)
+def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[float, float]:
+    """Rates of latitude and longitude, rad/s."""
+    meridian, transverse = radii(lat)
+    return (
+        speed * math.cos(heading) / (meridian + h),
+        speed * math.sin(heading) / ((transverse + h) * math.cos(lat)),
+    )
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A change of a quantity.
+
+    Attributes
+    ----------
+    change : float
+        By how much, signed.
+    limit : float
+        Largest rate, unit of the quantity per second; a change too small for it has a lower one.
+    ramp : float
+        Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
+        which two derivatives vanish at both ends.
+    """
+
+    change: float
+    limit: float
+    ramp: float
+
+    @property
+    def rate(self) -> float:
+        """Rate between the ramps, signed."""
+        return float(np.clip(self.change / self.ramp, -self.limit, self.limit))
+
+    @property
+    def hold(self) -> float:
+        """Time between the ramps, s."""
+        return max(abs(self.change) / self.limit - self.ramp, 0.0) if self.change else 0.0
+
+    @property
+    def duration(self) -> float:
+        """From the begin of the first ramp to the end of the last one, s; 0 without a change."""
+        return 2.0 * self.ramp + self.hold if self.change else 0.0
+
+    def value(self, time: FloatArray) -> FloatArray:
+        """What has changed some time after the begin, s."""
+        up, down = self._ramps(time)
+        area = self.rate * self.ramp * (_integral(up) - _integral(down))
+        # After a ramp its step goes on at 1.
+        past_up = np.maximum(time - self.ramp, 0.0)
+        past_down = np.maximum(time - 2.0 * self.ramp - self.hold, 0.0)
+        found = area + self.rate * (past_up - past_down)
+        return np.where(time >= self.duration, self.change, found)
+
+    def slope(self, time: FloatArray) -> FloatArray:
+        """Its rate some time after the begin, s."""
+        up, down = self._ramps(time)
+        return self.rate * (_step(up) - _step(down))
+
+    def curvature(self, time: FloatArray) -> FloatArray:
+        """Derivative of the rate some time after the begin, s."""
+        up, down = self._ramps(time)
+        return self.rate / self.ramp * (_bell(up) - _bell(down))
+
+    def _ramps(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far the two ramps are, 0 to 1."""
+        up = np.clip(time / self.ramp, 0.0, 1.0)
+        return up, np.clip((time - self.ramp - self.hold) / self.ramp, 0.0, 1.0)
+
+
+def _integral(x: FloatArray) -> FloatArray:
+    return x**4 * (2.5 + x * (-3.0 + x))
+
+
+def _step(x: FloatArray) -> FloatArray:
+    return x**3 * (10.0 + x * (-15.0 + 6.0 * x))
+
+
+def _bell(x: FloatArray) -> FloatArray:
+    return 30.0 * x**2 * (1.0 - x) ** 2

@@ -1,0 +1,201 @@
+"""Ready-made trajectories: a helicopter that maps, a car, a small fixed-wing aircraft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import cycle
+
+from scipy.optimize import brentq
+
+from gmwm._core.checks import positive
+from gmwm.errors import InputError
+from gmwm.ins.trajectory.manoeuvres import (
+    Accelerate,
+    Climb,
+    Lla,
+    Manoeuvre,
+    Pulse,
+    Stop,
+    Straight,
+    Turn,
+    perform,
+)
+from gmwm.ins.trajectory.routes import displacement
+from gmwm.ins.trajectory.trajectory import Trajectory
+
+_RAMP = 2.0  # s, of the helicopter's turns
+_START = (math.radians(46.52), math.radians(6.57), 400.0)
+
+
+def helicopter_mapping(
+    *,
+    duration: float = 1800.0,
+    dt: float = 0.01,
+    start: Lla = _START,
+    heading: float = 0.5,
+    speed: float = 30.0,
+    strip: float = 3000.0,
+    spacing: float = 300.0,
+) -> Trajectory:
+    """Airborne laser scanning: a vertical climb, then parallel strips flown to and fro.
+
+    Parameters
+    ----------
+    duration, dt : float, optional
+        s.
+    start : (3,) sequence, optional
+        Latitude, longitude, rad, and height, m.
+    heading : float, optional
+        Of the first strip, rad.
+    speed : float, optional
+        m/s.
+    strip : float, optional
+        Length that each strip and the next have beside each other, m.
+    spacing : float, optional
+        Distance of one strip from the next, m. If it is less than the diameter of a turn at
+        6 deg/s, the turn begins to the other side.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive, or the spacing is wider than the diameter of a turn.
+    """
+    rate = math.radians(6.0)
+    strip, spacing = positive("strip", strip), positive("spacing", spacing)
+    speed = positive("speed", speed)
+    away, overshoot = _turn_to_next_strip(speed, spacing, rate)
+    # A turn ends farther out than it began by the overshoot, and so does every other strip.
+    length = strip + max(overshoot, 0.0)
+
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield from (Straight(30.0), Climb(150.0, 4.0), Accelerate(speed, 1.5))
+        for side in cycle((1.0, -1.0)):
+            yield Straight(length / speed)
+            yield Turn(-side * away, rate)
+            yield Turn(side * (math.pi + away), rate)
+
+    return perform(
+        manoeuvres(),
+        start=start,
+        heading=heading,
+        dt=dt,
+        ramp=_RAMP,
+        level=True,
+        duration=duration,
+    )
+
+
+def _turn_to_next_strip(speed: float, spacing: float, rate: float) -> tuple[float, float]:
+    """How far to turn away before turning back, rad, and how far out that ends, m."""
+
+    def displaced(away: float) -> tuple[float, float]:
+        ahead, aside = displacement(Pulse(-away, rate, _RAMP), 0.0, speed)
+        more, back = displacement(Pulse(math.pi + away, rate, _RAMP), -away, speed)
+        return ahead + more, aside + back
+
+    widest = displaced(0.0)[1]
+    if spacing > widest:
+        raise InputError(
+            f"spacing = {spacing:g}: at {speed:g} m/s turns are {widest:.0f} m wide, give at most "
+            "that"
+        )
+    away = float(brentq(lambda angle: displaced(angle)[1] - spacing, 0.0, 0.75 * math.pi))
+    return away, displaced(away)[0]
+
+
+def car_drive(
+    *,
+    duration: float = 1200.0,
+    dt: float = 0.01,
+    start: Lla = _START,
+    heading: float = 1.0,
+) -> Trajectory:
+    """A car: streets with right-angled turns and stops at lights, then a winding open road.
+
+    Parameters
+    ----------
+    duration, dt : float, optional
+        s.
+    start : (3,) sequence, optional
+        Latitude, longitude, rad, and height, m.
+    heading : float, optional
+        rad.
+    """
+
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield Stop(20.0)
+        for side in cycle((1.0, -1.0)):
+            yield from _streets(side)
+            yield from _open_road(side)
+
+    return perform(
+        manoeuvres(), start=start, heading=heading, dt=dt, ramp=1.0, flat=True, duration=duration
+    )
+
+
+def _streets(side: float) -> list[Manoeuvre]:
+    """Some 3 minutes in a town; ``side`` 1 or -1 mirrors them."""
+    corner, rate = 0.5 * math.pi, math.radians(22.0)
+    found: list[Manoeuvre] = []
+    blocks = ((12.0, 15.0, 1.0), (20.0, 0.0, 1.0), (8.0, 35.0, -1.0), (15.0, 5.0, 1.0))
+    for block, wait, turn in blocks:
+        found += [Accelerate(13.0, 1.8), Straight(block)]
+        if wait:
+            found.append(Stop(wait, 2.0))
+        found += [Accelerate(5.5, 1.5), Turn(side * turn * corner, rate)]
+    return found
+
+
+def _open_road(side: float) -> list[Manoeuvre]:
+    """Some 3 minutes between towns; ``side`` 1 or -1 mirrors the bends."""
+    rate = math.radians(4.0)
+    found: list[Manoeuvre] = [Accelerate(24.0, 1.2)]
+    for bend, rise in ((35.0, 30.0), (-60.0, -12.0), (25.0, 15.0), (-15.0, -33.0)):
+        found += [
+            Straight(9.0),
+            Turn(side * math.radians(bend), rate),
+            Climb(rise, 1.2),
+        ]
+    return found
+
+
+def fixed_wing_loiter(
+    *,
+    duration: float = 1200.0,
+    dt: float = 0.01,
+    start: Lla = _START,
+    heading: float = 0.0,
+    speed: float = 22.0,
+    radius: float = 200.0,
+) -> Trajectory:
+    """A small fixed-wing aircraft that circles, now right, now left, with climbs between.
+
+    Parameters
+    ----------
+    duration, dt : float, optional
+        s.
+    start : (3,) sequence, optional
+        Latitude, longitude, rad, and height, m.
+    heading : float, optional
+        At the start, rad.
+    speed, radius : float, optional
+        Speed, m/s, and radius of the circles, m.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive.
+    """
+    rate = positive("speed", speed) / positive("radius", radius)
+
+    def manoeuvres() -> Iterator[Manoeuvre]:
+        yield from (Straight(20.0), Climb(60.0, 2.0))
+        for side in cycle((1.0, -1.0)):
+            yield Turn(side * 6.5 * math.pi, rate)
+            yield Straight(15.0)
+            yield Climb(side * 20.0, 1.5)
+
+    return perform(
+        manoeuvres(), start=start, heading=heading, speed=speed, dt=dt, duration=duration
+    )

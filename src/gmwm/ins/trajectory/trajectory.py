@@ -1,0 +1,224 @@
+"""Trajectories: position, velocity and attitude at evenly spaced epochs."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gmwm._core.checks import is_number, positive, real_numbers, sampling_interval, shown
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.logs import read_log
+from gmwm.ins.trajectory.splines import (
+    smoothed,
+    track_velocity,
+    unwrapped_angles,
+    unwrapped_longitudes,
+)
+
+_ATTITUDE_CUTOFF = 5.0  # of that of the track
+HIGHEST_LATITUDE = math.radians(89.0)
+"""North-east-down axes turn too fast beyond it, rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class NavState:
+    """Position, velocity and attitude at one epoch.
+
+    Attributes
+    ----------
+    lla : (3,) ndarray
+        Latitude, longitude, rad, and height above the ellipsoid, m.
+    velocity : (3,) ndarray
+        To the north, east and down, m/s.
+    rpy : (3,) ndarray
+        Roll, pitch and yaw, rad.
+    """
+
+    lla: FloatArray
+    velocity: FloatArray
+    rpy: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("lla", "velocity", "rpy"):
+            values = finite_numbers(getattr(self, name), name)
+            if values.shape != (3,):
+                raise InputError(f"{name} has shape {values.shape}: give 3 numbers")
+            object.__setattr__(self, name, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Position, velocity and attitude at n + 1 epochs, one sampling interval apart.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval, s.
+    lla : (n + 1, 3) ndarray
+        Latitude, longitude, rad, and height above the ellipsoid, m.
+    velocity : (n + 1, 3) ndarray
+        To the north, east and down, m/s.
+    rpy : (n + 1, 3) ndarray
+        Roll, pitch and yaw, rad.
+    """
+
+    dt: float
+    lla: FloatArray
+    velocity: FloatArray
+    rpy: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dt", sampling_interval(self.dt))
+        for name in ("lla", "velocity", "rpy"):
+            values = np.ascontiguousarray(real_numbers(getattr(self, name), name))
+            if values.ndim != 2 or values.shape[1] != 3 or len(values) != len(self.lla):
+                raise InputError(
+                    f"{name} has shape {values.shape}: give lla, velocity and rpy one row of 3 "
+                    "numbers for each epoch"
+                )
+            object.__setattr__(self, name, values)
+        if len(self.lla) < 2:
+            raise InputError(f"a trajectory of {len(self.lla)} epochs: give two or more")
+
+    @classmethod
+    def from_arrays(cls, dt: float, lla: FloatArray, rpy: FloatArray) -> Trajectory:
+        """Build a trajectory from positions and attitudes; the velocity is that of the splines.
+
+        Parameters
+        ----------
+        dt : float
+            Sampling interval, s.
+        lla : (n + 1, 3) array_like
+            Latitude, longitude, rad, and height, m; smooth enough to be differentiated twice.
+        rpy : (n + 1, 3) array_like
+            Roll, pitch and yaw, rad; jumps by a full turn do no harm.
+
+        Raises
+        ------
+        InputError
+            If a number is not finite or a latitude is beyond 89 deg.
+        """
+        dt = sampling_interval(dt)
+        position = _rows_of_three(lla, "lla")
+        check_latitudes(position, "lla")
+        position = unwrapped_longitudes(position)
+        velocity = track_velocity(position, dt)
+        return cls(dt, position, velocity, _rows_of_three(rpy, "rpy"))
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], *, smooth: float | None = 1.0) -> Trajectory:
+        """Read a logged trajectory, smoothed enough to be differentiated.
+
+        Logs come in coarse steps and hold the jumps of the filter that made them; differentiated
+        twice, a step of 1 mm at 100 Hz is a specific force of 10 m/s^2.
+
+        Parameters
+        ----------
+        path : str or path
+            Delimited text, plain or gzip, with columns of time, latitude, longitude, height, roll,
+            pitch and yaw, known by their names. Units stand at their end (``time_s``, ``lat_deg``,
+            ``roll [rad]``); without one, time is in seconds, height in metres, and angles are in
+            degrees if a latitude is beyond pi/2.
+        smooth : float or None, optional
+            What the track does faster than this is left out, Hz; for the attitude, which is
+            differentiated only once, five times this. It has no effect from a quarter of the
+            sampling rate on. ``None``: leave all as it is.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be used; the message names the line.
+        """
+        log = read_log(Path(path))
+        lla, rpy = log.lla, unwrapped_angles(log.rpy)
+        if smooth is not None:
+            cutoff = positive("smooth", smooth, "give a cutoff in Hz, or None to leave all as is")
+            lla = smoothed(unwrapped_longitudes(lla), log.dt, cutoff)
+            rpy = smoothed(rpy, log.dt, _ATTITUDE_CUTOFF * cutoff)
+        return cls.from_arrays(log.dt, lla, rpy)
+
+    @property
+    def n(self) -> int:
+        """Number of sampling intervals: one less than epochs."""
+        return len(self.lla) - 1
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        return self.n * self.dt
+
+    @property
+    def time(self) -> FloatArray:
+        """Time since the first epoch, s, shape (n + 1,)."""
+        return self.dt * np.arange(self.n + 1, dtype=float)
+
+    def state(self, index: int) -> NavState:
+        """Position, velocity and attitude at one epoch, counted from 0, or from the end if < 0."""
+        if not -self.n - 1 <= index <= self.n:
+            raise InputError(f"index = {shown(index)}: the trajectory has {self.n + 1:,} epochs")
+        return NavState(self.lla[index], self.velocity[index], self.rpy[index])
+
+    def segment(self, start: float, end: float) -> Trajectory:
+        """The part between two times.
+
+        Parameters
+        ----------
+        start, end : float
+            s since the first epoch; the nearest epochs are taken, both included.
+
+        Raises
+        ------
+        InputError
+            If they are not in order or outside the trajectory.
+        """
+        inside = is_number(start) and is_number(end)
+        first, last = (round(start / self.dt), round(end / self.dt)) if inside else (0, 0)
+        if not 0 <= first < last <= self.n:
+            raise InputError(
+                f"segment from {shown(start)} s to {shown(end)} s: give two times in order, "
+                f"within 0 to {self.duration:g} s"
+            )
+        part = slice(first, last + 1)
+        return Trajectory(self.dt, self.lla[part], self.velocity[part], self.rpy[part])
+
+
+def check_latitudes(lla: FloatArray, name: str) -> None:
+    """Refuse positions near the poles, where north and east turn too fast.
+
+    Raises
+    ------
+    InputError
+    """
+    bad = np.flatnonzero(~(np.abs(lla[:, 0]) <= HIGHEST_LATITUDE))
+    if bad.size:
+        raise InputError(
+            f"{name}: latitude {math.degrees(lla[bad[0], 0]):.6g} deg at index {bad[0]} is too "
+            "near a pole for north-east-down axes: stay within 89 deg of the equator"
+        )
+
+
+def _rows_of_three(values: object, name: str) -> FloatArray:
+    array = finite_numbers(values, name)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
+        raise InputError(f"{name} has shape {array.shape}: give two or more epochs, 3 numbers each")
+    return array
+
+
+def finite_numbers(values: object, name: str) -> FloatArray:
+    """An array of finite numbers.
+
+    Raises
+    ------
+    InputError
+        With the row of the first that is not finite.
+    """
+    array = np.ascontiguousarray(real_numbers(values, name))
+    if not np.all(np.isfinite(array)):
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise InputError(f"{name} is not finite at index {row}: give a number for every epoch")
+    return array

@@ -1,0 +1,36 @@
+"""Pictures from plain arrays and labels; knows no result object."""
+
+from gmwm.plotting.deviation import (
+    COMPONENT_COLOURS,
+    DATA_COLOUR,
+    SUM_COLOUR,
+    boxes,
+    curves,
+    deviation,
+    deviation_range,
+    deviations,
+    residuals,
+    straight_lines,
+    trace,
+)
+from gmwm.plotting.navigation import errors, growth, innovations, literal, measured_track, track
+
+__all__ = [
+    "COMPONENT_COLOURS",
+    "DATA_COLOUR",
+    "SUM_COLOUR",
+    "boxes",
+    "curves",
+    "deviation",
+    "deviation_range",
+    "deviations",
+    "errors",
+    "growth",
+    "innovations",
+    "literal",
+    "measured_track",
+    "residuals",
+    "straight_lines",
+    "trace",
+    "track",
+]

@@ -1,0 +1,275 @@
+"""Pictures of navigation from plain arrays: tracks, true errors with what a filter predicted.
+
+Every function draws a figure of its own and returns it; none knows what it draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.plotting.deviation import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)),
+                                                          (0, (1, 1)))  # fmt: skip
+_PANEL = (3.4, 2.1)  # inches, of one panel among several
+_BESIDE = 3  # panels in a row
+_BAND = "#9ecae1"
+_TRUE = "true track"
+_WIDEST_TITLE = 30  # characters over a panel
+_IN_LEGEND = 24
+_PREDICTED_SHOWN = 2.0  # of the largest true error: a prediction far above it leaves the view
+_T = TypeVar("_T")
+
+
+def track(
+    truth: FloatArray,
+    outages: Sequence[FloatArray],
+    solutions: Mapping[str, Sequence[FloatArray]],
+) -> Figure:
+    """A track with its outages, and what filters made of it.
+
+    Parameters
+    ----------
+    truth : (n, 2) ndarray
+        East and north, m.
+    outages : sequence of (k, 2) ndarray
+        The parts of the track without GNSS.
+    solutions : mapping of str to sequence of (k, 2) ndarray
+        Name -> estimated positions during each outage.
+    """
+    import matplotlib.pyplot as plt
+
+    columns = 1 + min(len(outages), 2)
+    figure, axes = plt.subplots(
+        1, columns, figsize=(4.2 * columns, 4.2), layout="constrained", squeeze=False
+    )
+    whole = axes[0, 0]
+    whole.plot(truth[:, 0], truth[:, 1], color=DATA_COLOUR, linewidth=0.9, label=_TRUE)
+    for i, part in enumerate(outages):
+        label = "without GNSS" if i == 0 else None
+        whole.plot(part[:, 0], part[:, 1], color=COMPONENT_COLOURS[1], linewidth=2.5, label=label)
+    whole.set_title("whole track", fontsize="medium")
+    for i, ax in enumerate(axes[0, 1:]):
+        part = outages[i]
+        ax.plot(part[:, 0], part[:, 1], color=_BAND, linewidth=5.0, label=_TRUE)
+        for colour, dash, (name, paths) in _styles(solutions):
+            path = paths[i]
+            ax.plot(path[:, 0], path[:, 1], color=colour, linestyle=dash, linewidth=1.4,
+                    label=literal(name, _IN_LEGEND))  # fmt: skip
+            ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
+        ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
+    for ax in axes[0]:
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_xlabel("east [m]")
+        ax.set_ylabel("north [m]")
+        _plain(ax)
+        ax.legend(fontsize="x-small")
+    return figure
+
+
+def errors(
+    panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]],
+    spans: Sequence[tuple[float, float]] = (),
+    *,
+    labels: Sequence[str] = ("east [m]", "north [m]", "vertical [m]"),
+) -> Figure:
+    """True errors of one run with the bands of 1 and 3 sigma that each filter predicted.
+
+    Parameters
+    ----------
+    panels : mapping of str to (time, error, sd)
+        Name -> times (K,), s; errors and predicted standard deviations (K, d).
+    spans : sequence of (start, end)
+        Outages, s.
+    labels : sequence of str, optional
+        Of the d components.
+    """
+    import matplotlib.pyplot as plt
+
+    d = len(labels)
+    blocks = -(-len(panels) // _BESIDE)
+    columns = -(-len(panels) // blocks)
+    figure, axes = plt.subplots(
+        blocks * d, columns, figsize=(_PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d),
+        sharex=True, layout="constrained", squeeze=False,
+    )  # fmt: skip
+    top = _largest(panels)
+    for place, (name, (time, error, sd)) in enumerate(panels.items()):
+        first, column = d * (place // columns), place % columns
+        for row, label in enumerate(labels):
+            ax = axes[first + row, column]
+            _draw_error(ax, time, error[:, row], sd[:, row], spans)
+            if np.isfinite(top[row]) and top[row] > 0.0:
+                ax.set_ylim(-top[row], top[row])
+            if column == 0:
+                ax.set_ylabel(label)
+        axes[first, column].set_title(literal(name, _WIDEST_TITLE), fontsize="medium")
+        axes[first + d - 1, column].set_xlabel("time [s]")
+        axes[first + d - 1, column].tick_params(labelbottom=True)
+    for ax in axes[-d:, (len(panels) - 1) % columns + 1 :].flat:
+        ax.set_axis_off()
+    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    return figure
+
+
+def _draw_error(
+    ax: Axes,
+    time: FloatArray,
+    error: FloatArray,
+    sd: FloatArray,
+    spans: Sequence[tuple[float, float]],
+) -> None:
+    """One component: its error in the bands of 3 and 1 sigma."""
+    for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
+        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
+                        label=f"{factor:g} sigma predicted")  # fmt: skip
+    ax.plot(time, error, color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
+    for end in (end for span in spans for end in span):
+        ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
+    _plain(ax)
+
+
+def growth(
+    panels: Mapping[str, Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]],
+    labels: Sequence[str] = ("horizontal [m]", "vertical [m]"),
+) -> Figure:
+    """Growth of errors in outages: root mean square over the runs, and what filters predicted.
+
+    Parameters
+    ----------
+    panels : mapping of str to mapping of str to (time, rms, predicted)
+        Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
+        errors and of the predicted ones, (K, d).
+    labels : sequence of str, optional
+        Of the d components.
+    """
+    import matplotlib.pyplot as plt
+
+    rows, columns = len(labels), len(panels)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(max(4.6 * columns, 5.6), 2.9 * rows), layout="constrained",
+        squeeze=False, sharex="col",
+    )  # fmt: skip
+    for column, (title, filters) in enumerate(panels.items()):
+        for row, label in enumerate(labels):
+            ax = axes[row, column]
+            for colour, _, (name, (time, rms, predicted)) in _styles(filters):
+                ax.plot(time, rms[:, row], color=colour, linewidth=1.7,
+                        label=literal(name, _IN_LEGEND))  # fmt: skip
+                ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
+            _plain(ax)
+            _from_zero(ax, [each[1][:, row] for each in filters.values()])
+            if column == 0:
+                ax.set_ylabel(label)
+            if row == 0:
+                ax.set_title(title, fontsize="medium")
+            if row == rows - 1:
+                ax.set_xlabel("time since the outage began [s]")
+    axes[0, 0].plot([], [], color=DATA_COLOUR, linestyle=":", label="predicted")
+    axes[0, 0].legend(fontsize="small")
+    return figure
+
+
+def literal(text: str, longest: int = 200) -> str:
+    """A name as a figure shows it: not as a formula, not too long, and not left out of legends."""
+    shown = text if len(text) <= longest else text[: longest - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    # Matplotlib takes what is between dollars for a formula, and hides labels that begin with _.
+    return (" " if shown.startswith("_") else "") + shown.replace("$", r"\$")
+
+
+def _largest(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> FloatArray:
+    """Ends of the axes of errors: all errors, and the narrowest of the bands, are in view."""
+    peaks = [np.max(np.abs(e), axis=0, initial=0.0) for _, e, _ in panels.values()]
+    bands = [np.max(3.0 * sd, axis=0, initial=0.0) for _, _, sd in panels.values()]
+    top = np.maximum(np.max(peaks, axis=0), np.min(bands, axis=0))
+    return np.asarray(1.1 * top, dtype=float)
+
+
+def _from_zero(ax: Axes, true: Sequence[FloatArray]) -> None:
+    """Axis of errors that begins at zero and shows all true ones."""
+    most = max((float(np.nanmax(each, initial=0.0)) for each in true), default=0.0)
+    ax.set_ylim(bottom=0.0)
+    if most > 0.0:
+        ax.set_ylim(top=min(ax.get_ylim()[1], 1.1 * _PREDICTED_SHOWN * most))
+
+
+def _styles(
+    named: Mapping[str, _T],
+) -> list[tuple[str, str | tuple[int, tuple[float, ...]], tuple[str, _T]]]:
+    colours = [SUM_COLOUR if name == "truth" else "" for name in named]
+    palette = iter(COMPONENT_COLOURS * (1 + len(named) // len(COMPONENT_COLOURS)))
+    colours = [colour or next(palette) for colour in colours]
+    dashes = [_DASHES[i % len(_DASHES)] for i in range(len(named))]
+    return list(zip(colours, dashes, named.items(), strict=True))
+
+
+def _plain(ax: Axes) -> None:
+    ax.grid(True, color="#dddddd", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.tick_params(labelsize="small")
+
+
+def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) -> Figure:
+    """An estimated track, the fixes that it rests on, and its part without fixes.
+
+    Parameters
+    ----------
+    track : (n, 2) ndarray
+        East and north, m.
+    fixes : (k, 2) ndarray
+    without : (j, 2) ndarray
+        Part of the track.
+    """
+    import matplotlib.pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
+    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=3, label="fixes")
+    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
+            label="longest time without fixes")  # fmt: skip
+    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel("east [m]")
+    ax.set_ylabel("north [m]")
+    _plain(ax)
+    ax.legend(fontsize="small")
+    return figure
+
+
+def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> Figure:
+    """Innovations of three components with the bands of 1 and 3 sigma that a filter expected.
+
+    Parameters
+    ----------
+    panels : mapping of str to (time, value, sd)
+        Kind with its unit -> times (K,), s; innovations and expected standard deviations (K, 3).
+    """
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(
+        3, len(panels), figsize=(1.4 * _PANEL[0] * len(panels) + 0.6, 3.0 * _PANEL[1]),
+        sharex=True, layout="constrained", squeeze=False,
+    )  # fmt: skip
+    for column, (title, (time, value, sd)) in enumerate(panels.items()):
+        for row, label in enumerate(("north", "east", "down")):
+            ax = axes[row, column]
+            for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
+                ax.fill_between(time, -factor * sd[:, row], factor * sd[:, row], color=_BAND,
+                                alpha=alpha, linewidth=0,
+                                label=f"{factor:g} sigma expected")  # fmt: skip
+            ax.plot(time, value[:, row], ".", color=COMPONENT_COLOURS[1], markersize=3,
+                    label="innovation")  # fmt: skip
+            _plain(ax)
+            if column == 0:
+                ax.set_ylabel(label)
+        axes[0, column].set_title(title, fontsize="medium")
+        axes[2, column].set_xlabel("time [s]")
+    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    return figure

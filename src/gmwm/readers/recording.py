@@ -1,0 +1,228 @@
+"""A static recording: named channels of equal rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT, factor, quantity_of
+from gmwm.errors import InputError
+
+_SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One axis of one sensor.
+
+    Attributes
+    ----------
+    name : str
+        E.g. ``"gyro_x"``.
+    values : (n,) ndarray
+        Samples in the SI unit of the quantity, mean not removed; NaN where one is missing.
+    dt : float
+        Sampling interval, s.
+    quantity : {"gyro", "accel", None}
+        Angular rate (rad/s), specific force (m/s^2) or, if ``None``, something else in its own
+        unit.
+    unit : str
+        The unit of ``values``.
+    """
+
+    name: str
+    values: FloatArray
+    dt: float
+    quantity: str | None = None
+    unit: str = ""
+
+    @property
+    def n(self) -> int:
+        """Number of samples, those that are missing included."""
+        return int(self.values.size)
+
+    @property
+    def missing(self) -> int:
+        """Number of samples that are missing."""
+        return int(np.count_nonzero(np.isnan(self.values)))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no sample is missing."""
+        return self.missing == 0
+
+    @property
+    def mean(self) -> float:
+        """Mean of the samples that are there; NaN if none is."""
+        present = self.n - self.missing
+        return float(np.nansum(self.values)) / present if present else np.nan
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether every sample that is there has the same value: a dead channel."""
+        values = np.asarray(self.values, dtype=float)
+        # fmin and fmax pass over NaN.
+        lowest = np.fmin.reduce(values, initial=np.inf)
+        return not lowest < np.fmax.reduce(values, initial=-np.inf)
+
+    def __str__(self) -> str:
+        missing = self.missing
+        size = f"{self.name}: {self.n:,} samples, {self.n * self.dt:.6g} s"
+        if missing == self.n:
+            return f"{size}, all missing"
+        gone = f", {missing:,} missing" if missing else ""
+        return f"{size}, mean {self.mean:.6g} {self.unit}{gone}"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Named channels with one sampling rate.
+
+    Attributes
+    ----------
+    channels : tuple of Channel
+    source : str
+        Where it came from, for messages and reports.
+    notes : tuple of str
+        What the reader noticed, one sentence each.
+    jitter : float or None
+        Standard deviation of the steps of its time stamps, as a share of the sampling interval;
+        None if it has none.
+    """
+
+    channels: tuple[Channel, ...]
+    source: str = ""
+    notes: tuple[str, ...] = field(default=())
+    jitter: float | None = None
+
+    @classmethod
+    def from_arrays(
+        cls,
+        arrays: Mapping[str, FloatArray],
+        rate: float,
+        units: Mapping[str, str],
+        source: str = "",
+        notes: tuple[str, ...] = (),
+    ) -> Recording:
+        """Build a recording from arrays in any unit.
+
+        Parameters
+        ----------
+        arrays : mapping of str to (n,) array_like
+            Channel name -> samples, NaN where one is missing.
+        rate : float
+            Sampling rate, Hz.
+        units : mapping of str to str
+            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
+        source : str, optional
+        notes : tuple of str, optional
+            What else is to be known; one sentence on missing samples is added.
+
+        Raises
+        ------
+        InputError
+            If the rate is not positive, a unit is missing or unknown, or the channels are not
+            series of numbers of one length, none infinite.
+        """
+        if not _SLOWEST <= rate <= _FASTEST:
+            limits = f"{_SLOWEST:g} to {_FASTEST:g}"
+            raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
+        channels = []
+        for name, values in arrays.items():
+            unit = units.get(name) or units.get(name.partition("_")[0])
+            if unit is None:
+                raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
+            quantity = quantity_of(unit)
+            si = SI_UNIT[quantity]
+            scaled = _series(name, values) * factor(unit, si)
+            channels.append(Channel(name, scaled, 1.0 / rate, quantity, si))
+        lengths = {channel.name: channel.n for channel in channels}
+        if len(set(lengths.values())) != 1:
+            listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
+            raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
+        return cls(tuple(channels), source, (*notes, *_notes_of_gaps(channels)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.channels[0].dt
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return 1.0 / self.dt
+
+    @property
+    def n(self) -> int:
+        """Number of samples of each channel."""
+        return self.channels[0].n
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        return self.n * self.dt
+
+    def __getitem__(self, name: str) -> Channel:
+        for channel in self.channels:
+            if channel.name == name:
+                return channel
+        raise InputError(f"the recording has no channel {name!r}: it has {', '.join(self.names)}")
+
+    def __iter__(self) -> Iterator[Channel]:
+        return iter(self.channels)
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+    def __str__(self) -> str:
+        head = f"{self.source or 'recording'}: {self.rate:g} Hz, {self.duration:.6g} s"
+        return "\n".join([head, *(f"  {channel}" for channel in self.channels), *self.notes])
+
+
+def _series(name: str, values: FloatArray) -> FloatArray:
+    try:
+        series = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"channel {name!r} holds something that is not a number") from None
+    if series.ndim != 1:
+        raise InputError(f"channel {name!r} has shape {series.shape}: give one series of samples")
+    infinite = np.flatnonzero(np.isinf(series))
+    if infinite.size:
+        raise InputError(
+            f"channel {name!r} is infinite at index {infinite[0]}: give a number, or NaN if the "
+            "sample is missing"
+        )
+    return series
+
+
+def _notes_of_gaps(channels: Iterable[Channel]) -> list[str]:
+    """One sentence for all channels that miss equally many samples in equally many gaps."""
+    names: dict[str, list[str]] = {}
+    for channel in channels:
+        gone = np.isnan(channel.values)
+        if not np.any(gone):
+            continue
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+        lengths = edges[1::2] - edges[::2]
+        text = f"{channel.missing:,} of {channel.n:,} samples missing"
+        if channel.missing == channel.n:
+            text = f"all {channel.n:,} samples missing"
+        elif lengths.size == 1:
+            text += ", in one gap"
+        else:
+            longest = int(np.max(lengths))
+            plural = "s" if longest > 1 else ""
+            text += f", in {lengths.size:,} gaps, the longest {longest:,} sample{plural}"
+        names.setdefault(text, []).append(channel.name)
+    return [
+        f"{', '.join(alike)}: {'each ' if len(alike) > 1 else ''}{text}."
+        for text, alike in names.items()
+    ]

@@ -1,0 +1,119 @@
+"""What the models mean for navigation: the error budget in words, tables and a figure."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from gmwm.budget import (
+    FIELD_UNITS,
+    HORIZONTAL,
+    QUANTITIES,
+    TIMES,
+    ErrorBudget,
+    axis,
+    error_budget,
+    per_si,
+    short,
+)
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.report.figure import growth_figure
+
+_TOLD = 60.0  # s, the coasting time of the sentence
+_NAMES = {
+    (HORIZONTAL, "attitude"): "tilt",
+    (HORIZONTAL, "velocity"): "horizontal velocity",
+    (HORIZONTAL, "position"): "horizontal position",
+    ("z", "attitude"): "heading",
+    ("z", "velocity"): "vertical velocity",
+    ("z", "position"): "vertical position",
+}
+
+
+def navigation(calibration: Calibration) -> dict[str, Any] | None:
+    """Content of the section; ``None`` without inertial sensors, ``problem`` without a budget."""
+    intervals = [fit.wv.dt for fit in calibration.fits.values() if fit.wv.quantity is not None]
+    times = [t for t in TIMES if intervals and t >= max(intervals)]
+    if not times:
+        return None
+    try:
+        known = error_budget(calibration, times)
+        unknown = error_budget(calibration, times, calibrated=False)
+    except InputError as error:
+        return {"problem": str(error)}
+    of = known.groups[-1]
+    figure = growth_figure(known, unknown, of, known.quantities(of)[-1])
+    return {
+        "problem": "",
+        "times": [f"{t:g} s" for t in times],
+        "sentence": _sentence(known, unknown),
+        "starts": [
+            ("The slow errors are known at the start, as after a filter with aiding", _rows(known)),
+            ("Nothing is known of the errors at the start", _rows(unknown)),
+        ],
+        "parts": _parts(known),
+        "notes": known.notes,
+        # "</" would end the script element, also within a string.
+        "figure": json.dumps(figure, allow_nan=False).replace("</", "<\\/"),
+    }
+
+
+def _rows(budget: ErrorBudget) -> list[dict[str, Any]]:
+    """The totals of the platform: tilt and horizontal errors, then what else there is."""
+    together = [HORIZONTAL] if HORIZONTAL in budget.groups else []
+    apart = [name for name in budget.channels if axis(name) not in ("x", "y")]
+    rows = []
+    for of in together + apart:
+        for quantity, values in budget.total(of).items():
+            row, share = budget.largest(quantity, of)
+            mostly = f"{row.channel} {row.component}, {100.0 * share:.0f} %"
+            rows.append(
+                {
+                    "name": _name(of, quantity),
+                    "quantity": quantity,
+                    "unit": FIELD_UNITS[quantity],
+                    "values": [short(value) for value in values * per_si(quantity)],
+                    "mostly": mostly if share > 0.0 else "",
+                }
+            )
+    # By quantity, the horizontal before the others; the sort keeps that order within each.
+    return sorted(rows, key=lambda row: list(QUANTITIES).index(row["quantity"]))
+
+
+def _name(of: str, quantity: str) -> str:
+    return _NAMES.get((axis(of) or of, quantity), f"{of} {quantity}")
+
+
+def _parts(budget: ErrorBudget) -> list[dict[str, Any]]:
+    return [
+        {
+            "channel": row.channel,
+            "component": row.component,
+            "quantity": row.quantity,
+            "unit": FIELD_UNITS[row.quantity],
+            "values": [short(value * per_si(row.quantity)) for value in row.values],
+        }
+        for row in budget.rows
+        if any(row.values)
+    ]
+
+
+def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
+    """The headline: what a minute without aiding costs."""
+    if HORIZONTAL not in known.groups or _TOLD not in known.times:
+        return ""
+    at = known.times.index(_TOLD)
+
+    def lost(budget: ErrorBudget) -> str:
+        total = budget.total()
+        return " and ".join(
+            f"{short(total[quantity][at] * per_si(quantity))} {FIELD_UNITS[quantity]} of {name}"
+            for quantity, name in (("attitude", "tilt"), ("position", "horizontal position"))
+            if quantity in total
+        )
+
+    return (
+        f"A minute without aiding costs {lost(known)} (1 sigma) if the slow errors are known when "
+        f"it begins, and {lost(unknown)} if nothing is known of them."
+    )

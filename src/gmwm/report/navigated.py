@@ -1,0 +1,45 @@
+"""The report of filtered real data: one HTML file with its figures inside."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import gmwm
+from gmwm._core.files import written
+from gmwm.ins.field import Navigated
+from gmwm.report.validation import svg
+
+
+def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a solution as one HTML file that needs no network.
+
+    Parameters
+    ----------
+    navigated : Navigated
+    path : path-like
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
+    )
+    sensors = navigated.measured.sensors
+    text = environment.get_template("navigated.html").render(
+        title=navigated.measured.title,
+        version=gmwm.__version__,
+        verdict=navigated.verdict,
+        track=svg(navigated.plot_track()),
+        innovations=svg(navigated.plot_innovations()),
+        tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
+        summary=str(navigated),
+        models=[(axis, model, sensors.bias_sd[axis]) for axis, model in sensors.models.items()],
+    )
+    with written(path) as stream:
+        stream.write(text)
+    return Path(path)

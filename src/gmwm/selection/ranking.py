@@ -1,0 +1,307 @@
+"""Candidate models under common weights, ranked by an information criterion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate.moments import Design, Point, Profile, Reference, dictionary_fit, search
+from gmwm.estimate.problem import (
+    Scales,
+    Slope,
+    bias_of_detrending,
+    chi_square,
+    gls_slope,
+    weight_root,
+)
+from gmwm.estimate.result import Fit
+from gmwm.process import (
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+    model_from_list,
+)
+from gmwm.selection import tuning
+from gmwm.variance import PooledVariance, WaveletVariance
+
+MAX_GAUSS_MARKOV = 5
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a model may be made of.
+
+    Attributes
+    ----------
+    max_gauss_markov : int
+        Largest number of Gauss-Markov terms.
+    extra : tuple of Process
+        Further terms of open amplitude and given shape, each of which a candidate may have.
+    """
+
+    max_gauss_markov: int = MAX_GAUSS_MARKOV
+    extra: tuple[Process, ...] = ()
+
+    def __post_init__(self) -> None:
+        most = self.max_gauss_markov
+        if not checks.is_number(most) or most not in range(MAX_GAUSS_MARKOV + 1):
+            raise InputError(
+                f"max_gauss_markov = {checks.shown(most)}: give a whole number from 0 to "
+                f"{MAX_GAUSS_MARKOV}"
+            )
+        for process in self.extra:
+            if not isinstance(process, Process):
+                raise InputError(
+                    f"extra holds {checks.shown(process)}: give processes, as in "
+                    "[Sinusoid(frequency=0.5)]"
+                )
+            linear = process.linear_parameter
+            shape = [process.values[p.name] for p in process.shape_parameters]
+            if linear is None or process.values[linear.name] is not None or None in shape:
+                raise InputError(
+                    f"extra = {process!r}: give its shape and leave its amplitude open, as in "
+                    "Sinusoid(frequency=0.5)"
+                )
+
+    def bases(self) -> Iterator[tuple[Process, ...]]:
+        """All sums of the terms whose shape is given, the empty one first."""
+        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        for chosen in product((False, True), repeat=len(kinds)):
+            yield tuple(kind for kind, on in zip(kinds, chosen, strict=True) if on)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model of the ranking.
+
+    Attributes
+    ----------
+    model : Model
+        With open parameters.
+    criterion : float
+        Chi-square plus ``3 p ln ln n``; less is better.
+    objective : float
+        Weighted sum of squares under weights common to all candidates.
+    chi_square : float
+        The same on cube roots of the wavelet variances, which are close to normal at coarse levels
+        too: a level of few degrees of freedom that is high by chance asks for a term otherwise.
+    n_parameters : int
+    dof : int
+        Moments less parameters.
+    """
+
+    model: Model
+    criterion: float
+    objective: float
+    chi_square: float
+    n_parameters: int
+    dof: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """In JSON types."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return values | {"model": [term.to_dict() for term in self.model.terms]}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Candidate:
+        """Inverse of `to_dict`."""
+        return cls(**{**content, "model": model_from_list(content["model"])})
+
+    @property
+    def wic(self) -> float:
+        """Wavelet information criterion, chi-square + 2 tr{cov(nu_hat, nu) Omega}.
+
+        Under the inverse covariance as weights, the trace is the number of parameters. It is an
+        estimate of the error of prediction, and chooses more terms than ``criterion``.
+        """
+        return self.chi_square + 2.0 * self.n_parameters
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a chi-square as large; NaN without degrees of freedom."""
+        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
+
+
+def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
+    """All candidates, best first.
+
+    Parameters
+    ----------
+    wv : WaveletVariance
+        Of one recording, or pooled of several; a drift is sought in one recording only.
+    choices : Choices
+    """
+    reference = dictionary_fit(wv, wv.variance, choices.extra)
+    allowed = reference.discrepancy
+    plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
+    plain.sort(key=lambda item: item[0].criterion)
+    if isinstance(wv, PooledVariance):
+        return [candidate for candidate, _ in plain]
+    slope = _slope_under(plain[0], wv)
+    without = slope.value**2 / slope.variance
+    ramped: list[Candidate] = []
+    if without > tuning.RAMP_PLAUSIBLE:
+        target, drift_free = _drift_free(wv, slope, choices)
+        if drift_free.discrepancy < allowed:
+            # Both kinds must be compared under the same allowance.
+            allowed = drift_free.discrepancy
+            plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
+        found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
+        ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
+    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+
+
+def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
+    """Generalized least-squares slope under the noise of a candidate."""
+    candidate, point = item
+    design = Design(candidate.model, Scales.of(wv))
+    return gls_slope(wv, design.fitted_noise(point.x, point.shapes).psd)
+
+
+def _drift_free(
+    wv: WaveletVariance, slope: Slope, choices: Choices
+) -> tuple[FloatArray, Reference]:
+    """Wavelet variances without the drift, and the mixture fitted to them.
+
+    Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
+    estimated again under the mixture that is left.
+    """
+    for _ in range(tuning.RAMP_ROUNDS):
+        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        reference = dictionary_fit(wv, target, choices.extra)
+        slope = gls_slope(wv, reference.mixture.psd)
+    return target, reference
+
+
+def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
+    # The slope is a moment of its own: the degrees of freedom stay.
+    return replace(
+        candidate,
+        model=candidate.model + RateRamp(),
+        criterion=candidate.criterion + penalty,
+        n_parameters=candidate.n_parameters + 1,
+    )
+
+
+def _without_ramp(
+    plain: list[tuple[Candidate, Point]], wv: WaveletVariance, squared_slope: float
+) -> list[Candidate]:
+    """Candidates that pay the squared slope over its variance: under their own noise, if good."""
+    result = []
+    for rank, item in enumerate(sorted(plain, key=lambda item: item[0].criterion)):
+        price = squared_slope
+        if squared_slope > tuning.RAMP_PLAUSIBLE and rank < tuning.FITS:
+            slope = _slope_under(item, wv)
+            price = slope.value**2 / slope.variance
+        candidate = item[0]
+        result.append(
+            replace(
+                candidate,
+                criterion=candidate.criterion + price,
+                objective=candidate.objective + price,
+                chi_square=candidate.chi_square + price,
+            )
+        )
+    return result
+
+
+def candidate_of(fitted: Fit) -> Candidate:
+    """What a fit under its own weights says of its model.
+
+    Candidates of such fits are less comparable than those of `rank`, whose weights are common.
+    """
+    p, dof = len(fitted.keys), fitted.dof
+    statistic = fitted.chi_square if dof > 0 else 0.0
+    criterion = statistic + _penalty(fitted.wv.n) * p
+    return Candidate(fitted.model.opened(), criterion, fitted.objective, statistic, p, dof)
+
+
+def rank_key(candidate: Candidate) -> float:
+    ramped = any(term.is_drift for term in candidate.model.terms)
+    return candidate.criterion + (tuning.RAMP_MARGIN if ramped else 0.0)
+
+
+def _penalty(n: int) -> float:
+    """Price of a parameter: 2 c ln ln n."""
+    return 2.0 * tuning.STRICTNESS * float(np.log(np.log(n)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What all candidates are compared on: moments, and their covariance under the mixture."""
+
+    target: FloatArray
+    covariance: FloatArray
+    root: FloatArray
+    basis: FloatArray
+
+    @classmethod
+    def of(cls, target: FloatArray, reference: Reference, discrepancy: float) -> _Ground:
+        covariance = reference.weights(target, discrepancy)
+        return cls(target, covariance, weight_root(covariance), reference.curve)
+
+    def candidate(self, design: Design, point: Point) -> Candidate:
+        implied = design.curves(point.shapes) @ design.amplitudes(point.x)
+        statistic = point.objective
+        if np.all(implied > 0.0) and np.all(self.basis > 0.0):
+            statistic = chi_square(self.target, implied, self.covariance, self.basis)[1]
+        return Candidate(
+            model=design.model,
+            criterion=statistic + _penalty(design.scales.n) * design.n_free,
+            objective=point.objective,
+            chi_square=statistic,
+            n_parameters=design.n_free,
+            dof=self.target.size - design.n_free,
+        )
+
+
+def _candidates(
+    wv: WaveletVariance, ground: _Ground, choices: Choices
+) -> list[tuple[Candidate, Point]]:
+    """All sums whose terms come out positive, each started from the one with one term less."""
+    found = []
+    for base in choices.bases():
+        shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
+        before = np.inf
+        for g in range(choices.max_gauss_markov + 1):
+            if g == 0 and all(process.is_line for process in base):
+                continue  # lines are no noise
+            model = Model((*base, *(GaussMarkov() for _ in range(g))))
+            design = Design(model, Scales.of(wv))
+            if design.n_free >= wv.tau.size:
+                break
+            if g:
+                shapes.append(None)
+            point = search(Profile(design, ground.target, ground.root), shapes)
+            shapes = list(point.shapes)
+            if np.any(point.x <= 0.0) or before - point.objective < tuning.USELESS:
+                if g:
+                    break
+                before = point.objective
+                continue
+            before = point.objective
+            found.append((ground.candidate(design, point), point))
+    return found or [_fallback(wv, ground)]
+
+
+def _fallback(wv: WaveletVariance, ground: _Ground) -> tuple[Candidate, Point]:
+    """White noise alone, for records too short for anything else."""
+    design = Design(Model((WhiteNoise(),)), Scales.of(wv))
+    point = search(Profile(design, ground.target, ground.root))
+    return ground.candidate(design, point), point
+
+
+def _given_shape(process: Process) -> tuple[float, ...]:
+    return tuple(float(process.values[p.name] or 0.0) for p in process.shape_parameters)

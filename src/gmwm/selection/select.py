@@ -1,0 +1,302 @@
+"""Which model: the best of a ranking that the data support."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import Any, ClassVar, Self, cast
+
+from gmwm._core import checks
+from gmwm._core.documents import Document
+from gmwm._core.text import wrapped
+from gmwm.errors import InputError
+from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
+from gmwm.process import GaussMarkov, Model, Process, WhiteNoise
+from gmwm.selection import tuning
+from gmwm.selection.ranking import (
+    MAX_GAUSS_MARKOV,
+    Candidate,
+    Choices,
+    candidate_of,
+    rank,
+    rank_key,
+)
+from gmwm.selection.ties import ranges
+from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
+
+RULES = ("criterion", "merge")
+_SHOWN = 12
+_REDUNDANT = ("amplitude-bound", "search-limit", "redundant-term", "indistinct-terms")
+
+
+@dataclass(frozen=True, repr=False)
+class Selection(Document):
+    """Candidate models, best first, and the fit of the chosen one.
+
+    Attributes
+    ----------
+    ranking : tuple of Candidate
+    chosen : Candidate
+    fit : Fit
+        Of the chosen model.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.selection"
+
+    ranking: tuple[Candidate, ...]
+    chosen: Candidate
+    fit: Fit
+
+    @property
+    def model(self) -> Model:
+        """The chosen model with its estimated values."""
+        return self.fit.model
+
+    @property
+    def ties(self) -> tuple[Candidate, ...]:
+        """Candidates within 2 of the best criterion, which the data hardly tell apart."""
+        limit = rank_key(self.ranking[0]) + tuning.TIE
+        return tuple(item for item in self.ranking if rank_key(item) <= limit)
+
+    @cached_property
+    def rivals(self) -> tuple[Fit, ...]:
+        """Fits of the other candidates that tie, but for those with a redundant term.
+
+        These are as good as the model without the term.
+        """
+        others = [item for item in self.ties if item is not self.chosen][: tuning.RIVALS]
+        fits = [_fitted(item.model, self.fit.wv) for item in others]
+        return tuple(fit for fit in fits if not _has_redundant_term(fit))
+
+    def ranges(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """What is known of each parameter where several models tie: all of their intervals.
+
+        A parameter of the chosen model is found in another by its name, those of Gauss-Markov
+        terms by the nearest correlation time, one to one. Where the other model does without the
+        term, the range of its amplitude begins at zero. At most five rivals are fitted, the best.
+
+        Parameters
+        ----------
+        level : float, optional
+            Of the intervals that the ranges are made of.
+
+        Returns
+        -------
+        dict
+            Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model;
+            `Fit.interval` where nothing ties.
+
+        Raises
+        ------
+        InputError
+            If ``level`` is not between 0 and 1.
+        """
+        return ranges(self.fit, self.rivals, checks.share("level", level, 0.95))
+
+    def __iter__(self) -> Iterator[Candidate]:
+        return iter(self.ranking)
+
+    def __len__(self) -> int:
+        return len(self.ranking)
+
+    def __getitem__(self, index: int) -> Candidate:
+        return self.ranking[index]
+
+    def content(self) -> dict[str, Any]:
+        """What it cannot be rebuilt without, in JSON types."""
+        return {
+            "ranking": [item.to_dict() for item in self.ranking],
+            "chosen": self.ranking.index(self.chosen),
+            "fit": self.fit.to_dict(),
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        """Inverse of `content`."""
+        ranking = tuple(map(Candidate.from_dict, content["ranking"]))
+        fitted = content["fit"]
+        kind = JointFit if fitted["schema"] == JointFit.SCHEMA else Fit
+        return cls(ranking, ranking[content["chosen"]], kind.from_dict(fitted))
+
+    def __repr__(self) -> str:
+        return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        best = self.ranking[0].criterion
+        ties = self.ties
+        lines = [f"{'':2}{'difference':>10} {'objective':>10} {'p-value':>8} {'param.':>6}  model"]
+        for item in self.ranking[:_SHOWN]:
+            mark = ">" if item is self.chosen else " "
+            tie = "=" if len(ties) > 1 and item in ties else " "
+            row = (
+                f"{mark}{tie}{item.criterion - best:>10.4g} {item.objective:>10.4g} "
+                f"{item.p_value:>8.2g} {item.n_parameters:>6}  "
+            )
+            lines += wrapped(item.model.title(), first=row, indent=len(row))
+        if len(self.ranking) > _SHOWN:
+            lines.append(f"  and {len(self.ranking) - _SHOWN} more")
+        if len(ties) > 1:
+            lines.append("= these tie: the data hardly tell them apart, the simplest is preferred")
+        if self.chosen not in ties:
+            lines += wrapped(
+                "it is simpler than the first, and as good under weights of its own",
+                first="> ", indent=2,
+            )  # fmt: skip
+        return "\n".join(lines)
+
+
+def select(
+    data: Data | Sequence[Data],
+    dt: float | None = None,
+    *,
+    max_gauss_markov: int = MAX_GAUSS_MARKOV,
+    extra: Sequence[Process] = (),
+    rule: str = "criterion",
+) -> Selection:
+    """Rank the candidate models of a series and fit the best one.
+
+    Parameters
+    ----------
+    data : WaveletVariance, Channel or (n,) array_like, or a list of them
+        Several recordings have one model; see `gmwm.estimate.result.joint.JointFit`.
+    dt : float, optional
+        Sampling interval, s; needed for an array.
+    max_gauss_markov : int, optional
+        Largest number of Gauss-Markov terms.
+    extra : sequence of Process, optional
+        Further terms that a model may have, of given shape and open amplitude, such as
+        ``Sinusoid(frequency=0.565)`` or ``BiasInstability()``.
+    rule : {"criterion", "merge"}, optional
+        "merge" is the way of Stebler et al. (2012): white noise (and ``extra``) with as many
+        Gauss-Markov processes as allowed, one less while two do not differ significantly or one is
+        redundant. The ranking then holds the models on that way, each under its own weights.
+
+    Returns
+    -------
+    Selection
+
+    Raises
+    ------
+    InputError
+        If the data cannot be used, an extra term has an open shape, or the rule is unknown.
+
+    Notes
+    -----
+    All candidates are compared under the same weights, those of a rich mixture fitted to the
+    wavelet variances, with the discrepancy that this mixture shows. The criterion is the chi-square
+    on cube roots (see `gmwm.estimate.problem.whitening.chi_square`) with the penalty ``2 c p ln ln
+    n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
+    (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
+    without one pays the squared slope over its variance; it must win by a margin of 6, for a
+    straight line passes through any slow drift that is seen only once. Terms that come out as zero
+    make a model equal to a smaller one, and it is left out of the ranking. Models within 2 of the
+    best are a tie, in which the smaller one wins. Of the best candidates the first one is chosen
+    whose own fit finds all of its terms identifiable and misses no averaging time by far
+    (`Goodness.is_excluded`). The mixture follows coarse levels that are low by chance and gives
+    them small errors, so that a random walk may look worse than a Gauss-Markov process of long
+    correlation time: a simpler candidate that is as good by its own fit, under the weights that it
+    implies itself, is preferred.
+    """
+    if not isinstance(extra, Iterable):
+        raise InputError(
+            f"extra = {checks.shown(extra)}: give a list of processes, as in "
+            "[Sinusoid(frequency=0.5)]"
+        )
+    choices = Choices(max_gauss_markov, tuple(extra))
+    if are_several(data):
+        parts = [as_wavelet_variance(part, dt) for part in cast("Sequence[Data]", data)]
+        wv: WaveletVariance = PooledVariance.of(parts)
+    else:
+        wv = as_wavelet_variance(cast("Data", data), dt)
+    if checks.choice("rule", rule, RULES) == "merge":
+        return _by_merging(wv, choices)
+    ranking = tuple(rank(wv, choices))
+    tried = []
+    for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
+        fitted = _fitted(candidate.model, wv)
+        if fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded):
+            return Selection(ranking, *_simplest_by_own_fit(ranking, candidate, fitted, wv))
+        tried.append((candidate, fitted))
+    # A term too many does less harm than a level that is missed.
+    best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
+    return Selection(ranking, *best)
+
+
+def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
+    """All Gauss-Markov processes allowed, one fewer while two are alike or one is redundant."""
+    base = (WhiteNoise(), *choices.extra)
+    fits: list[Fit] = []
+    for g in range(choices.max_gauss_markov, -1, -1):
+        if g and len(base) + 2 * g >= wv.tau.size:
+            continue
+        fits.append(_fitted(Model((*base, *(GaussMarkov() for _ in range(g)))), wv))
+        if not _gauss_markov_is_redundant(fits[-1]):
+            break
+    ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
+    return Selection(ranking, ranking[0], fits[-1])
+
+
+def _fitted(model: Model, wv: WaveletVariance) -> Fit:
+    return estimate(model, wv.parts if isinstance(wv, PooledVariance) else wv)
+
+
+def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
+    """The ranking with the candidates that tie with the best one ordered by size."""
+    limit = rank_key(ranking[0]) + tuning.TIE
+    tied = [item for item in ranking if rank_key(item) <= limit]
+    tied.sort(key=lambda item: item.n_parameters)
+    return tied + list(ranking[len(tied) :])
+
+
+def _simplest_by_own_fit(
+    ranking: Sequence[Candidate], best: Candidate, fitted: Fit, wv: WaveletVariance
+) -> tuple[Candidate, Fit]:
+    """A simpler candidate that is as good under the weights that it implies, or the best one."""
+    limit = rank_key(best) + tuning.CONTEST
+    simpler = [
+        item
+        for item in ranking
+        if item.n_parameters < best.n_parameters
+        and rank_key(item) <= limit
+        and _has_ramp(item.model) == _has_ramp(best.model)
+    ]
+    for candidate in simpler[: tuning.COMPARED]:
+        other = _fitted(candidate.model, wv)
+        as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + tuning.TIE
+        as_good = as_good and other.discrepancy <= fitted.discrepancy
+        if as_good and not (_has_redundant_term(other) or other.goodness.is_excluded):
+            return candidate, other
+    return best, fitted
+
+
+def _own_criterion(candidate: Candidate, fitted: Fit) -> float:
+    """The criterion with the chi-square of the candidate's own fit."""
+    statistic = fitted.chi_square if fitted.dof > 0 else 0.0
+    return candidate.criterion - candidate.chi_square + statistic
+
+
+def _has_ramp(model: Model) -> bool:
+    return any(term.is_drift for term in model.terms)
+
+
+def _gauss_markov_is_redundant(fitted: Fit) -> bool:
+    """Whether two Gauss-Markov terms are alike, or one is not supported by the data."""
+    model = fitted.model
+    terms = {i for i, term in enumerate(model.terms) if term.ordered_by}
+    if any(i.term in terms and i.key in fitted.upper_bounds for i in model.parameters):
+        return True
+    kind = GaussMarkov.__name__
+    return any(
+        notice.code == "indistinct-terms" or notice.values.get("process") == kind
+        for notice in fitted.notices
+    )
+
+
+def _has_redundant_term(fitted: Fit) -> bool:
+    """Whether some term of the model is not supported by the data."""
+    return any(notice.code in _REDUNDANT for notice in fitted.notices)

@@ -1,0 +1,114 @@
+"""What stays open where several models describe the data equally well.
+
+The interval of a parameter holds if its model is the right one. Where other models are as good, the
+parameter of each of them is as good an answer, and their intervals together tell what is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from gmwm._core.units import field_units
+from gmwm.estimate.result import Fit
+from gmwm.process import Model, Process
+from gmwm.selection import tuning
+
+Ranges = dict[str, tuple[float, float]]
+
+
+def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
+    """Union of the intervals of each parameter over several models.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Of the chosen model.
+    others : sequence of Fit
+        Of the models that are as good.
+    level : float, optional
+
+    Returns
+    -------
+    dict
+        Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model. An
+        amplitude or slope of a term that one of the others does without has zero in its range.
+    """
+    result = dict(fitted.interval(level))
+    for other in others:
+        intervals = other.interval(level)
+        partner = _partners(fitted.model, other.model)
+        keys = {(i.term, i.parameter.name): i.key for i in other.model.parameters}
+        for item in fitted.model.parameters:
+            if item.key not in result:
+                continue
+            low, high = result[item.key]
+            match = partner[item.term]
+            if match is None:
+                if item.parameter.role != "shape":
+                    result[item.key] = (min(low, 0.0), max(high, 0.0))
+                continue
+            found = intervals.get(keys[match, item.parameter.name])
+            if found is not None:
+                result[item.key] = (min(low, found[0]), max(high, found[1]))
+    return result
+
+
+def _partners(model: Model, other: Model) -> list[int | None]:
+    """For each term of a model, that of the other which stands for the same noise.
+
+    Gauss-Markov terms go one to one, those of the nearest correlation times together.
+    """
+    partners: list[int | None] = []
+    for term in model.terms:
+        alike = [k for k, candidate in enumerate(other.terms) if _same(term, candidate)]
+        partners.append(alike[0] if alike else None)
+    own, theirs = _correlation_times(model), _correlation_times(other)
+    if own and theirs:
+        first, second = (np.log(list(times.values())) for times in (own, theirs))
+        rows, columns = linear_sum_assignment(np.abs(first[:, None] - second))
+        for row, column in zip(rows, columns, strict=True):
+            partners[list(own)[row]] = list(theirs)[column]
+    return partners
+
+
+def _same(term: Process, other: Process) -> bool:
+    """Whether two terms are of one kind; those of a shape were given the same."""
+    if type(term) is not type(other) or term.ordered_by:
+        return False
+    return all(term.values[p.name] == other.values[p.name] for p in term.shape_parameters)
+
+
+def _correlation_times(model: Model) -> dict[int, float]:
+    terms = enumerate(model.terms)
+    return {k: float(t.values[t.ordered_by] or 1.0) for k, t in terms if t.ordered_by}
+
+
+def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
+    """The parameters whose range is more than 20 % wider than their interval, in words.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Of the chosen model.
+    found : dict
+        From `ranges`, at 95 %.
+    """
+    intervals = fitted.interval()
+    said = []
+    for estimate in fitted.estimates:
+        key = estimate.key
+        if key not in found:
+            continue
+        (low, high), (a, b) = found[key], intervals[key]
+        if not high - low > tuning.WIDER * (b - a):
+            continue
+        parameter = next(i.parameter for i in fitted.model.parameters if i.key == key)
+        units = field_units(parameter.unit, fitted.wv.quantity)
+        unit, factor = (units[0].unit, units[0].per_si) if units else (estimate.unit, 1.0)
+        low, high, a, b = (value * factor for value in (low, high, a, b))
+        ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
+        said.append(f"{key} {ends} {unit} rather than {a:.3g} to {b:.3g}")
+    return said

@@ -1,0 +1,41 @@
+"""Constants of the selection that change answers, each with its source or its reason.
+
+``python benchmarks/tuning.py`` halves and doubles every one of them; what that does stands in
+docs/method.md.
+"""
+
+STRICTNESS = 1.5
+"""The c of Hannan & Quinn (1979); consistent above 1."""
+
+TIE = 2.0
+"""Difference of the criterion within which the data hardly tell models apart (twice the
+log-likelihood: Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
+
+RAMP_MARGIN = 6.0
+"""Of the criterion, by which a rate ramp must win: a straight line passes through any slow drift
+that is seen only once."""
+
+RAMP_PLAUSIBLE = 2.0
+"""Squared slope over its variance, below which no ramp is tried."""
+
+RAMP_ROUNDS = 3
+"""Rounds of the slope under the mixture that is left without it."""
+
+USELESS = 1.0
+"""Gain of a Gauss-Markov process in the objective below which the search for more ends."""
+
+FITS = 5
+"""Candidates that are fitted in full before the best one is taken as it is, and candidates without
+a ramp whose own noise prices the slope."""
+
+CONTEST = 40.0
+"""Of the criterion, up to which simpler candidates are compared by their own fit ..."""
+
+COMPARED = 3
+"""... and how many of them."""
+
+RIVALS = 5
+"""Models of a tie that are fitted to show what it leaves open."""
+
+WIDER = 1.2
+"""Times the interval, from which on the range of a tie is reported."""

@@ -1,0 +1,122 @@
+"""A demonstration on simulated data: the MEMS IMU of the PLANS 2012 paper, Table VI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.units import SI_UNIT, factor, field_units
+from gmwm.estimate.result import Fit
+from gmwm.process import GaussMarkov, Model, WhiteNoise
+from gmwm.readers import Channel, Recording
+
+RATE = 100.0
+"""Hz."""
+
+_DEG_PER_HOUR = factor("deg/h", "rad/s")
+_GYRO_DENSITY = factor("deg/h/sqrt(Hz)", "rad/s/sqrt(Hz)")
+_MICRO_G = factor("ug", "m/s^2")
+_ACCEL_DENSITY = factor("ug/sqrt(Hz)", "m/s^2/sqrt(Hz)")
+
+
+def table_six() -> dict[str, Model]:
+    """The paper's Table VI models by quantity, in SI units.
+
+    Gauss-Markov standard deviations in deg/h and ug, correlation times 1/beta in seconds.
+    """
+    gyro = WhiteNoise(140.0 * _GYRO_DENSITY) + Model(
+        tuple(
+            GaussMarkov(sigma * _DEG_PER_HOUR, 1.0 / beta)
+            for sigma, beta in ((113.0, 0.0005), (65.0, 0.05), (206.0, 10.0))
+        )
+    )
+    accel = WhiteNoise(140.0 * _ACCEL_DENSITY) + Model(
+        tuple(
+            GaussMarkov(sigma * _MICRO_G, 1.0 / beta)
+            for sigma, beta in ((5.0, 0.04), (13.0, 0.002))
+        )
+    )
+    return {"gyro": gyro, "accel": accel}
+
+
+def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model]]:
+    """A six-axis static recording and the model of each of its channels.
+
+    Parameters
+    ----------
+    seconds : float
+        Length.
+    seed : int
+
+    Returns
+    -------
+    Recording
+    dict
+        Channel name -> Model that made it.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(seconds * RATE)
+    truth = {
+        f"{quantity}_{axis}": model for quantity, model in table_six().items() for axis in "xyz"
+    }
+    channels = []
+    for name, model in truth.items():
+        quantity = name.split("_")[0]
+        values = model.simulate(n, 1.0 / RATE, rng)
+        channels.append(Channel(name, values, 1.0 / RATE, quantity, SI_UNIT[quantity]))
+    source = f"simulated IMU, seed {seed}"
+    return Recording(tuple(channels), source), truth
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A true value beside its estimate, in the units of the field.
+
+    Attributes
+    ----------
+    channel, what, unit : str
+    truth, estimate, lower, upper : float
+        With the 95 % interval.
+    """
+
+    channel: str
+    what: str
+    truth: float
+    estimate: float
+    lower: float
+    upper: float
+    unit: str
+
+    @property
+    def determined(self) -> bool:
+        """Whether the record says anything about it."""
+        return bool(np.isfinite(self.upper))
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval holds the truth."""
+        return self.lower <= self.truth <= self.upper
+
+
+def compare(fitted: Fit, truth: Model) -> list[Comparison]:
+    """True parameters beside those estimated for a model of the same form."""
+    intervals = fitted.interval()
+    rows = []
+    for item in truth.parameters:
+        key, value = item.key, item.value or 0.0
+        units = field_units(item.parameter.unit, fitted.wv.quantity)
+        unit, scale = (units[0].unit, units[0].per_si) if units else (item.parameter.unit, 1.0)
+        low, high = intervals.get(key, (0.0, np.inf))
+        rows.append(
+            Comparison(
+                channel=fitted.wv.name,
+                what=key,
+                truth=value * scale,
+                estimate=fitted.params[key] * scale,
+                lower=low * scale,
+                upper=high * scale,
+                unit=unit,
+            )
+        )
+    return rows

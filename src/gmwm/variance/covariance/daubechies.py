@@ -1,0 +1,194 @@
+"""Covariance of the wavelet variance estimates of a Gaussian process, for any wavelet.
+
+The theory is that of `gmwm.variance.covariance.haar`: with M_j coefficients W_j free of end
+effects, and c_jk(h) pairs of them at lag h,
+
+    cov(nu2_j, nu2_k) = 2 / (M_j M_k) sum_h c_jk(h) g_jk(h)^2,
+
+g_jk being their cross-covariance (Serroukh, Walden & Percival 2000, *JASA* 95, 184-196). Sums over
+all lags with min(M_j, M_k) pairs each are spectral integrals, whose weights are those of
+`gmwm.process.wavelet_gain`. For the coarse levels they are multiplied by the ratio of the two sums,
+over the lags that are multiples of a block of samples: g_jk^2 is smooth on that scale. Nothing
+supposes that filters are symmetric: their transfer functions enter with their phases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process import PSD, ComplexArray, Wavelet, evaluated, pair_weights, unit_legendre, wavelet
+from gmwm.variance.covariance.lags import LagGrid, block_of
+
+_LEAST_LAGS = 2048  # memory may be longer than a short record
+_FOLDS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class _LagSums:
+    """Everything about the coarse levels that does not depend on the spectrum.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first of the C coarse levels.
+    frequency : (A, F) ndarray
+        Fourier frequencies of the lag sums and their aliases, cycles per sample, unsigned.
+    transfer : (C, A, F) ndarray
+        Transfer functions there.
+    counts : (C, C, size) ndarray
+        Pairs at each lag, relative to min(M_j, M_k).
+    grid : LagGrid
+    """
+
+    first: int
+    frequency: FloatArray
+    transfer: ComplexArray
+    counts: FloatArray
+    grid: LagGrid
+
+
+@lru_cache(maxsize=4)
+def _lag_sums(name: str, n: int, levels: int) -> _LagSums:
+    filters = wavelet(name)
+    block, first = block_of(n)
+    coarse = range(min(first, levels) + 1, levels + 1)
+    grid = LagGrid.holding(max(3 * n / block, _LEAST_LAGS), block)
+    folds = np.arange(max(-_FOLDS, -(block // 2)), min(_FOLDS, (block - 1) // 2) + 1)
+    signed = (grid.frequency + folds[:, None]) / block
+    transfer = np.empty((len(coarse), *signed.shape), dtype=complex)
+    for row, level in enumerate(coarse):
+        transfer[row] = _transfer(filters, level, signed)
+    lag = block * grid.lag
+    counts = np.array([[_counts(filters, n, j, k, lag, block) for k in coarse] for j in coarse])
+    return _LagSums(first, np.abs(signed), transfer, counts, grid)
+
+
+def _transfer(filters: Wavelet, level: int, f: FloatArray) -> ComplexArray:
+    """Transfer function, with all digits of its size where it is minute."""
+    response = filters.transfer(level, f)
+    return np.asarray(np.sqrt(filters.gain(level, f)) * np.exp(1j * np.angle(response)))
+
+
+def _counts(
+    filters: Wavelet, n: int, j: int, k: int, lag: npt.NDArray[np.intp], block: int
+) -> FloatArray:
+    """Number of coefficients s of level j and t of level k with s - t about ``lag``.
+
+    It is a trapezium in the lag, which may be narrower than a block: its mean under a triangle
+    of one block to either side is given, relative to min(M_j, M_k). As the sum of four ramps
+    max(x, 0) it is a second difference of |x| (x^2 - 1) / 12.
+    """
+    first, second = (n - filters.width(level) + 1 for level in (j, k))
+    begin = filters.width(j) - 1 - n
+    total = np.zeros(lag.size)
+    for corner, sign in ((0, 1.0), (first, -1.0), (second, -1.0), (first + second, 1.0)):
+        for shift, factor in ((-block, 1.0), (0, -2.0), (block, 1.0)):
+            x = np.abs(lag - begin - corner + shift).astype(float)
+            total += sign * factor * x * (x * x - 1.0)
+    total /= 12.0 * block**2
+    outside = (lag <= begin - block) | (lag >= begin + first + second + block)
+    total[outside] = 0.0
+    return np.asarray(total / min(first, second))
+
+
+def _end_effects(psd: PSD, dt: float, sums: _LagSums, moments: int) -> FloatArray:
+    """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
+    density = evaluated(psd, sums.frequency.ravel() / dt, dt).reshape(sums.frequency.shape)
+    zero = np.flatnonzero(sums.frequency[:, 0] * sums.grid.size * sums.grid.block < 0.5)
+    density[zero, 0] = _at_zero(psd, dt, sums, moments, density[zero, 1])
+    weighted = sums.transfer * density
+    levels = sums.transfer.shape[0]
+    result = np.ones((levels, levels))
+    for j in range(levels):
+        cross_spectrum = np.sum(weighted[j] * np.conj(sums.transfer[j:]), axis=1)
+        square = sums.grid.transform(cross_spectrum) ** 2
+        total = np.sum(square, axis=-1)
+        seen = np.sum(sums.counts[j, j:] * square, axis=-1)
+        np.divide(seen, total, out=result[j, j:], where=total > 0.0)
+        result[j:, j] = result[j, j:]
+    return result
+
+
+def _at_zero(
+    psd: PSD, dt: float, sums: _LagSums, moments: int, neighbour: FloatArray
+) -> FloatArray:
+    """What stands for the spectrum in the bin at zero frequency.
+
+    The product of two gains and the spectrum is f^2r S(f) there. It is given its mean over the bin
+    less what a smooth function would have curved there.
+    """
+    x, w = unit_legendre(8)
+    bin_width = 1.0 / (sums.grid.size * sums.grid.block)
+    f = 0.5 * x
+    zero = sums.grid.frequency[0] * sums.grid.size  # in bins
+    mean = w @ (f ** (2 * moments) * evaluated(psd, f * bin_width / dt, dt))
+    return np.asarray(np.maximum(12.0 * mean - neighbour, 0.0) / 11.0 / zero ** (2 * moments))
+
+
+def wavelet_covariance(
+    psd: PSD,
+    n: int,
+    dt: float,
+    name: str,
+    levels: int,
+    lines: Sequence[tuple[float, float]] = (),
+) -> FloatArray:
+    """Covariance of the wavelet variance estimates of a Gaussian series.
+
+    Parameters
+    ----------
+    psd : callable
+        ``psd(f, dt)``, two-sided, in u^2/Hz.
+    n : int
+        Number of samples.
+    dt : float
+        Sampling interval, s.
+    name : str
+        Wavelet, see `gmwm.process.wavelets.wavelet`.
+    levels : int
+        Number of levels J.
+    lines : sequence of (float, float), optional
+        Spectral lines: frequency (Hz), amplitude a (u). Their product with the noise around them
+        adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
+
+    Returns
+    -------
+    (J, J) ndarray
+        In u^4.
+
+    Raises
+    ------
+    InputError
+        If the series has fewer levels with a coefficient free of end effects, for an unknown
+        wavelet, or a spectrum that is not finite and non-negative.
+    """
+    filters = wavelet(name)
+    if not 1 <= levels <= filters.levels(n):
+        raise InputError(
+            f"levels = {levels}: {n} samples have {filters.levels(n)} levels of wavelet "
+            f"{filters.name!r} with coefficients free of end effects"
+        )
+    weights = pair_weights(filters.name, levels)
+    density = evaluated(psd, weights.frequency / dt, dt) / dt
+    integral = 4.0 * (weights.weight @ density**2)
+    result = np.empty((levels, levels))
+    result[weights.first, weights.second] = integral
+    result[weights.second, weights.first] = integral
+    sums = _lag_sums(filters.name, n, levels)
+    if sums.transfer.size:
+        coarse = slice(sums.first, None)
+        result[coarse, coarse] *= _end_effects(psd, dt, sums, filters.vanishing_moments)
+    for frequency, amplitude in lines:
+        f = np.abs(frequency * dt - np.rint(frequency * dt))
+        gains = filters.gains(levels, f)
+        around = float(evaluated(psd, np.array([f]) / dt, dt)[0]) / dt
+        result += 2.0 * amplitude**2 * around * np.outer(gains, gains)
+    counts = np.array([n - filters.width(j) + 1 for j in range(1, levels + 1)], dtype=float)
+    return np.asarray(result / np.maximum.outer(counts, counts))

@@ -1,0 +1,205 @@
+"""Covariance of the wavelet variance estimates of a Gaussian process, from its spectrum.
+
+For two levels j, k with M_j, M_k coefficients W free of end effects,
+
+    cov(nu2_j, nu2_k) = 2 / (M_j M_k) sum_h c_jk(h) g_jk(h)^2,
+
+where g_jk is the cross-covariance of W_j and W_k at lag h and c_jk(h) the number of pairs at that
+lag (Percival 1995, *Biometrika* 82, 619-631; Serroukh, Walden & Percival 2000, *JASA* 95, 184-196).
+With c_jk(h) replaced by min(M_j, M_k), which is what it is at the lags that matter unless both
+levels are coarse, the sum is by Parseval's theorem
+
+    2 / max(M_j, M_k) int |H_j|^2 |H_k|^2 S^2 df.
+
+For the coarse levels, whose few coefficients make the counts matter, this is multiplied by the
+ratio of the two sums, with g_jk by FFT from the spectrum; in records of more than some samples the
+ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.process import PSD, haar_gain, quadrature
+from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
+
+# Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
+_MEAN_PRODUCT_EXCESS = {0: 35.0 / 128.0 - 9.0 / 64.0, 1: 7.0 / 64.0 - 9.0 / 64.0}
+
+
+def haar_counts(n: int, m: FloatArray) -> FloatArray:
+    """Number of Haar coefficients free of end effects: n - 2 m + 1."""
+    return n - 2.0 * np.asarray(m, dtype=float) + 1.0
+
+
+def dyadic_levels(n: int) -> FloatArray:
+    """Averaging times 1, 2, 4, ... in samples with at least one coefficient."""
+    return np.exp2(np.arange(int(n).bit_length() - 1, dtype=float))
+
+
+def _tent_sum(distance: FloatArray, block: int) -> FloatArray:
+    """What a kink of unit slope in the counts adds to their sum under a tent of +- block lags.
+
+    sum_h (1 - |h - x|/b)_+ (h)_+ - b (x)_+ with integer h, x: even in x, (y^3 - y)/(6 b) with
+    y = b - |x|.
+    """
+    y = np.maximum(block - np.abs(distance), 0.0)
+    return np.asarray((y**3 - y) / (6.0 * block))
+
+
+def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> FloatArray:
+    """Number of pairs of coefficients whose centres are about ``x`` samples apart.
+
+    Of ``first`` and ``second`` coefficients the number is a trapezoid in the lag. The pairs at the
+    lags between multiples of ``block`` are divided between the neighbours as a straight line would.
+    """
+    outer, inner = 0.5 * (first + second), 0.5 * abs(first - second)
+    pairs = block * np.clip(outer - np.abs(x), 0.0, min(first, second))
+    pairs += _tent_sum(x - outer, block) + _tent_sum(x + outer, block)
+    pairs -= _tent_sum(x - inner, block) + _tent_sum(x + inner, block)
+    return np.asarray(pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class _LagSums:
+    """Everything about the coarse levels that does not depend on the spectrum."""
+
+    first: int
+    grid: LagGrid
+    amplitude: FloatArray
+    counts: FloatArray
+
+
+@lru_cache(maxsize=2)
+def _lag_sums(n: int) -> _LagSums:
+    """Set-up of the sums over lags, on means of blocks of samples."""
+    m = dyadic_levels(n)
+    block, first = block_of(n)
+    grid = LagGrid.holding(3 * n / block, block)
+    available = haar_counts(n, m[first:])
+    lag = (block * grid.lag).astype(float)
+    counts = np.empty((available.size, available.size, grid.size))
+    for j, own in enumerate(available):
+        for k, other in enumerate(available):
+            counts[j, k] = centred_pairs(own, other, lag, block) / (block * min(own, other))
+    return _LagSums(first, grid, grid.haar_amplitude(m[first:] / block), counts)
+
+
+def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
+    """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
+    spectrum = block_spectrum(psd, dt, sums.grid)
+    levels = sums.amplitude.shape[0]
+    result = np.empty((levels, levels))
+    for j in range(levels):
+        cross = sums.grid.transform(sums.amplitude[j] * sums.amplitude[j:] * spectrum)
+        cross *= cross
+        result[j, j:] = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.sum(cross, axis=-1)
+        result[j:, j] = result[j, j:]
+    return result
+
+
+@lru_cache(maxsize=4)
+def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows, columns and weights of what replaced lobes take from products of gains.
+
+    Where lobes were replaced by their mean, the mean of a product of two gains is not the
+    product of the means if the averaging times are equal or differ by a factor of two.
+    """
+    grid = quadrature(averaging)
+    m = np.array(averaging)
+    rows, columns, weights = [], [], []
+    for step, excess in _MEAN_PRODUCT_EXCESS.items():
+        for j in range(m.size - step):
+            averaged = 1.0 - grid.resolved[j] * grid.resolved[j + step]
+            if np.any(averaged > 0.0):
+                rows.append(j)
+                columns.append(j + step)
+                scale = excess / (m[j] * m[j + step]) ** 2
+                weights.append(scale * averaged / np.sin(np.pi * grid.frequency) ** 4)
+    return np.array(rows, dtype=int), np.array(columns, dtype=int), np.array(weights)
+
+
+def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
+    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
+    averaging = tuple(m.tolist())
+    grid = quadrature(averaging)
+    density = grid.sampled(psd, dt)
+    scaled = grid.gain * (np.sqrt(grid.weight) * density)
+    integral = scaled @ scaled.T
+    rows, columns, weights = _excess(averaging)
+    if rows.size:
+        correction = weights @ (grid.weight * density**2)
+        integral[rows, columns] += correction
+        apart = rows != columns
+        integral[columns[apart], rows[apart]] += correction[apart]
+    return np.asarray(4.0 * integral)
+
+
+def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
+    """Covariance of the means over time of the Haar coefficients of the levels, (J, J), in u^2.
+
+    It scales what a drift adds to the covariance of the wavelet variances. At fine levels, where
+    a drift that the record can show is far below the noise, it is left at zero.
+    """
+    sums = _lag_sums(n)
+    spectrum = block_spectrum(psd, dt, sums.grid)
+    m = dyadic_levels(n)
+    counts = haar_counts(n, m)[sums.first :] / sums.grid.block
+    result = np.zeros((m.size, m.size))
+    for j in range(counts.size):
+        cross = sums.grid.transform(sums.amplitude[j] * sums.amplitude[j:] * spectrum)
+        row = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.maximum(counts[j], counts[j:])
+        result[sums.first + j, sums.first + j :] = row
+        result[sums.first + j :, sums.first + j] = row
+    return result
+
+
+def haar_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
+    """Covariance of the Haar wavelet variance estimates of a Gaussian series.
+
+    Parameters
+    ----------
+    psd : callable
+        ``psd(f, dt)``, two-sided, in u^2/Hz.
+    n : int
+        Number of samples.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    (J, J) ndarray
+        In u^4, for the levels of `dyadic_levels`.
+    """
+    m = dyadic_levels(n)
+    counts = haar_counts(n, m)
+    covariance = integrals(psd, dt, m) / np.maximum.outer(counts, counts)
+    sums = _lag_sums(n)
+    covariance[sums.first :, sums.first :] *= _end_effects(psd, dt, sums)
+    return covariance
+
+
+def line_covariance(
+    lines: tuple[tuple[float, float], ...],
+    psd: PSD,
+    dt: float,
+    m: FloatArray,
+    counts: FloatArray,
+) -> FloatArray:
+    """What spectral lines add to the covariance: their product with the noise around them.
+
+    A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
+    """
+    total = np.zeros((m.size, m.size))
+    for frequency, amplitude in lines:
+        f = np.array([abs(frequency * dt - np.rint(frequency * dt))])
+        gain = np.array([haar_gain(value, f)[0] for value in m])
+        density = float(np.asarray(psd(f / dt, dt))[0]) / dt
+        total += (
+            2.0 * amplitude**2 * density * np.outer(gain, gain) / np.maximum.outer(counts, counts)
+        )
+    return total

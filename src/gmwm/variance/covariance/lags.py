@@ -1,0 +1,123 @@
+"""Sums over lags by FFT: the lags, the frequencies, and means of blocks of samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy import fft
+
+from gmwm._core.typing import FloatArray
+from gmwm.process import PSD, legendre
+
+EXACT_SAMPLES = 2048
+"""Longest record whose lags are single samples; longer ones are taken in blocks."""
+
+_BLOCKS = 1024
+_BLOCKS_PER_AVERAGE = 8  # averaging times of fewer blocks are left to the spectral integral
+_FOLDS = 2
+_ZERO = 1e-4  # of a bin: the frequency that stands for zero
+
+
+@dataclass(frozen=True)
+class LagGrid:
+    """Lags of covariances that are found by FFT, in blocks of samples.
+
+    Attributes
+    ----------
+    size : int
+        Number of lags, even.
+    block : int
+        Samples from lag to lag.
+    """
+
+    size: int
+    block: int
+
+    @classmethod
+    def holding(cls, lags: float, block: int) -> LagGrid:
+        """A grid of at least so many lags, of a size that is quick to transform."""
+        size = int(fft.next_fast_len(int(lags), real=True))
+        return cls(size + size % 2, block)
+
+    @cached_property
+    def frequency(self) -> FloatArray:
+        """Fourier frequencies, cycles per block; a small one stands for zero."""
+        result = np.arange(self.size // 2 + 1) / self.size
+        result[0] = _ZERO / self.size
+        return result
+
+    @cached_property
+    def lag(self) -> npt.NDArray[np.intp]:
+        """Lags in blocks, the negative ones at the end."""
+        result = np.arange(self.size)
+        result[self.size // 2 + 1 :] -= self.size
+        return result
+
+    def haar_amplitude(self, averaging: FloatArray) -> FloatArray:
+        """Gain of Haar filters over their phase on block means, (len(averaging), F).
+
+        ``averaging`` are averaging times in blocks.
+        """
+        scaled = np.asarray(averaging)[:, None]
+        result = np.sin(np.pi * scaled * self.frequency) ** 2
+        result /= scaled * np.sin(np.pi * self.frequency)
+        return result
+
+    def transform(self, spectrum: FloatArray) -> FloatArray:
+        """Covariances at the lags from spectra at the frequencies, along the last axis."""
+        return np.asarray(fft.irfft(spectrum, self.size, axis=-1))
+
+
+def block_of(n: int) -> tuple[int, int]:
+    """Samples per block in a record of ``n``, and the first level that lags are summed for."""
+    if n <= EXACT_SAMPLES:
+        return 1, 0
+    block = 2 ** int(np.floor(np.log2(n / _BLOCKS)))
+    return block, int(np.log2(block * _BLOCKS_PER_AVERAGE))
+
+
+def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> FloatArray:
+    """Spectrum of means over blocks of samples, in u^2 per cycle per block.
+
+    The spectrum of block means is that of the running mean, folded ``block`` times. The nearest
+    folds are summed; the smoothing of all others shares the factor sin^2(pi f), and their sum is
+    an integral over the rest of the band.
+    """
+    if block == 1:
+        return np.asarray(psd(frequency / dt, dt)) / dt
+    total = np.zeros_like(frequency)
+    folds = min(_FOLDS, block // 2)
+    for fold in range(-folds, folds + 1):
+        f = np.abs(frequency + fold) / block
+        smoothing = (np.sin(np.pi * block * f) / (block * np.sin(np.pi * f))) ** 2
+        # With an even number of folds the outermost one is half of the fold on either side.
+        share = 0.5 if 2 * abs(fold) == block else 1.0
+        total += share * smoothing * np.asarray(psd(f / dt, dt)) / (block * dt)
+    x, w = legendre(256)
+    low = (folds + 0.5) / block
+    if low < 0.5:
+        rest = low * (0.5 / low) ** (0.5 * (x + 1.0))
+        weight = 0.5 * w * rest * np.log(0.5 / low)
+        integral = 2.0 * weight @ (np.asarray(psd(rest / dt, dt)) / dt / np.sin(np.pi * rest) ** 2)
+        total += (np.sin(np.pi * frequency) / block) ** 2 * integral
+    return total
+
+
+def block_spectrum(psd: PSD, dt: float, grid: LagGrid) -> FloatArray:
+    """`block_density` at the Fourier frequencies of a grid.
+
+    The product of two gains and the spectrum is f^2 S(f) near zero frequency. What stands for
+    its bin at zero is its mean over the bin less what a smooth function would have curved there:
+    exact for short memory, where it vanishes, and for a random walk, where it is constant.
+    """
+    frequency = grid.frequency
+    result = block_density(psd, dt, frequency, grid.block)
+    x, w = legendre(8)
+    f = 0.25 / grid.size * (x + 1.0)
+    mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, grid.block))
+    bin_value = (12.0 * mean - frequency[1] ** 2 * result[1]) / 11.0
+    result[0] = max(bin_value, 0.0) / frequency[0] ** 2
+    return result

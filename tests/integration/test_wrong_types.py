@@ -1,0 +1,399 @@
+"""Values of the wrong type, size or shape: one sentence, never a traceback of another kind."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import (
+    ARMA,
+    Channel,
+    Fit,
+    GaussMarkov,
+    InputError,
+    JointFit,
+    Process,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+    parameter,
+)
+from gmwm._core import checks
+
+TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
+MODEL = TRUTH.opened()
+X = TRUTH.simulate(1000, 1.0, seed=1)
+WV = gmwm.wavelet_variance(X, 1.0)
+FIT = gmwm.fit(MODEL, WV)
+
+
+def refused(call, words):
+    """Whether the call ends in one sentence with these words."""
+    with pytest.raises(InputError) as caught:
+        call()
+    said = str(caught.value)
+    assert words in said
+    assert "\n" not in said
+    assert len(said) < 300
+
+
+# -- numbers --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "value", ["a", None, True, 1j, [1.0], np.ones(2), np.nan, np.inf, 10**400, {}, np.ones(10**4)]
+)
+def test_what_is_no_number_is_refused_everywhere(value):
+    refused(lambda: checks.positive("x", value), "x = ")
+    refused(lambda: checks.whole("x", value, 0), "x = ")
+    refused(lambda: checks.share("x", value, 0.5), "x = ")
+    refused(lambda: checks.sampling_interval(value), "dt = ")
+    refused(lambda: checks.samples(value), "n = ")
+
+
+@pytest.mark.parametrize("value", [8, 8.0, np.int32(8), np.float32(8), np.float64(8)])
+def test_numbers_of_every_type_are_taken(value):
+    assert checks.positive("x", value) == checks.whole("x", value, 8) == 8
+    assert isinstance(checks.whole("x", value, 0), int)
+    assert checks.samples(value, 8) == 8
+
+
+@pytest.mark.parametrize(
+    ("n", "dt", "words"),
+    [
+        ("a", 1.0, "n = 'a': give a whole number of samples, 8 or more"),
+        (7, 1.0, "n = 7"),
+        (100.5, 1.0, "n = 100.5"),
+        (1e13, 1.0, "too long"),
+        (100, "a", "dt = 'a': give a positive sampling interval"),
+        (100, None, "dt = None"),
+        (100, -1.0, "dt = -1.0"),
+        (100, 1e300, "1e-09 to 1e+06"),
+    ],
+)
+def test_bound_of_no_record(n, dt, words):
+    refused(lambda: gmwm.cramer_rao(TRUTH, n, dt), words)
+
+
+def test_a_bound_takes_a_whole_number_written_as_a_float():
+    assert gmwm.cramer_rao(TRUTH, 1e3, 1).stderr == gmwm.cramer_rao(TRUTH, 1000, 1.0).stderr
+
+
+@pytest.mark.parametrize(
+    ("n", "dt", "seed", "words"),
+    [
+        ("a", 1.0, None, "n = 'a'"),
+        (0, 1.0, None, "n = 0"),
+        (1e13, 1.0, None, "too long"),
+        (10, "a", None, "dt = 'a'"),
+        (10, np.nan, None, "dt = nan"),
+        (10, 1.0, -1, "seed = -1"),
+        (10, 1.0, "a", "seed = 'a'"),
+        (10, 1.0, 1.5, "seed = 1.5"),
+    ],
+)
+def test_simulation_of_nothing(n, dt, seed, words):
+    refused(lambda: gmwm.simulate(TRUTH, n, dt, seed), words)
+    refused(lambda: WhiteNoise(1.0).simulate(n, dt, seed), words)
+
+
+def test_a_series_that_fills_the_memory_is_said_to(monkeypatch):
+    def full(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(WhiteNoise, "draw", full)
+    refused(lambda: gmwm.simulate(WhiteNoise(1.0), 100, 1.0), "memory")
+
+
+# -- options --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("method", "option", "value"),
+    [
+        ("em", "tolerance", "a"),
+        ("em", "tolerance", -1.0),
+        ("em", "max_iterations", "a"),
+        ("em", "max_iterations", 1.5),
+        ("em", "accelerate", "yes"),
+        ("em", "accelerate", 1),
+        ("em", "drift", ["ramp"]),
+        ("mle", "start", "a"),
+        ("gmwm", "discrepancy", "a"),
+        ("gmwm", "discrepancy", 1.0),
+        ("gmwm", "omega", np.ones(3)),
+        ("gmwm", "omega", ["model"]),
+        ("simulated", "replications", "a"),
+        ("simulated", "replications", 0),
+        ("simulated", "seed", "a"),
+        ("simulated", "seed", -1),
+        ("allan", "regions", {"N": (-1.0, 10.0)}),
+        ("allan", "regions", {"N": 3}),
+        ("allan", "regions", "N"),
+    ],
+)
+def test_options_of_a_fit(method, option, value):
+    said = "'a' is no error model" if option == "start" else option
+    channel = Channel("", X, 1.0)
+    refused(lambda: gmwm.fit(MODEL, channel, method=method, **{option: value}), said)
+
+
+@pytest.mark.parametrize("method", [np.ones(3), ["gmwm"], 3, "GMWM"])
+def test_no_method(method):
+    refused(lambda: gmwm.fit(MODEL, WV, method=method), "known are gmwm,")
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("efficiency", "a"),
+        ("confidence", "a"),
+        ("confidence", 95),
+        ("robust", "yes"),
+        ("wavelet", ["db4"]),
+        ("wavelet", 4),
+        ("data_covariance", "foo"),
+        ("data_covariance", np.ones(2)),
+    ],
+)
+def test_options_of_a_wavelet_variance(option, value):
+    refused(lambda: gmwm.wavelet_variance(X, 1.0, **{option: value}), option)
+
+
+@pytest.mark.parametrize("level", ["a", None, 0.0, 95, np.array([0.5, 0.6])])
+def test_level_of_an_interval(level):
+    refused(lambda: FIT.interval(level), "level = ")
+    refused(lambda: FIT.deviation_interval([1.0], level), "level = ")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"max_gauss_markov": "a"}, "max_gauss_markov = 'a'"),
+        ({"max_gauss_markov": 1.5}, "max_gauss_markov = 1.5"),
+        ({"extra": "a"}, "extra holds 'a'"),
+        ({"extra": WhiteNoise()}, "extra = WhiteNoise(): give a list"),
+    ],
+)
+def test_options_of_a_selection(options, words):
+    refused(lambda: gmwm.select(WV, **options), words)
+
+
+def test_options_of_a_bootstrap():
+    refused(lambda: gmwm.bootstrap(FIT, "a"), "runs = 'a'")
+    refused(lambda: gmwm.bootstrap(FIT, 5, "a"), "seed = 'a'")
+    refused(lambda: gmwm.bootstrap_test(FIT, MODEL + GaussMarkov(), 1.5), "runs = 1.5")
+
+
+# -- data -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dt", [1e-300, 1e300, "a", 0.0, True])
+@pytest.mark.parametrize("entrance", [gmwm.select, lambda *data: gmwm.fit(MODEL, *data)])
+def test_sampling_interval_of_no_sensor(entrance, dt):
+    refused(lambda: entrance(X, dt), "dt = ")
+    refused(lambda: entrance(Channel("a", X, dt)), "dt = ")
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (X + 1j, "complex"),
+        (np.arange(100).astype("M8[s]"), "dates"),
+        (np.arange(100).astype("m8[s]"), "dates"),
+        (["a"] * 10, "not a number"),
+        ([[1.0], [1.0, 2.0]], "not a number"),
+        (X * 1e200, "check the unit"),
+        (X * 1e-200, "check the unit"),
+    ],
+)
+@pytest.mark.parametrize(
+    "entrance",
+    [
+        gmwm.deviations,
+        gmwm.wavelet_variance,
+        gmwm.select,
+        lambda *data: gmwm.fit(MODEL, *data, method="mle"),
+    ],
+)
+def test_what_is_no_series(entrance, values, words):
+    if entrance is gmwm.deviations:
+        pytest.importorskip("allantools")
+    refused(lambda: entrance(values, 1.0), words)
+
+
+def test_a_channel_of_complex_numbers():
+    for method in ("gmwm", "mle", "em"):
+        channel = Channel("gyro_x", X + 1j, 1.0)
+        refused(lambda c=channel, m=method: gmwm.fit(MODEL, c, method=m), "'gyro_x' holds complex")
+    refused(lambda: gmwm.modwt(X + 1j), "complex")
+
+
+def test_recordings_that_are_none():
+    for entrance in (gmwm.select, lambda data: gmwm.fit(MODEL, data)):
+        refused(lambda e=entrance: e([]), "there is no recording: give one")
+        refused(lambda e=entrance: e((WV, "a")), "'a' stands among the recordings")
+        refused(lambda e=entrance: e([WV, 2.0]), "2.0 stands among the recordings")
+
+
+# -- models ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: WhiteNoise(foo=1), "its parameters are N"),
+        (lambda: WhiteNoise(1.0, 2.0), "its parameters are N"),
+        (lambda: GaussMarkov(1.0, sigma=2.0), "its parameters are sigma, tau"),
+        (lambda: ARMA(foo=1), "its parameters are ar, ma, sigma2"),
+        (lambda: WhiteNoise("0.2"), "N is '0.2': give a number"),
+        (lambda: 2.5 * GaussMarkov(), "2.5 * process"),
+        (lambda: np.float64(2.5) * GaussMarkov(), "2.5"),
+        (lambda: True * GaussMarkov(), "True * process"),
+        (lambda: 0 * GaussMarkov(), "0 * process"),
+        (lambda: "a" * GaussMarkov(), "'a' * process"),
+        (lambda: WhiteNoise() + 1, "1 is no error process"),
+        (lambda: 1 + WhiteNoise(), "1 is no error process"),
+        (lambda: None + WhiteNoise(), "None is no error process"),
+        (lambda: MODEL + "a", "'a' is no error process"),
+    ],
+)
+def test_what_makes_no_model(make, words):
+    refused(make, words)
+
+
+def test_models_are_still_made_as_before():
+    assert sum([WhiteNoise(), RandomWalk()]) == MODEL
+    assert np.int64(2) * GaussMarkov() == 2 * GaussMarkov()
+
+
+class Own(Process):
+    sigma: float = parameter("u")
+    drawn = staticmethod(lambda n: None)
+
+    def draw(self, n, dt, rng):
+        return self.drawn(n)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        (lambda n: None, "draw of Own returns nothing"),
+        (lambda n: np.arange(n - 1.0), "shape (999,): let it return 1,000 samples"),
+        (lambda n: 1.0, "shape ()"),
+        (lambda n: np.full(n, np.nan), "not finite"),
+        (lambda n: np.ones(n) * 1j, "complex"),
+        (lambda n: "a", "not a number"),
+    ],
+)
+def test_a_process_of_ones_own_that_draws_no_series(monkeypatch, drawn, words):
+    monkeypatch.setattr(Own, "drawn", staticmethod(drawn))
+    refused(lambda: Own(1.0).simulate(1000, 1.0), words)
+    refused(lambda: gmwm.fit(WhiteNoise() + Own(), WV, method="simulated"), words)
+
+
+def test_a_process_of_ones_own_that_draws_zeros(monkeypatch):
+    monkeypatch.setattr(Own, "drawn", staticmethod(np.zeros))
+    refused(lambda: gmwm.fit(Own(), WV, method="simulated"), "no variance")
+
+
+# -- stored results -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", [{}, None, [], "x", 3, {"parts": []}])
+def test_what_is_no_fit(content):
+    refused(lambda: Fit.from_dict(content), "give what to_dict of a fit made")
+
+
+@pytest.mark.parametrize("key", sorted(FIT.to_dict()))
+@pytest.mark.parametrize("value", [3, "a", ["a"], {"a": "b"}], ids=repr)
+def test_a_damaged_fit_is_refused_or_still_prints(key, value):
+    try:
+        again = Fit.from_dict({**FIT.to_dict(), key: value})
+    except InputError:
+        return
+    str(again)
+
+
+@pytest.mark.parametrize("key", ["objective", "params", "model", "keys", "wavelet_variance"])
+def test_a_fit_with_nothing_in_place_of_its_content(key):
+    if key == "objective":
+        assert np.isnan(Fit.from_dict({**FIT.to_dict(), key: None}).objective)
+        return
+    refused(lambda: Fit.from_dict({**FIT.to_dict(), key: None}), "give what to_dict of a fit made")
+
+
+@pytest.mark.parametrize("place", ["objective", "N"])
+def test_a_calibration_with_a_string_for_a_number(tmp_path, place):
+    recording = gmwm.Recording((Channel("gyro_x", X, 1.0, "gyro", "rad/s"),))
+    path = tmp_path / "calibration.json"
+    content = gmwm.calibrate(recording, MODEL).to_dict()
+    channel = content["channels"]["gyro_x"]
+    if place == "N":
+        channel["model"][0]["N"] = "0.2"
+    else:
+        channel["objective"] = "large"
+    path.write_text(json.dumps(content))
+    refused(lambda: gmwm.load(path), "calibration.json: the calibration cannot be rebuilt")
+
+
+def test_a_joint_fit_comes_back_as_one():
+    joint = gmwm.fit(MODEL, [WV, gmwm.wavelet_variance(X[:600], 1.0)])
+    content = json.loads(json.dumps(joint.to_dict()))
+    for again in (Fit.from_dict(content), JointFit.from_dict(content)):
+        assert isinstance(again, JointFit)
+        assert str(again) == str(joint)
+        assert again.to_dict() == joint.to_dict()
+    assert "2 recordings, 1,600 samples in all at 1 Hz" in str(joint)
+
+
+def test_a_ramp_of_given_value_is_stored_with_its_sign():
+    fit = gmwm.fit(WhiteNoise() + RateRamp(R=-1e-4), X, 1.0)
+    assert Fit.from_dict(json.loads(json.dumps(fit.to_dict()))).params == fit.params
+
+
+# -- 80 columns -----------------------------------------------------------------------------------
+
+
+def widest(result):
+    return max(map(len, str(result).splitlines()))
+
+
+@pytest.mark.parametrize("quantity", ["gyro", "accel"])
+@pytest.mark.parametrize("method", ["gmwm", "mle", "whittle", "em", "simulated"])
+def test_a_fit_prints_within_80_columns(quantity, method):
+    channel = Channel(f"{quantity}_x", 1.2345e-5 * X[:400], 0.01, quantity, "")
+    fit = gmwm.fit(MODEL, channel, method=method)
+    assert widest(fit) <= 80
+    assert widest(replace(fit, remarks=("one that goes on and on " * 9,) * 2)) <= 80
+
+
+def test_long_names_and_many_terms_print_within_80_columns():
+    many = (
+        WhiteNoise()
+        + gmwm.QuantizationNoise()
+        + RandomWalk()
+        + 5 * GaussMarkov()
+        + 2 * gmwm.Resonance()
+        + RateRamp()
+    )
+    values = {i.key: 1.23456e-5 * (k + 1) for k, i in enumerate(many.parameters)}
+    model, keys, matrix = many.with_params(values), tuple(values), 1e-12 * np.eye(len(values))
+    wv = replace(WV, name="accelerometer_x_of_the_second_unit", quantity="accel", unit="m/s^2")
+    fit = replace(FIT, model=model, wv=wv, keys=keys, covariance=matrix, upper_bounds={})
+    assert widest(fit) <= 80
+    assert "5 Gauss-Markov" in str(fit)
+    assert widest(gmwm.CramerRao(model, 300, 1.0, keys, matrix, matrix, exact=True)) <= 80
+
+
+def test_a_selection_prints_within_80_columns():
+    chosen = gmwm.select(WV, extra=[gmwm.Sinusoid(frequency=0.1)])
+    assert widest(chosen) <= 80
+    assert all(len(item.model.terms) > 0 for item in chosen)
+
+
+def test_many_recordings_print_within_80_columns():
+    parts = [gmwm.wavelet_variance(X[k : k + 400], 1.0) for k in range(0, 600, 100)]
+    assert widest(gmwm.fit(MODEL, parts)) <= 80

@@ -1,0 +1,135 @@
+"""Output files appear whole or not at all."""
+
+import errno
+import os
+
+import pytest
+
+from gmwm._core.files import output_folder, written
+from gmwm.errors import InputError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_text_arrives_whole_and_in_utf8(tmp_path):
+    path = tmp_path / "out.txt"
+    with written(path) as stream:
+        stream.write("µg/√Hz\n")
+        assert names(tmp_path) != ["out.txt"]  # not yet under its own name
+    assert path.read_bytes() == "µg/√Hz\n".encode()
+    assert names(tmp_path) == ["out.txt"]
+
+
+def test_old_file_is_there_until_the_new_one_is_complete(tmp_path):
+    path = tmp_path / "out.txt"
+    path.write_text("old")
+    with written(str(path)) as stream:
+        stream.write("new")
+        stream.flush()
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert names(tmp_path) == ["out.txt"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt()], ids=repr)
+@pytest.mark.parametrize("before", [None, "old"])
+def test_an_interruption_leaves_everything_as_it_was(tmp_path, error, before):
+    path = tmp_path / "out.txt"
+    if before is not None:
+        path.write_text(before)
+    with pytest.raises(type(error)), written(path) as stream:
+        stream.write("half of it")
+        stream.flush()
+        raise error
+    assert names(tmp_path) == ([] if before is None else ["out.txt"])
+    if before is not None:
+        assert path.read_text() == before
+
+
+def test_full_disk_is_told_and_leaves_nothing(tmp_path):
+    path = tmp_path / "out.txt"
+    with pytest.raises(InputError, match=r"out\.txt: cannot be written \(No space"), written(path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert names(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="file modes are those of POSIX")
+def test_permissions_are_those_of_any_new_file(tmp_path):
+    before = os.umask(0o027)
+    try:
+        with written(tmp_path / "out.txt") as stream:
+            stream.write("x")
+        assert os.umask(0o027) == 0o027  # the process's own mask is as it was
+    finally:
+        os.umask(before)
+    assert (tmp_path / "out.txt").stat().st_mode & 0o777 == 0o640
+
+
+def test_missing_folder(tmp_path):
+    path = tmp_path / "nowhere" / "out.txt"
+    with pytest.raises(InputError) as caught, written(path) as stream:
+        stream.write("x")
+    message = str(caught.value)
+    assert message.startswith(f"{path}: cannot be written (")
+    assert ": choose another place" in message
+    assert names(tmp_path) == []
+
+
+def test_a_file_for_a_folder(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="cannot be written"), written(tmp_path / "file" / "out"):
+        pass
+    assert (tmp_path / "file").read_text() == "x"
+
+
+def test_a_folder_for_a_file(tmp_path):
+    (tmp_path / "out").mkdir()
+    with pytest.raises(InputError, match="out: cannot be written"), written(tmp_path / "out"):
+        pass
+    assert names(tmp_path) == ["out"]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
+def test_folder_without_permission(tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    with pytest.raises(InputError, match="Permission denied"), written(folder / "out.txt"):
+        pass
+    with pytest.raises(InputError, match="Permission denied"):
+        output_folder(folder)
+
+
+# -- folders --------------------------------------------------------------------------------------
+
+
+def test_output_folder_is_made_with_its_parents_and_left_empty(tmp_path):
+    folder = output_folder(str(tmp_path / "a" / "b"))
+    assert folder == tmp_path / "a" / "b"
+    assert names(folder) == []
+
+
+def test_output_folder_keeps_what_is_there(tmp_path):
+    (tmp_path / "calibration.json").write_text("old")
+    assert output_folder(tmp_path) == tmp_path
+    assert names(tmp_path) == ["calibration.json"]
+    assert (tmp_path / "calibration.json").read_text() == "old"
+
+
+def test_output_folder_in_the_way(tmp_path):
+    (tmp_path / "file").write_text("x")
+    for path in (tmp_path / "file", tmp_path / "file" / "under"):
+        with pytest.raises(InputError) as caught:
+            output_folder(path)
+        assert str(caught.value).startswith(f"{path}: cannot be written (")
+    assert (tmp_path / "file").read_text() == "x"
+
+
+def test_output_folder_is_tried_before_any_work(tmp_path, monkeypatch):
+    def refuse(*args, **kwargs):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr("gmwm._core.files.tempfile.TemporaryFile", refuse)
+    with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\)"):
+        output_folder(tmp_path)

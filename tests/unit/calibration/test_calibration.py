@@ -1,0 +1,569 @@
+"""The main job, its file format, and what happens to bad channels and bad files."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import (
+    Calibration,
+    Channel,
+    GaussMarkov,
+    InputError,
+    RandomWalk,
+    RateRamp,
+    Recording,
+    WhiteNoise,
+)
+from places import SHARED
+
+DT = 0.01
+DATA = SHARED / "data"
+GYRO = WhiteNoise(4e-4) + RandomWalk(2e-4)
+ACCEL = WhiteNoise(1e-3)
+
+
+MODELS = {
+    "gyro_x": GYRO.opened() + RateRamp(),
+    "gyro_y": WhiteNoise(),
+    "accel_x": WhiteNoise() + RandomWalk(),
+    "accel_y": WhiteNoise() + GaussMarkov(tau=50.0),
+}
+
+
+def channel(name, values):
+    quantity = name.split("_")[0]
+    return Channel(name, values, DT, quantity, {"gyro": "rad/s", "accel": "m/s^2"}[quantity])
+
+
+@pytest.fixture(scope="module")
+def recording():
+    rng = np.random.default_rng(13)
+    n = 10_000
+    return Recording(
+        (
+            channel("gyro_x", GYRO.simulate(n, DT, rng)),
+            channel("gyro_y", np.full(n, 0.25)),
+            channel("accel_x", ACCEL.simulate(n, DT, rng) + 9.8),
+            channel("accel_y", ACCEL.simulate(n, DT, rng)),
+        ),
+        source="bench.csv",
+        notes=("Column 'temp' was not used.",),
+    )
+
+
+@pytest.fixture(scope="module")
+def calibration(recording):
+    return gmwm.calibrate(recording)
+
+
+@pytest.fixture(scope="module")
+def mapped(recording):
+    """With every kind of parameter: estimated, given, at its bound, and a ramp."""
+    return gmwm.calibrate(recording, MODELS, jobs=1)
+
+
+# -- calibrate ------------------------------------------------------------------------------------
+
+
+def test_every_live_channel_has_a_fit_that_holds_the_truth(calibration):
+    assert list(calibration) == ["gyro_x", "accel_x", "accel_y"]
+    assert len(calibration) == 3
+    assert {"N", "K"} <= calibration["gyro_x"].params.keys()
+    for name, truth in (("gyro_x", GYRO), ("accel_x", ACCEL), ("accel_y", ACCEL)):
+        low, high = calibration[name].interval(0.999)["N"]
+        assert low < gmwm.process.as_model(truth).params["N"] < high
+        assert calibration[name].wv.name == name
+    low, high = calibration["gyro_x"].interval(0.999)["K"]
+    assert low < 2e-4 < high
+
+
+def test_what_it_says_of_the_recording(calibration):
+    assert calibration.source == "bench.csv"
+    assert calibration.n == 10_000
+    assert calibration.rate == pytest.approx(100.0)
+    assert calibration.duration == pytest.approx(100.0)
+    assert calibration.notes == ("Column 'temp' was not used.",)
+
+
+def test_dead_channel_is_named_and_skipped(calibration):
+    assert calibration.skipped == {"gyro_y": "constant at 0.25 rad/s"}
+    assert "gyro_y: skipped, constant at 0.25 rad/s" in str(calibration)
+    assert not calibration.valid
+    with pytest.raises(InputError, match=r"'gyro_y': constant at 0\.25 rad/s"):
+        calibration["gyro_y"]
+
+
+def test_unknown_channel_lists_those_there_are(calibration):
+    with pytest.raises(InputError, match="'gyro_w': it has gyro_x, accel_x, accel_y"):
+        calibration["gyro_w"]
+
+
+def test_valid_only_if_every_fit_is(calibration):
+    sound = replace(calibration, skipped={})
+    assert sound.valid == all(fit.valid for fit in calibration.fits.values())
+    fits = {name: replace(fit, valid=True) for name, fit in calibration.fits.items()}
+    assert replace(sound, fits=fits).valid
+    assert not replace(calibration, fits=fits).valid  # one is skipped
+    assert not replace(sound, fits=fits | {"gyro_x": replace(fits["gyro_x"], valid=False)}).valid
+
+
+def test_all_channels_dead():
+    rec = Recording(
+        (channel("gyro_x", np.zeros(100)), channel("accel_x", np.ones(100))), "dead.csv"
+    )
+    with pytest.raises(InputError, match=r"^dead\.csv: every channel is constant.*: check the"):
+        gmwm.calibrate(rec)
+
+
+def test_too_short_a_recording():
+    rec = Recording((channel("gyro_x", np.arange(7.0)),))
+    with pytest.raises(InputError, match=r"^7 samples are too few: record at least 8"):
+        gmwm.calibrate(rec)
+
+
+def test_an_infinite_sample_stops_no_other_channel(recording):
+    values = recording["accel_y"].values.copy()
+    values[17] = np.inf
+    rec = Recording((recording["gyro_x"], channel("accel_y", values)))
+    result = gmwm.calibrate(rec, WhiteNoise())
+    assert list(result) == ["gyro_x"]
+    assert "'accel_y' has 1 " in result.skipped["accel_y"]
+    assert "index 17" in result.skipped["accel_y"]
+
+
+def test_missing_samples_are_passed_over(recording):
+    values = recording["accel_y"].values.copy()
+    values[2000:3000] = values[17] = np.nan
+    result = gmwm.calibrate(Recording((channel("accel_y", values),)), WhiteNoise())
+    low, high = result["accel_y"].interval(0.999)["N"]
+    assert low < gmwm.process.as_model(ACCEL).params["N"] < high
+
+
+def test_channels_of_which_too_much_is_missing_are_skipped(recording):
+    n = recording.n
+    values = recording["accel_y"].values.copy()
+    values[: n // 2] = np.nan
+    half = channel("accel_y", values)
+    less = channel("accel_z", np.where(np.arange(n) == n - 1, np.nan, values))
+    none = channel("gyro_y", np.full(n, np.nan))
+    dead = channel("gyro_z", np.where(np.arange(n) < 10, np.nan, 2.5))
+    result = gmwm.calibrate(Recording((half, less, none, dead)), {"accel_y": WhiteNoise()})
+    assert list(result) == ["accel_y"]
+    assert result.skipped == {
+        "accel_z": f"{n // 2 + 1:,} of {n:,} samples missing, more than half",
+        "gyro_y": "all samples missing",
+        "gyro_z": "constant at 2.5 rad/s",
+    }
+    with pytest.raises(InputError, match=r"gyro_y: all samples missing; gyro_z: constant.*check"):
+        gmwm.calibrate(Recording((none, dead)))
+
+
+STEPS = np.arange(10_000)
+
+
+@pytest.mark.parametrize("model", [None, WhiteNoise() + RandomWalk()], ids=["selected", "given"])
+@pytest.mark.parametrize(
+    "values",
+    [STEPS % 2 / 8.0, (STEPS % 4 < 2) / 8.0, STEPS / 8.0, np.sin(0.05 * STEPS)],
+    ids=["toggling", "toggling in twos", "straight line", "sine"],
+)
+def test_a_channel_that_no_noise_describes_does_not_stop_the_others(recording, values, model):
+    # Without any noise the wavelet variance is exactly zero at some averaging times.
+    rec = Recording((recording["gyro_x"], channel("gyro_z", values)))
+    result = gmwm.calibrate(rec, model)
+    assert "gyro_x" in result.fits
+    assert "gyro_z" in result.skipped or not result["gyro_z"].valid
+    if "gyro_z" in result.skipped:
+        assert "gyro_z" in result.skipped["gyro_z"] or "constant" in result.skipped["gyro_z"]
+
+
+def test_one_model_for_all_channels(recording):
+    result = gmwm.calibrate(recording, WhiteNoise())
+    assert [list(fit.params) for fit in result.fits.values()] == [["N"]] * 3
+
+
+def test_a_model_by_channel(mapped):
+    assert list(mapped["gyro_x"].params) == ["N", "K", "R"]
+    assert list(mapped["accel_x"].params) == ["N", "K"]
+    assert mapped["accel_y"].params["tau"] == 50.0
+    assert "tau" not in mapped["accel_y"].keys
+
+
+def test_a_mapping_must_have_every_live_channel(recording):
+    models = dict.fromkeys(("gyro_x", "gyro_y", "accel_x"), WhiteNoise())
+    with pytest.raises(InputError, match="no model is given for channel 'accel_y': add one"):
+        gmwm.calibrate(recording, models)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_progress_hears_of_every_channel_once_and_threads_change_nothing(recording, mapped, jobs):
+    heard = []
+    result = gmwm.calibrate(recording, MODELS, jobs=jobs, progress=lambda *told: heard.append(told))
+    assert sorted(name for *_, name in heard[:-1]) == sorted(result.fits)
+    assert heard[-1] == (len(result.fits), len(result.fits), "")
+    assert_same(result, mapped)
+
+
+# -- files ----------------------------------------------------------------------------------------
+
+
+def assert_same(one, other):
+    assert list(one) == list(other)
+    assert (one.skipped, one.source, one.rate, one.n, one.notes) == (
+        other.skipped,
+        other.source,
+        other.rate,
+        other.n,
+        other.notes,
+    )
+    assert str(one) == str(other)
+    assert one.valid == other.valid
+    for a, b in zip(one.fits.values(), other.fits.values(), strict=True):
+        assert a.model == b.model
+        assert a.params == b.params
+        assert a.keys == b.keys
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+        assert a.covariance.shape == b.covariance.shape
+        assert a.stderr == b.stderr
+        assert a.interval() == b.interval()
+        assert a.interval(0.5) == b.interval(0.5)
+        assert a.upper_bounds == b.upper_bounds
+        assert a.remarks == b.remarks
+        numbers = [(f.objective, f.dof, f.discrepancy, f.p_value) for f in (a, b)]
+        np.testing.assert_array_equal(*numbers)
+        assert (a.method, a.omega, a.valid) == (b.method, b.omega, b.valid)
+        assert a.rows() == b.rows()
+        for array in ("tau", "variance", "mean", "blocks", "lower", "upper", "covariance"):
+            np.testing.assert_array_equal(getattr(a.wv, array), getattr(b.wv, array))
+        scalars = ("block", "n", "dt", "confidence", "name", "quantity", "unit")
+        assert [getattr(a.wv, s) for s in scalars] == [getattr(b.wv, s) for s in scalars]
+        np.testing.assert_array_equal(a.implied, b.implied)
+
+
+@pytest.mark.parametrize("which", ["calibration", "mapped"])
+def test_round_trip_through_a_file(which, request, tmp_path):
+    original = request.getfixturevalue(which)
+    path = tmp_path / "cal.json"
+    assert original.save(path) == path
+    again = gmwm.load(path)
+    assert isinstance(again, Calibration)
+    assert_same(again, original)
+    again.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+
+
+def test_an_upper_bound_is_in_the_round_trip(mapped):
+    # What `mapped` is for: a bound and a remark must exist to be lost.
+    fit = mapped["accel_x"]
+    assert fit.upper_bounds.keys() == {"K"}
+    assert any("K is not identifiable" in remark for remark in fit.remarks)
+
+
+def test_a_missing_p_value_survives(calibration, tmp_path):
+    fits = {"gyro_x": replace(calibration["gyro_x"], p_value=float("nan"), dof=0)}
+    odd = replace(calibration, fits=fits)
+    odd.save(tmp_path / "cal.json")
+    assert_same(gmwm.load(tmp_path / "cal.json"), odd)
+
+
+def test_an_infinite_bound_survives(mapped, tmp_path):
+    fits = {"accel_x": replace(mapped["accel_x"], upper_bounds={"K": float("inf")})}
+    odd = replace(mapped, fits=fits)
+    odd.save(tmp_path / "cal.json")
+    assert_same(gmwm.load(tmp_path / "cal.json"), odd)
+
+
+def test_the_file_is_plain_json_in_si(calibration, tmp_path):
+    content = json.loads(calibration.save(tmp_path / "cal.json").read_text())
+    assert content["schema"] == "gmwm.calibration"
+    assert content["schema_version"] == 1
+    assert content["rate_hz"] == pytest.approx(100.0)
+    gyro = content["channels"]["gyro_x"]
+    assert gyro["params"] == calibration["gyro_x"].params
+    assert gyro["units"]["N"] == "rad/s/sqrt(Hz)"
+    assert gyro["units"]["K"] == "rad/s/s/sqrt(Hz)"
+
+
+def test_interrupted_write_leaves_nothing(calibration, tmp_path, monkeypatch):
+    def interrupted(content, stream, **options):
+        stream.write('{"schema": ')
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gmwm.calibration.calibration.json.dump", interrupted)
+    path = tmp_path / "cal.json"
+    with pytest.raises(KeyboardInterrupt):
+        calibration.save(path)
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        calibration.save(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["cal.json"]
+    assert path.read_text() == "old"
+
+
+def test_a_folder_that_is_not_there(calibration, tmp_path):
+    with pytest.raises(InputError, match=r"cal\.json: cannot be written"):
+        calibration.save(tmp_path / "nowhere" / "cal.json")
+
+
+# -- files that are not ours, or not whole --------------------------------------------------------
+
+
+def refused(path):
+    with pytest.raises(InputError) as caught:
+        gmwm.load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert len(message.splitlines()) == 1
+    assert message.count(": ") >= 2, "no mend is given"
+    return message
+
+
+def test_missing_file_and_folder(tmp_path):
+    assert "cannot be read" in refused(tmp_path / "nowhere.json")
+    assert "cannot be read" in refused(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is no JSON"),
+        (b"time,gyro_x\n0,1\n", "is no JSON"),
+        (b'{"schema": "gmwm.calibration", "schema_ver', "is no JSON"),
+        (b"\xff\xfe\x00\x93NUMPY", "is no JSON"),
+        (b"[1, 2, 3]", "no calibration"),
+        (b"null", "no calibration"),
+        (b'{"type": "FeatureCollection"}', "no calibration"),
+        (b'{"schema": "gmwm.calibration"}', "schema version None"),
+    ],
+)
+def test_foreign_files(tmp_path, content, words):
+    path = tmp_path / "cal.json"
+    path.write_bytes(content)
+    assert words in refused(path)
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", None])
+def test_other_schema_versions(calibration, tmp_path, version):
+    path = tmp_path / "cal.json"
+    path.write_text(json.dumps(calibration.to_dict() | {"schema_version": version}))
+    message = refused(path)
+    assert f"schema version {version!r}" in message
+    assert "calibrate again or update gmwm" in message
+
+
+GONE = object()
+FIT = ("channels", "gyro_x")
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        *[((key,), GONE) for key in ("channels", "skipped", "source", "rate_hz", "n", "notes")],
+        *[
+            ((*FIT, key), GONE)
+            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "remarks")
+        ],
+        ((*FIT, "wavelet_variance", "variance"), GONE),
+        ((*FIT, "wavelet_variance", "dt"), GONE),
+        ((*FIT, "wavelet_variance", "surplus"), 1.0),
+        ((*FIT, "wavelet_variance", "tau"), ["a", "b"]),
+        ((*FIT, "covariance"), [[1.0]]),
+        ((*FIT, "model"), []),
+        ((*FIT, "model", 0, "process"), "PinkNoise"),
+        ((*FIT, "model", 0, "N"), -1.0),
+        ((*FIT, "model", 0, "M"), 1.0),
+        ((*FIT, "model", 0, "N"), None),
+        ((*FIT, "keys"), ["N", "X"]),
+        ((*FIT, "wavelet_variance", "dt"), None),
+        (FIT, None),
+        (("channels",), []),
+        (("rate_hz",), None),
+        (("rate_hz",), "fast"),
+        (("n",), None),
+    ],
+    ids=lambda v: "gone" if v is GONE else ".".join(map(str, v)) if isinstance(v, tuple) else None,
+)
+def test_damaged_files(calibration, tmp_path, place, value):
+    content = json.loads(json.dumps(calibration.to_dict()))
+    inner = content
+    for key in place[:-1]:
+        inner = inner[key]
+    if value is GONE:
+        del inner[place[-1]]
+    else:
+        inner[place[-1]] = value
+    path = tmp_path / "cal.json"
+    path.write_text(json.dumps(content))
+    refused(path)
+
+
+def repeated(seeds, model=None, n=20_000):
+    truth = gmwm.WhiteNoise(1e-3) + gmwm.GaussMarkov(1e-3, 0.5)
+    return [
+        gmwm.Recording.from_arrays(
+            {"gyro_x": (model or truth).simulate(n, 0.01, seed)},
+            rate=100.0,
+            units={"gyro": "rad/s"},
+            source=f"rec{seed}",
+        )
+        for seed in seeds
+    ]
+
+
+def test_several_recordings_have_one_model_with_a_test_of_equality(tmp_path):
+    calibration = gmwm.calibrate(repeated([1, 2, 3]))
+    fit = calibration["gyro_x"]
+    assert len(fit.parts) == 3
+    assert fit.equality_p > 0.001
+    assert calibration.n == 60_000
+    assert calibration.source == "rec1, rec2, rec3"
+    again = gmwm.load(calibration.save(tmp_path / "cal.json"))["gyro_x"]
+    assert again.params == fit.params
+    assert again.equality_p == fit.equality_p
+    np.testing.assert_allclose(again.wv.covariance, fit.wv.covariance)
+    assert str(again) == str(fit)
+    assert "Gauss-Markov" in calibration.report(tmp_path / "r.html").read_text()
+
+
+def test_a_channel_dead_in_one_recording_is_taken_from_the_others():
+    first, second = repeated([1, 2])
+    dead = gmwm.Recording.from_arrays(
+        {"gyro_x": np.ones(20_000)}, rate=100.0, units={"gyro": "rad/s"}, source="dead"
+    )
+    calibration = gmwm.calibrate([dead, first, second])
+    assert len(calibration["gyro_x"].parts) == 2
+    assert calibration.skipped == {}
+
+
+def test_recordings_of_other_rates_are_refused():
+    first = repeated([1])[0]
+    other = gmwm.Recording.from_arrays(
+        {"gyro_x": np.random.default_rng(1).standard_normal(5000)},
+        rate=50.0,
+        units={"gyro": "rad/s"},
+        source="slow",
+    )
+    with pytest.raises(gmwm.InputError, match="slow has 50 Hz and rec1 100 Hz"):
+        gmwm.calibrate([first, other])
+    with pytest.raises(gmwm.InputError, match="no recording"):
+        gmwm.calibrate([])
+
+
+def noisy_recording():
+    """A line, a knock and a channel that is left alone."""
+    rng = np.random.default_rng(5)
+    t = np.arange(40_000) * 0.01
+    accel = gmwm.WhiteNoise(1e-3).simulate(t.size, 0.01, rng) + 0.01 * np.sin(2 * np.pi * 0.7 * t)
+    gyro = gmwm.WhiteNoise(1e-3).simulate(t.size, 0.01, rng)
+    gyro[20_000:20_020] += 1.0
+    return gmwm.Recording.from_arrays(
+        {"gyro_x": gyro, "accel_x": accel}, 100.0, {"gyro": "rad/s", "accel": "m/s^2"}
+    )
+
+
+def test_what_is_wrong_is_told_and_taken_care_of():
+    calibration = gmwm.calibrate(noisy_recording())
+    assert calibration["gyro_x"].params["N"] == pytest.approx(1e-3, rel=0.03)
+    assert calibration["gyro_x"].wv.runs.present < 40_000
+    line = calibration["accel_x"].params
+    assert line["sinusoid_frequency"] == pytest.approx(0.7, abs=1e-3)
+    assert line["sinusoid_amplitude"] == pytest.approx(0.01, rel=0.1)
+    told = " ".join(calibration.warnings)
+    assert "accel_x: a periodic line at 0.7" in told
+    assert "(a term of the model)" in told
+    assert "gyro_x: a spike or knock" in told
+    assert f"(left out, {40_000 - calibration['gyro_x'].wv.runs.present} samples)" in told
+    assert all("samples of spikes or knocks left out" in note for note in calibration.notes)
+
+
+def test_findings_survive_the_file_and_old_files_have_none(tmp_path):
+    calibration = gmwm.calibrate(noisy_recording(), WhiteNoise())
+    assert {found.kind for found in calibration.findings} >= {"event", "line", "length"}
+    line = next(found for found in calibration.findings if found.kind == "line")
+    assert line.action == "not tried as a term of the model"  # which was given
+    path = calibration.save(tmp_path / "cal.json")
+    assert gmwm.load(path).findings == calibration.findings
+    assert gmwm.load(path).warnings == calibration.warnings
+    content = json.loads(path.read_text())
+    del content["findings"]
+    path.write_text(json.dumps(content))
+    assert gmwm.load(path).findings == ()
+    content["findings"] = [{"kind": "line"}]
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="the calibration is damaged"):
+        gmwm.load(path)
+
+
+def test_findings_of_several_recordings_say_which():
+    first, second = noisy_recording(), noisy_recording()
+    both = [replace(first, source="a.csv"), replace(second, source="b.csv")]
+    found = gmwm.calibrate(both, WhiteNoise()).findings
+    assert {one.recording for one in found} == {"a.csv", "b.csv"}
+    assert str(found[0]).startswith("a.csv: ")
+
+
+def contaminated(share, size, n=60_000, seed=3):
+    """White noise of which some samples have a standard deviation ``size`` times as large."""
+    rng = np.random.default_rng(seed)
+    noise = WhiteNoise(1e-3).simulate(n, 0.01, rng)
+    return noise * np.where(rng.random(n) < share, size, 1.0)
+
+
+def as_recording(values):
+    return gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "rad/s"})
+
+
+@pytest.mark.parametrize(("share", "size"), [(0.01, 4.0), (0.01, 30.0), (0.03, 10.0)])
+def test_outliers_all_over_the_record_make_the_variances_robust(share, size):
+    recording = as_recording(contaminated(share, size))
+    calibration = gmwm.calibrate(recording, WhiteNoise())
+    fit = calibration["gyro_x"]
+    assert fit.wv.efficiency < 1.0
+    assert fit.wv.runs.longest * 32 >= 60_000  # masks must leave long averaging times
+    if share * size > 0.2:
+        assert fit.wv.present is None
+    (told,) = [found for found in calibration.findings if found.kind == "outliers"]
+    assert told.action.startswith("robust wavelet variances bound their influence")
+    assert any("outliers spread over the record" in line for line in calibration.warnings)
+    plain = gmwm.calibrate(recording, WhiteNoise(), remedies=["lines", "resonances"])["gyro_x"]
+    assert plain.wv.efficiency == 1.0
+    truth = 0.5 * 1e-3**2 / 0.01  # Haar wavelet variance of the noise at the first level
+    # The mean square is too high by share (size^2 - 1) of the variance; the biweight, which does
+    # not see the samples far out, by much less.
+    raised = plain.wv.variance[0] / truth - 1.0
+    assert raised > 0.5 * share * (size**2 - 1.0)
+    assert abs(fit.wv.variance[0] / truth - 1.0) < 0.3 * raised
+
+
+@pytest.mark.parametrize("step", [0.0, 0.5, 1.0, 2.0])
+def test_clean_and_rounded_noise_stays_as_it_is(step):
+    values = WhiteNoise(1e-3).simulate(60_000, 0.01, 8)
+    if step:
+        values = step * 0.01 * np.rint(values / (step * 0.01))
+    calibration = gmwm.calibrate(as_recording(values), WhiteNoise())
+    assert calibration["gyro_x"].wv.efficiency == 1.0
+    assert "outliers" not in {found.kind for found in calibration.findings}
+
+
+def test_a_real_recording_with_outliers():
+    path = DATA / "mtig" / "mtig_contaminated_gyro_x.csv.gz"
+    if not path.exists():
+        pytest.skip("the recordings are not part of the package")
+    recording = gmwm.read(path, rate=100, units={"gyro": "rad/s"})
+    calibration = gmwm.calibrate(recording, WhiteNoise() + RandomWalk())
+    assert calibration["gyro_x"].wv.efficiency < 1.0
+    plain = gmwm.wavelet_variance(recording["gyro_x"]).variance[0]
+    assert calibration["gyro_x"].wv.variance[0] < 0.97 * plain
+
+
+def test_remedies_can_be_left_out():
+    calibration = gmwm.calibrate(noisy_recording(), remedies=())
+    assert calibration.notes == ()
+    assert calibration["gyro_x"].wv.present is None
+    assert "sinusoid_amplitude" not in calibration["accel_x"].params
+    with pytest.raises(gmwm.InputError, match="there are events, lines, resonances, outliers"):
+        gmwm.calibrate(noisy_recording(), remedies=["magic"])

@@ -1,0 +1,53 @@
+"""Terms that are not there: whether they are left out, and how large they may be."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood.vanishing import idle_term
+from gmwm.estimate.problem.parameters import Coordinates
+
+
+@pytest.mark.parametrize("method", ["mle", "em"])
+def test_the_bound_is_the_quantile_of_the_profile_likelihood(method):
+    x = WhiteNoise(1.0).simulate(800, 1.0, seed=7)
+    fit = gmwm.fit(WhiteNoise() + RandomWalk(), x, dt=1.0, method=method)
+    assert fit.params["K"] == 0.0
+    likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
+
+    def profile(walk):
+        search = minimize_scalar(
+            lambda white: -likelihood((WhiteNoise(white), RandomWalk(walk))),
+            bounds=(0.8, 1.2),
+            method="bounded",
+        )
+        return -search.fun
+
+    scale = np.linspace(0.0, 0.06, 301)
+    heights = np.array([profile(k) for k in scale])
+    share = np.cumsum(np.exp(heights - np.max(heights)))
+    expected = np.interp(0.95, share / share[-1], scale)
+    assert fit.upper_bounds["K"] == pytest.approx(expected, rel=0.03)
+
+
+def test_a_bound_has_the_unit_of_its_parameter():
+    x = WhiteNoise(1.0).simulate(800, 1.0, seed=7)
+    plain = gmwm.fit(WhiteNoise() + RandomWalk(), x, dt=1.0, method="mle")
+    scaled = gmwm.fit(WhiteNoise() + RandomWalk(), 1e-5 * x, dt=0.01, method="mle")
+    assert scaled.upper_bounds["K"] == pytest.approx(1e-4 * plain.upper_bounds["K"], rel=1e-2)
+
+
+def test_a_term_is_idle_where_the_likelihood_does_not_miss_it():
+    truth = WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)
+    x = truth.simulate(2000, 1.0, seed=1)
+    likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
+    coordinates = Coordinates(truth.opened() + RandomWalk() + RateRamp())
+    present = (*truth.terms, RandomWalk(1e-9))
+    assert idle_term(coordinates, present, likelihood) == 2
+    assert idle_term(coordinates.without([2]), truth.terms, likelihood) is None
+    # A given amplitude is not for the likelihood to drop.
+    given = Coordinates(truth.opened() + RandomWalk(1e-9))
+    assert idle_term(given, present, likelihood) is None

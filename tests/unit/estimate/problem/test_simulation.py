@@ -1,0 +1,160 @@
+"""Simulated moments: processes that are known by simulation only."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, WhiteNoise, parameter
+from gmwm.estimate.problem.simulation import Simulation
+
+
+class RoundedNoise(Process):
+    """White noise behind a converter whose steps are as large as the noise."""
+
+    sigma: float = parameter("u")
+    lsb: float = parameter("u")
+
+    def draw(self, n, dt, rng):
+        return self.lsb * np.rint(self.sigma / self.lsb * rng.standard_normal(n))
+
+
+class BlockBias(Process):
+    """Bias instability as a value held for a time and then drawn anew."""
+
+    level: float = parameter("u", role="scale")
+    hold: float = parameter("s")
+    prefix = "block_"
+
+    def draw(self, n, dt, rng):
+        length = max(round(self.hold / dt), 1)
+        blocks = self.level * rng.standard_normal(-(-n // length) + 1)
+        start = int(rng.integers(length))
+        return np.repeat(blocks, length)[start : start + n]
+
+
+TRUTH = WhiteNoise(1.0) + GaussMarkov(0.5, 20.0)
+
+
+@pytest.fixture(scope="module")
+def series():
+    return TRUTH.simulate(8192, 1.0, 3)
+
+
+def test_a_known_process_by_simulation_agrees_with_its_closed_form(series):
+    closed = gmwm.fit(TRUTH.opened(), series, dt=1.0)
+    simulated = gmwm.fit(TRUTH.opened(), series, dt=1.0, method="simulated", replications=16)
+    assert simulated.valid, simulated.message
+    for key, error in closed.stderr.items():
+        # The simulated series are so many more: their own error is a quarter of the data's.
+        assert simulated.params[key] == pytest.approx(closed.params[key], abs=3.0 * error / 4.0)
+    assert "simulated moments" in str(simulated)
+
+
+def test_the_covariance_grows_by_the_share_of_the_simulation():
+    series = WhiteNoise(1.0).simulate(8192, 1.0, 4)
+    closed = gmwm.fit(WhiteNoise(), series, dt=1.0)
+    for replications in (1, 4):
+        found = gmwm.fit(
+            WhiteNoise(), series, dt=1.0, method="simulated", replications=replications,
+            discrepancy=0.0,
+        )  # fmt: skip
+        ratio = found.covariance[0, 0] / closed.covariance[0, 0]
+        assert ratio == pytest.approx(1.0 + 1.0 / replications, rel=0.1)
+
+
+def test_the_same_seed_gives_the_same_estimates(series):
+    fits = [
+        gmwm.fit(TRUTH.opened(), series, dt=1.0, method="simulated", replications=2, seed=seed)
+        for seed in (5, 5, 6)
+    ]
+    assert fits[0].params == fits[1].params
+    assert fits[0].params != fits[2].params
+
+
+def test_noise_rounded_as_coarsely_as_it_is_large():
+    """White noise alone is off by the variance of rounding; the simulation is not."""
+    errors, naive = [], []
+    for seed in range(8):
+        x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, seed)
+        fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method="simulated", replications=4)
+        assert fit.valid, fit.message
+        errors.append((fit.params["sigma"] - 0.7) / fit.stderr["sigma"])
+        white = gmwm.fit(WhiteNoise(), x, dt=1.0)
+        naive.append((white.params["N"] - 0.7) / white.stderr["N"])
+    assert np.mean(np.square(errors)) < 3.3  # chi-square of 8 over 8, at 0.001
+    assert np.min(naive) > 5.0
+
+
+def test_a_bias_held_in_blocks():
+    truth = WhiteNoise(1.0) + BlockBias(level=0.5, hold=64.0)
+    fits = [
+        gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0, replications=4,
+                 method="simulated")
+        for seed in (1, 2, 3)
+    ]  # fmt: skip
+    for fit in fits:
+        for key, value in truth.params.items():
+            assert abs(fit.params[key] - value) < 4.0 * fit.stderr[key], key
+        low, high = fit.interval()["block_hold"]
+        assert low < fit.params["block_hold"] < high
+        # Its curves can be drawn though there is no closed form.
+        assert fit.components.keys() == {"white noise", "BlockBias"}
+        assert np.all(fit.deviation_interval(fit.wv.tau)[0] > 0.0)
+
+
+def test_simulated_terms_are_simulated_without_being_asked_for():
+    truth = WhiteNoise(1.0) + BlockBias(level=0.5, hold=64.0)
+    x = truth.simulate(4096, 1.0, 1)
+    asked = gmwm.fit(WhiteNoise() + BlockBias(hold=64.0), x, dt=1.0)
+    assert asked.params["block_level"] == pytest.approx(0.5, abs=4 * asked.stderr["block_level"])
+
+
+def test_a_drift_beside_a_simulated_term():
+    truth = WhiteNoise(1.0) + BlockBias(level=0.3, hold=16.0) + RateRamp(2e-3)
+    x = truth.simulate(8192, 1.0, 2)
+    fit = gmwm.fit(WhiteNoise() + BlockBias(hold=16.0) + RateRamp(), x, dt=1.0)
+    for key, error in fit.stderr.items():
+        assert fit.params[key] == pytest.approx(truth.params[key], abs=4.0 * error)
+
+
+def test_between_levels_curves_are_interpolated():
+    tau = np.array([1.0, 2.0, 4.0])
+    curve = Simulation(3, 0).curve(RandomWalk(1.0), tau, 4096, 1.0, "haar")
+    between = Simulation(3, 0).curve(RandomWalk(1.0), np.array([1.5]), 4096, 1.0, "haar")
+    assert curve[0] < between[0] < curve[1]
+    np.testing.assert_allclose(curve, RandomWalk(1.0).haar_variance(tau, 1.0), rtol=0.1)
+
+
+def test_rounding_to_nothing_has_no_variance():
+    curve = Simulation(2, 0).curve(RoundedNoise(0.01, 1.0), np.ones(1), 256, 1.0, "haar")
+    np.testing.assert_array_equal(curve, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"replications": 0}, "positive whole number"),
+        ({"replications": 1.5}, "positive whole number"),
+        ({"seed": -1}, "zero or more"),
+        ({"start": WhiteNoise(1.0)}, "no option of method 'simulated'"),
+    ],
+)
+def test_bad_options_are_refused(series, options, words):
+    with pytest.raises(gmwm.InputError, match=words):
+        gmwm.fit(WhiteNoise(), series, dt=1.0, method="simulated", **options)
+
+
+def test_likelihoods_refuse_what_has_no_spectrum(series):
+    for method in ("mle", "whittle", "em"):
+        with pytest.raises(gmwm.InputError, match=r"state-space|simulation only|does not know"):
+            gmwm.fit(BlockBias(hold=8.0), series, dt=1.0, method=method)
+    with pytest.raises(gmwm.InputError, match="simulation only"):
+        BlockBias(1.0, 8.0).psd(np.ones(1), 1.0)
+
+
+def test_two_parameters_of_one_number_are_said_not_to_be_told_apart(series):
+    """Rounded white noise is white: its variance alone gives no step."""
+    x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 1)
+    fit = gmwm.fit(RoundedNoise(), x, dt=1.0, method="simulated", replications=4)
+    assert not fit.valid
+    assert "sigma and lsb cannot be told apart" in fit.message

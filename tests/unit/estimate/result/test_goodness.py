@@ -1,0 +1,239 @@
+"""Agreement of model and data, octave by octave, and how long a record would have to be."""
+
+import json
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import (
+    GaussMarkov,
+    InputError,
+    Process,
+    RandomWalk,
+    RateRamp,
+    Resonance,
+    WhiteNoise,
+    parameter,
+)
+from places import GOLDEN
+
+TRUTH = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
+
+
+def fitted(truth=TRUTH, n=6000, seed=1, **options):
+    truth = gmwm.process.as_model(truth)
+    return gmwm.fit(truth.opened(), truth.simulate(n, 1.0, seed), dt=1.0, **options)
+
+
+class Noise(Process):
+    """White noise that is known by its samples only."""
+
+    A: float = parameter("u", role="scale")
+
+    def draw(self, n, dt, rng):
+        return self.A * rng.standard_normal(n)
+
+
+class TestResiduals:
+    def test_they_are_standard_normal_at_every_level_if_the_model_is_right(self):
+        runs = 150
+        truth = gmwm.process.as_model(TRUTH)
+        residuals = []
+        for seed in range(runs):
+            # The true values in place of the estimated ones, which would take some of the spread.
+            fit = gmwm.fit(WhiteNoise(), truth.simulate(1000, 1.0, seed), dt=1.0, discrepancy=0.0)
+            residuals.append(replace(fit, model=truth).goodness.residual)
+        table = np.array(residuals)
+        assert np.all(np.abs(table.mean(axis=0)) < 4.5 / runs**0.5)
+        # The standard deviation of a standard deviation is (2 runs)^(-1/2); the normal law of
+        # Wilson & Hilferty is an approximation at the two coarsest levels.
+        scatter = np.abs(table.std(axis=0) - 1.0) * (2 * runs) ** 0.5
+        assert np.all(scatter[:-2] < 4.0), scatter
+        assert np.all(scatter[-2:] < 6.0), scatter
+
+    def test_degrees_of_freedom_are_those_of_independent_samples_at_the_finest_level(self):
+        """var(nu_hat) of first differences of white noise: 3 nu^4/n for large n, by hand."""
+        at = fitted(WhiteNoise(1.0), n=4097).goodness
+        assert at.dof[0] == pytest.approx(2.0 * 4096 / 3.0, rel=0.01)
+
+    def test_against_deviations_by_hand(self):
+        x = TRUTH.simulate(777, 1.0, 3)
+        at = gmwm.fit(TRUTH.opened(), x, dt=1.0).goodness
+        for tau, data in zip(at.tau, at.data, strict=True):
+            m = int(tau)
+            mean = np.convolve(x, np.ones(m) / m, "valid")
+            assert data == pytest.approx(np.sqrt(0.5 * np.mean((mean[m:] - mean[:-m]) ** 2)))
+
+    def test_a_missing_resonance_shows_at_its_octave(self):
+        truth = WhiteNoise(1.0) + Resonance(0.4, 0.02, 0.05)
+        fit = gmwm.fit(WhiteNoise(), truth.simulate(100_000, 1.0, 1), dt=1.0)
+        misfit, tau = fit.goodness.worst
+        assert 8.0 <= tau <= 64.0  # half a period is 25 s
+        assert misfit > 0.1
+        at = fit.goodness
+        k = int(np.flatnonzero(at.tau == tau)[0])
+        assert at.residual[k] > 10.0
+        # What was granted brings the residuals down to their usual size.
+        assert abs(at.granted[k]) < 0.5 * abs(at.residual[k])
+        assert np.sqrt(np.mean(at.granted**2)) < 2.0
+
+    def test_a_model_that_misses_a_level_by_far_is_excluded(self):
+        truth = WhiteNoise(1.0) + GaussMarkov(0.3, 300.0)
+        x = truth.simulate(50_000, 1.0, 1)
+        rigid = gmwm.fit(WhiteNoise(), x, dt=1.0, discrepancy=0.0)
+        assert rigid.goodness.is_excluded
+        # A large misfit alone is no proof: at few degrees of freedom it is chance.
+        chance = [gmwm.fit(truth.opened(), truth.simulate(3000, 1.0, s), dt=1.0) for s in range(20)]
+        assert any(np.max(np.abs(fit.goodness.misfit)) > 0.3 for fit in chance)
+        assert not any(fit.goodness.is_excluded for fit in chance)
+
+    def test_nothing_granted_changes_nothing(self):
+        fit = fitted()
+        assert fit.discrepancy == 0.0
+        np.testing.assert_array_equal(fit.goodness.residual, fit.goodness.granted)
+
+
+class TestEveryMethod:
+    @pytest.mark.parametrize("method", ["gmwm", "mle", "whittle", "em", "simulated"])
+    def test_all_methods_agree_on_a_good_model(self, method):
+        truth = WhiteNoise(0.3) + RandomWalk(0.01)
+        fit = fitted(truth, n=1500, method=method)
+        other = fitted(truth, n=1500)
+        np.testing.assert_allclose(fit.goodness.data, other.goodness.data)
+        # Estimates differ by less than their standard errors; the finest levels have most of them.
+        assert np.all(np.abs(fit.goodness.residual[:4]) < 4.0)
+        assert fit.goodness.worst is not None
+
+    def test_straight_lines_of_the_allan_plot(self):
+        fit = fitted(WhiteNoise(0.3) + RandomWalk(0.01), n=40_000, method="allan")
+        assert np.all(np.isfinite(fit.goodness.residual))
+        drift = 1e-3 * np.arange(4000.0) + 1e-6 * TRUTH.simulate(4000, 1.0, 1)
+        lonely = gmwm.fit(RateRamp(), drift, dt=1.0, method="allan")
+        assert lonely.goodness.worst is None
+        assert str(lonely.goodness)
+
+    def test_a_process_that_can_only_be_simulated(self):
+        x = np.random.default_rng(1).standard_normal(3000)
+        at = gmwm.fit(Noise(), x, dt=1.0, method="simulated").goodness
+        assert abs(at.worst[0]) < 0.5
+        assert np.all(np.isfinite(at.residual))
+
+    def test_a_ramp_is_taken_out(self):
+        fit = fitted(TRUTH + RateRamp(0.01), n=6000)
+        plain = fitted(TRUTH, n=6000)
+        assert fit.goodness.model[-1] < 0.1 * np.sqrt(2.0 * fit.implied[-1])
+        # The series is the same but for its drift, and what the drift's estimate takes is given
+        # back: within a fraction of the standard error of the coarse levels.
+        np.testing.assert_allclose(fit.goodness.data[:8], plain.goodness.data[:8], rtol=0.05)
+        given = gmwm.fit(TRUTH.opened() + RateRamp(0.01), (TRUTH + RateRamp(0.01)).simulate(
+            6000, 1.0, 1), dt=1.0)  # fmt: skip
+        np.testing.assert_allclose(given.goodness.data, plain.goodness.data, rtol=1e-6)
+
+    def test_several_recordings(self):
+        series = [TRUTH.simulate(n, 1.0, n) for n in (3000, 5000)]
+        fit = gmwm.fit(TRUTH.opened(), series, dt=1.0)
+        single = gmwm.fit(TRUTH.opened(), series[1], dt=1.0)
+        assert fit.goodness.dof[0] == pytest.approx(8.0 / 5.0 * single.goodness.dof[0], rel=0.03)
+        again = gmwm.Fit.from_dict(json.loads(json.dumps(fit.to_dict())))
+        assert str(again.goodness) == str(fit.goodness)
+
+    def test_robust_and_gaps_and_other_wavelets(self):
+        x = TRUTH.simulate(5000, 1.0, 4)
+        x[1000:1300] = np.nan
+        plain = gmwm.fit(TRUTH.opened(), gmwm.wavelet_variance(x, 1.0)).goodness
+        robust = gmwm.fit(TRUTH.opened(), gmwm.wavelet_variance(x, 1.0, robust=True)).goodness
+        assert np.all(np.abs(robust.residual) < 4.5)
+        assert robust.dof[0] == pytest.approx(0.6 * plain.dof[0], rel=0.2)
+        db = gmwm.fit(TRUTH.opened(), gmwm.wavelet_variance(x, 1.0, wavelet="db2")).goodness
+        assert np.all(np.abs(db.residual) < 4.5)
+
+    def test_gaps_that_leave_no_variance_are_not_judged(self):
+        x = TRUTH.simulate(600, 1.0, 1)
+        x[::3] = np.nan
+        fit = gmwm.fit(TRUTH.opened(), x, dt=1.0, method="mle")
+        assert "no test of the fit" in fit.message
+        assert fit.goodness.worst is None
+        assert "misfit" not in str(fit)
+
+
+@pytest.mark.parametrize("n", [8, 9, 33])
+def test_short_records(n):
+    x = np.random.default_rng(n).standard_normal(n)
+    at = gmwm.fit(WhiteNoise(), x, dt=1.0).goodness
+    assert at.worst is None or at.dof.max() > 30.0
+    assert str(at).count("\n") >= at.tau.size + 1
+
+
+def test_printed_table():
+    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RateRamp(1e-3)
+    fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0)
+    text = str(fit.goodness)
+    assert text == (GOLDEN / "goodness.txt").read_text().rstrip("\n")
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_extremes_fit_the_table():
+    at = fitted().goodness
+    odd = replace(at, misfit=at.misfit * 1e7, residual=at.residual * 1e3, name="x" * 20)
+    assert max(map(len, str(odd).splitlines())) <= 80
+    assert "granted" in str(replace(odd, misfit=np.full(at.tau.size, np.nan)))
+
+
+def test_the_fit_tells_the_largest_misfit():
+    fit = fitted(n=20_000)
+    misfit, tau = fit.goodness.worst
+    assert f"largest misfit {100 * abs(misfit):.2g} % of the deviation at tau = {tau:.3g} s" in (
+        " ".join(str(fit).split())
+    )
+
+
+def test_it_draws_itself():
+    at = fitted(WhiteNoise(1.0), n=500).goodness
+    axes = at.plot()
+    assert axes.get_xscale() == "log"
+    assert [text.get_text() for text in axes.texts] == [f"{100 * m:+.2g}" for m in at.misfit]
+    stems = axes.collections[-1].get_segments()
+    np.testing.assert_allclose([s[1][1] for s in stems], at.residual)
+    assert at.plot(axes) is axes
+    plt.close(axes.figure)
+
+
+class TestNeededLength:
+    def test_it_is_what_makes_the_error_so(self):
+        """The standard error of N from white noise: that of a Gaussian sample, 1/(2 n)^(1/2)."""
+        fit = fitted(WhiteNoise(1.0), n=2000)
+        relative = fit.stderr["N"] / fit.params["N"]
+        assert fit.needed_length(0.01)["N"] == pytest.approx(2000 * (relative / 0.01) ** 2)
+        # 1/(2 n)^(1/2) = 0.01 at n = 5000; the Haar variances lose little of it.
+        assert fit.needed_length(0.01)["N"] == pytest.approx(5000, rel=0.2)
+
+    def test_a_record_of_that_length_has_that_error(self):
+        truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
+        first = fitted(truth, n=10_000, seed=2)
+        wanted = first.needed_length(0.06)
+        longer = fitted(truth, n=int(wanted["sigma"]), seed=3)
+        # The first error is that of an estimate: 10 % of it, and of the law's next order.
+        assert longer.stderr["sigma"] / longer.params["sigma"] == pytest.approx(0.06, rel=0.25)
+
+    def test_what_it_says_of_bounds_ramps_and_given_values(self):
+        x = TRUTH.simulate(4000, 1.0, 5)
+        fit = gmwm.fit(WhiteNoise() + GaussMarkov(tau=20.0) + RateRamp(), x, dt=1.0)
+        assert set(fit.needed_length()) == {"N", "sigma"}
+        white = WhiteNoise(1.0).simulate(4000, 1.0, 5)
+        bounded = gmwm.fit(WhiteNoise() + RandomWalk(), white, dt=1.0)
+        assert "K" in bounded.upper_bounds
+        assert bounded.needed_length()["K"] == np.inf
+
+    def test_several_recordings_count_together(self):
+        series = [TRUTH.simulate(4000, 1.0, seed) for seed in (1, 2)]
+        fit = gmwm.fit(TRUTH.opened(), series, dt=1.0)
+        relative = fit.stderr["tau"] / fit.params["tau"]
+        assert fit.needed_length()["tau"] == pytest.approx(8000 * (relative / 0.1) ** 2)
+
+    @pytest.mark.parametrize("value", [0.0, -1.0, "much", np.nan, None])
+    def test_an_error_that_is_none(self, value):
+        with pytest.raises(InputError, match="relative_error"):
+            fitted(WhiteNoise(1.0), n=100).needed_length(value)

@@ -1,0 +1,239 @@
+"""The estimator: what it finds, what it refuses, and what it says."""
+
+import json
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
+from places import GOLDEN
+
+
+def inside(fit, truth, level=0.999):
+    """Whether every parameter's interval holds the truth."""
+    bounds = fit.interval(level)
+    return {key: bounds[key][0] <= truth.params[key] <= bounds[key][1] for key in bounds}
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        WhiteNoise(0.2),
+        QuantizationNoise(0.4) + WhiteNoise(0.2) + RandomWalk(0.01),
+        WhiteNoise(0.3) + gmwm.BiasInstability(0.2),
+        WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + GaussMarkov(0.4, 600.0),
+        WhiteNoise(0.2) + RandomWalk(0.01) + RateRamp(-2e-3),
+        WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1),
+        WhiteNoise(0.2) + gmwm.Sinusoid(0.5, 0.01),
+        gmwm.AR([1.5, -0.7], 1.0),
+        gmwm.MA([0.6], 1.0),
+        gmwm.ARMA([0.9], [-0.5], 1.0),
+        gmwm.ARIMA(0, 1, [0.5], 1e-3),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("dt", [1.0, 0.01])
+def test_every_kind_of_model_is_found_again(truth, dt):
+    scaled = truth
+    if dt != 1.0 and not isinstance(truth, gmwm.ARIMA):
+        # The same series in other units of time.
+        values = {}
+        for item in gmwm.process.as_model(truth).parameters:
+            power = {"s": 1, "Hz": -1, "u/sqrt(Hz)": 0.5, "u s": 1, "u/s": -1, "u/s/sqrt(Hz)": -0.5}
+            values[item.key] = item.value * dt ** power.get(item.parameter.unit, 0)
+        scaled = gmwm.process.as_model(truth).with_params(values)
+    scaled = gmwm.process.as_model(scaled)
+    x = scaled.simulate(30_000, dt, seed=7)
+    fit = gmwm.fit(scaled.opened(), x, dt=dt)
+    assert fit.valid, fit.message
+    assert all(inside(fit, scaled).values()), (fit.params, fit.interval(0.999))
+
+
+def test_given_parameters_stay_as_they_are():
+    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
+    fit = gmwm.fit(
+        WhiteNoise() + GaussMarkov(tau=20.0), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0
+    )
+    assert fit.params["tau"] == 20.0
+    assert set(fit.stderr) == {"N", "sigma"}
+    fixed = gmwm.fit(WhiteNoise(0.2) + GaussMarkov(), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0)
+    assert fixed.params["N"] == 0.2
+    assert all(inside(fixed, truth).values())
+
+
+def test_scale_and_offset_do_not_matter():
+    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
+    x = gmwm.simulate(truth, 20_000, 1.0, 2)
+    plain = gmwm.fit(truth.opened(), x, dt=1.0)
+    scaled = gmwm.fit(truth.opened(), 1e-7 * x + 3e-5, dt=1.0)
+    assert scaled.params["tau"] == pytest.approx(plain.params["tau"], rel=1e-3)
+    assert scaled.params["sigma"] == pytest.approx(1e-7 * plain.params["sigma"], rel=1e-3)
+    assert scaled.objective == pytest.approx(plain.objective, rel=1e-2)
+
+
+@pytest.mark.parametrize("omega", ["model", "diagonal", "identity"])
+def test_standard_errors_are_right_for_every_weight(omega):
+    truth = WhiteNoise(0.3) + RandomWalk(0.02)
+    rng = np.random.default_rng(5)
+    fits = [
+        gmwm.fit(truth.opened(), truth.simulate(2000, 1.0, rng), dt=1.0, omega=omega)
+        for _ in range(80)
+    ]
+    for key in ("N", "K"):
+        estimates = np.array([fit.params[key] for fit in fits])
+        predicted = np.median([fit.stderr[key] for fit in fits if key in fit.stderr])
+        # sd of a standard deviation over 80 runs: 8 %, more for the skewed identity weights
+        assert np.std(estimates) == pytest.approx(predicted, rel=0.35)
+        assert np.mean(estimates) == pytest.approx(truth.params[key], abs=4 * predicted / 80**0.5)
+
+
+def test_model_weights_are_the_most_efficient():
+    truth = WhiteNoise(0.3) + RandomWalk(0.02)
+    x = gmwm.simulate(truth, 20_000, 1.0, 6)
+    errors = {
+        omega: gmwm.fit(truth.opened(), x, dt=1.0, omega=omega).stderr
+        for omega in ("model", "diagonal", "identity")
+    }
+    for key in ("N", "K"):
+        assert errors["model"][key] < 1.02 * min(errors["diagonal"][key], errors["identity"][key])
+
+
+class TestWhatIsOff:
+    def test_a_random_walk_that_is_not_there_has_an_upper_bound(self):
+        covered = found = 0
+        rng = np.random.default_rng(11)
+        for _ in range(40):
+            fit = gmwm.fit(
+                WhiteNoise() + RandomWalk(), WhiteNoise(1.0).simulate(3000, 1.0, rng), dt=1.0
+            )
+            if "K" in fit.upper_bounds:
+                assert not fit.valid
+                assert "K is not identifiable" in fit.message
+                assert fit.interval()["K"] == (0.0, fit.upper_bounds["K"])
+                covered += 1
+            else:
+                found += 1
+        # A random walk of zero comes out as zero in about half of the runs.
+        assert covered >= 10
+
+    def test_an_upper_bound_covers_a_small_random_walk(self):
+        truth = WhiteNoise(1.0) + RandomWalk(2e-4)
+        rng = np.random.default_rng(13)
+        above = total = 0
+        for _ in range(60):
+            fit = gmwm.fit(truth.opened(), truth.simulate(3000, 1.0, rng), dt=1.0)
+            if "K" in fit.upper_bounds:
+                total += 1
+                above += fit.upper_bounds["K"] > 2e-4
+        assert total > 10
+        assert above >= 0.85 * total
+
+    def test_two_gauss_markov_that_are_one(self):
+        truth = WhiteNoise(0.5) + GaussMarkov(1.0, 30.0)
+        fit = gmwm.fit(
+            WhiteNoise() + 2 * GaussMarkov(), gmwm.simulate(truth, 20_000, 1.0, 3), dt=1.0
+        )
+        assert not fit.valid
+        assert any(
+            words in fit.message for words in ("use one less", "not identifiable", "leave it out")
+        )
+
+    def test_fewer_levels_than_parameters(self):
+        x = gmwm.simulate(WhiteNoise(1.0), 40, 1.0, 1)
+        fit = gmwm.fit(WhiteNoise() + 3 * GaussMarkov(), x, dt=1.0)
+        assert not fit.valid
+        assert "5 levels cannot determine 7 parameters" in fit.message
+
+    def test_a_model_that_misses_the_data_says_so(self):
+        truth = WhiteNoise(0.1) + GaussMarkov(1.0, 50.0)
+        fit = gmwm.fit(WhiteNoise(), gmwm.simulate(truth, 50_000, 1.0, 3), dt=1.0)
+        assert not fit.valid
+        assert fit.discrepancy > 0.1
+        assert "differs from the data" in fit.message
+
+    def test_a_model_that_fits_has_no_discrepancy(self):
+        truth = WhiteNoise(0.1) + GaussMarkov(1.0, 50.0)
+        for seed in range(5):
+            fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, 50_000, 1.0, seed), dt=1.0)
+            assert fit.discrepancy == 0.0
+            assert fit.valid
+
+    def test_discrepancy_keeps_the_long_averaging_times(self):
+        """A resonance that the model lacks must not pull the slow terms away."""
+        slow = WhiteNoise(0.01) + RandomWalk(1e-4)
+        truth = slow + Resonance(0.02, 20.0, 0.02)
+        x = truth.simulate(1_000_000, 0.01, seed=5)
+        fit = gmwm.fit(slow.opened(), x, dt=0.01)
+        assert fit.discrepancy > 0.01
+        assert fit.params["K"] == pytest.approx(1e-4, rel=0.5)
+        rigid = gmwm.fit(slow.opened(), x, dt=0.01, discrepancy=0.0)
+        assert rigid.discrepancy == 0.0
+        error = abs(np.log(fit.params["K"] / 1e-4))
+        assert "K" in rigid.upper_bounds or error < abs(np.log(rigid.params["K"] / 1e-4)) + 0.05
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"model": WhiteNoise(1.0)}, "no open parameter"),
+        ({"model": RateRamp()}, "no noise process"),
+        ({"model": "white"}, "no error model"),
+        ({"method": "magic"}, "known are gmwm"),
+        ({"omega": "data!"}, "known are model"),
+        ({"discrepancy": 2.0}, "share of the variance"),
+        ({"dt": None}, "sampling interval"),
+        ({"model": gmwm.ARIMA(0, 2, 1)}, "one integration"),
+        ({"model": gmwm.AR([0.5, None])}, "give all or none"),
+    ],
+)
+def test_bad_arguments(arguments, words):
+    x = gmwm.simulate(WhiteNoise(1.0), 100, 1.0, 1)
+    with pytest.raises(gmwm.InputError, match=words):
+        gmwm.fit(**({"model": WhiteNoise(), "data": x, "dt": 1.0} | arguments))
+
+
+def example_fit():
+    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RateRamp(1e-3)
+    return gmwm.fit(truth.opened(), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0)
+
+
+def test_printed_table():
+    assert str(example_fit()) == (GOLDEN / "fit.txt").read_text().rstrip("\n")
+
+
+def test_round_trip_through_json():
+    fit = example_fit()
+    again = gmwm.Fit.from_dict(json.loads(json.dumps(fit.to_dict(), allow_nan=False)))
+    assert str(again) == str(fit)
+    assert again.params == fit.params
+    assert again.interval(0.9) == fit.interval(0.9)
+    np.testing.assert_array_equal(again.covariance, fit.covariance)
+
+
+def test_intervals_keep_to_bounds_and_grow_with_the_level():
+    fit = example_fit()
+    for key, (low, high) in fit.interval(0.99).items():
+        narrow = fit.interval(0.5)[key]
+        assert low < narrow[0] < fit.params[key] < narrow[1] < high
+        assert key == "R" or low > 0.0
+    with pytest.raises(gmwm.InputError, match="between 0 and 1"):
+        fit.interval(95)
+
+
+def test_curves_add_up():
+    fit = example_fit()
+    np.testing.assert_allclose(sum(fit.components.values()), fit.implied)
+    value, low, high = fit.deviation_interval(fit.wv.tau)
+    np.testing.assert_allclose(value, np.sqrt(2.0 * fit.implied))
+    assert np.all((low < value) & (value < high))
+
+
+def test_plot_shows_data_model_and_components():
+    axes = example_fit().plot()
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["white noise", "Gauss-Markov", "rate ramp", "model", "data, 95 % interval"]
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    assert axes.get_xlabel() == "averaging time [s]"
+    plt.close(axes.figure)

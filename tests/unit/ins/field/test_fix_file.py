@@ -1,0 +1,161 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.ins import read_fixes, read_imu
+from gmwm.ins.field.imu_file import read_imu_log
+
+ROWS = [[100.0 + i, 46.0 + 1e-5 * i, 7.0 + 2e-5 * i, 400.0 + i] for i in range(5)]
+HEAD = "time_s,latitude_deg,longitude_deg,height_m"
+
+
+def write(folder: Path, rows: list[list[object]], header: str = HEAD) -> Path:
+    path = folder / "fixes.csv"
+    path.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]))
+    return path
+
+
+@pytest.mark.parametrize(
+    "header",
+    [HEAD, "t [s],Lat [deg],Lon [deg],Alt [m]", "time,gps_lat,gps_lon,h", "time,lat,lng,altitude"],
+)
+def test_positions(tmp_path: Path, header: str) -> None:
+    (fixes,) = read_fixes(write(tmp_path, ROWS, header), start=90.0).fixes
+    assert fixes.kind == "position"
+    np.testing.assert_allclose(fixes.time, np.arange(10.0, 15.0))
+    np.testing.assert_allclose(np.degrees(fixes.value[:, :2]), [row[1:3] for row in ROWS])
+    np.testing.assert_allclose(fixes.value[:, 2], np.arange(400.0, 405.0))
+    np.testing.assert_allclose(fixes.sd, np.tile([1.0, 1.0, 1.5], (5, 1)))
+
+
+@pytest.mark.parametrize(
+    ("header", "sign"),
+    [
+        ("velocity_north_mps,velocity_east_mps,velocity_down_mps", 1.0),
+        ("vn,ve,vd", 1.0),
+        ("VelN [m/s],VelE [m/s],VelU [m/s]", -1.0),
+        ("north_velocity,east_velocity,up_velocity", -1.0),
+        ("vel_n_m_s,vel_e_m_s,vel_d_m_s", 1.0),
+    ],
+)
+def test_velocities(tmp_path: Path, header: str, sign: float) -> None:
+    rows = [[*row, 1.0, 2.0, 3.0] for row in ROWS]
+    _, velocity = read_fixes(write(tmp_path, rows, f"{HEAD},{header}")).fixes
+    assert velocity.kind == "velocity"
+    np.testing.assert_allclose(velocity.value, np.tile([1.0, 2.0, 3.0 * sign], (5, 1)))
+
+
+@pytest.mark.parametrize(
+    ("header", "count"),
+    [
+        ("sd_north_m,sd_east_m,sd_down_m", 3),
+        ("std_n,std_e,std_u", 3),
+        ("latitude_sd_m,longitude_sd_m,height_sd_m", 3),
+        ("sigma_lat,sigma_lon,sigma_h", 3),
+        ("horizontal_accuracy_m,vertical_accuracy_m", 2),
+    ],
+)
+def test_standard_deviations(tmp_path: Path, header: str, count: int) -> None:
+    values = [2.0, 2.0, 5.0] if count == 3 else [2.0, 5.0]
+    rows = [[*row, *values] for row in ROWS]
+    (fixes,) = read_fixes(write(tmp_path, rows, f"{HEAD},{header}")).fixes
+    np.testing.assert_allclose(fixes.sd, np.tile([2.0, 2.0, 5.0], (5, 1)))
+
+
+def test_empty_rows_and_the_gulf_of_guinea_are_no_fixes(tmp_path: Path) -> None:
+    rows: list[list[object]] = [list(row) for row in ROWS]
+    rows[1][1] = ""
+    rows[3][1:3] = [0.0, 0.0]
+    (fixes,) = read_fixes(write(tmp_path, rows)).fixes
+    np.testing.assert_allclose(fixes.time, [100.0, 102.0, 104.0])
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "cells", "message"),
+    [
+        ("time_s,latitude_deg,height_m,x", 0, ROWS[0], "no column for longitude"),
+        ("time_s,latitude_rad,longitude_rad,height_m", 0, ROWS[0], "line 2: a latitude of 26"),
+        ("time_s,latitude_m,longitude_deg,height_m", 0, ROWS[0], "m is no unit of an angle"),
+        ("time_s,latitude_deg,longitude_deg,height_deg", 0, ROWS[0], "no unit of a height"),
+        (HEAD, 2, [101.0, 46, 7, 400], "line 4: time stamp 101 repeats the one before"),
+        (HEAD, 2, [99.0, 46, 7, 400], "line 4: time stamp 99 goes back"),
+        (HEAD, 2, ["", 46, 7, 400], "line 4: no time"),
+        (HEAD, 2, [102, "x", 7, 400], "line 4"),
+    ],
+)
+def test_bad_files(
+    tmp_path: Path, header: str, row: int, cells: list[object], message: str
+) -> None:
+    rows: list[list[object]] = [list(each) for each in ROWS]
+    rows[row] = cells
+    with pytest.raises(InputError, match=message):
+        read_fixes(write(tmp_path, rows, header))
+
+
+def test_a_velocity_without_one_component_or_a_deviation_of_zero(tmp_path: Path) -> None:
+    rows: list[list[object]] = [[*row, 1.0, 2.0] for row in ROWS]
+    with pytest.raises(InputError, match="none for velocity down"):
+        read_fixes(write(tmp_path, rows, f"{HEAD},vn,ve"))
+    rows = [[*row, 1.0, 2.0, 0.0 if i == 3 else 1.0] for i, row in enumerate(ROWS)]
+    with pytest.raises(InputError, match="line 5: a standard deviation of 0"):
+        read_fixes(write(tmp_path, rows, f"{HEAD},sd_n,sd_e,sd_d"))
+    with pytest.raises(InputError, match="both look like"):
+        read_fixes(write(tmp_path, rows, f"{HEAD},vn,ve,v_north"))
+    with pytest.raises(InputError, match="does not exist"):
+        read_fixes(tmp_path / "no.csv")
+
+
+def imu_rows(n: int = 100) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    rows = np.hstack([5.0 + 0.02 * np.arange(n)[:, None], 0.01 * rng.standard_normal((n, 6))])
+    rows[:, 6] -= 9.8
+    return rows
+
+
+IMU_HEAD = "time,wx [deg/s],wy [deg/s],wz [deg/s],ax [m/s^2],ay [m/s^2],az [m/s^2]"
+
+
+def write_imu(folder: Path, rows: np.ndarray, header: str = IMU_HEAD) -> Path:
+    path = folder / "imu.csv"
+    lines = [",".join("" if np.isnan(x) else f"{x:.12g}" for x in row) for row in rows]
+    path.write_text("\n".join([header, *lines]))
+    return path
+
+
+def test_samples_become_increments_over_the_interval_that_ends_at_their_stamp(
+    tmp_path: Path,
+) -> None:
+    rows = imu_rows()
+    log = read_imu_log(write_imu(tmp_path, rows))
+    assert log.start == pytest.approx(5.0 - 0.02)
+    assert log.imu.dt == pytest.approx(0.02)
+    np.testing.assert_allclose(log.imu.rotation, np.radians(rows[:, 1:4]) * 0.02, rtol=1e-9)
+    np.testing.assert_allclose(log.imu.velocity, rows[:, 4:] * 0.02, rtol=1e-9)
+
+
+def test_a_clock_in_microseconds(tmp_path: Path) -> None:
+    rows = imu_rows()
+    rows[:, 0] *= 1e6
+    log = read_imu_log(write_imu(tmp_path, rows, IMU_HEAD.replace("time", "time_us")))
+    assert log.start == pytest.approx(5.0 - 0.02)
+
+
+def test_bad_imu_files(tmp_path: Path) -> None:
+    rows = imu_rows()
+    holed = rows.copy()
+    holed[30, 3] = np.nan
+    with pytest.raises(InputError, match=r"sample 31 of gyro_z, 0.6 s after the first, is missing"):
+        read_imu(write_imu(tmp_path, holed))
+    with pytest.raises(InputError, match="sample 31 of gyro_x"):
+        read_imu(write_imu(tmp_path, np.delete(rows, 30, axis=0)))
+    with pytest.raises(InputError, match="no channel accel_z"):
+        read_imu(write_imu(tmp_path, rows[:, :6], IMU_HEAD.rpartition(",")[0]))
+    free = rows.copy()
+    free[:, 6] += 9.8
+    with pytest.raises(InputError, match="that gravity is not taken off"):
+        read_imu(write_imu(tmp_path, free))
+    upward = rows.copy()
+    upward[:, 6] *= -1.0
+    assert "points up" in " ".join(read_imu_log(write_imu(tmp_path, upward)).notes)

@@ -1,0 +1,292 @@
+"""Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from gmwm import cli
+from gmwm.errors import InputError
+from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
+from gmwm.ins.field.measured import Measured
+from gmwm.ins.field.navigated import Navigated
+from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.spec.model_text import sensor_models
+
+RATE, START = 25.0, 1000.0
+SENSORS = {
+    "gyro": {"N": "20 deg/h/sqrt(Hz)", "GM": [["20 deg/h", 100]]},
+    "accel": {"N": "100 ug/sqrt(Hz)", "GM": [["100 ug", 100]]},
+}
+WRONG = {"gyro": {"N": "0.02 deg/h/sqrt(Hz)"}, "accel": {"N": "1 ug/sqrt(Hz)"}}
+ARM = [1.0, 0.3, -1.0]
+IMU_HEADER = "time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+def table(path, header, columns):
+    with open(path, "w") as stream:
+        np.savetxt(stream, np.column_stack(columns), "%.12g", ",", header=header, comments="")
+
+
+def drive(folder, seed=0, trajectory=None, velocity=True, deviations=True, hole=(100.0, 120.0)):
+    """Write imu.csv and fixes.csv of a drive; returns the true trajectory."""
+    rng = np.random.default_rng(seed)
+    truth = trajectory or car_drive(duration=160.0, dt=1.0 / RATE)
+    ideal = emulate(truth)
+    errors = sensor_models(SENSORS, "test").simulate(ideal.n, ideal.dt, rng).total
+    errors += np.repeat([0.002, 0.05], 3) * rng.standard_normal(6)
+    imu = ideal.with_errors(errors[:, :3], errors[:, 3:])
+    stamps = START + imu.dt * (1.0 + np.arange(imu.n))
+    table(folder / "imu.csv", IMU_HEADER, [stamps, imu.rotation / imu.dt, imu.velocity / imu.dt])
+    aiding = gnss(
+        truth, velocity_sd=(0.1, 0.1, 0.15) if velocity else None, lever_arm=ARM, imu=ideal
+    )
+    aiding = aiding.without([Outage(hole[0], hole[1] - hole[0])]).noisy(rng)
+    position = aiding.fixes[0]
+    names = ["time_s", "latitude_deg", "longitude_deg", "height_m"]
+    columns = [START + position.time, np.degrees(position.value[:, :2]), position.value[:, 2]]
+    if deviations:
+        names += ["sd_north_m", "sd_east_m", "sd_down_m"]
+        columns.append(position.sd)
+    if velocity:
+        names += ["velocity_north_mps", "velocity_east_mps", "velocity_up_mps"]
+        columns.append(aiding.fixes[1].value * [1.0, 1.0, -1.0])
+    table(folder / "fixes.csv", ",".join(names), columns)
+    return truth
+
+
+def content(**changes):
+    found = {
+        "imu": {"file": "imu.csv", "units": UNITS},
+        "gnss_fixes": "fixes.csv",
+        "sensors": SENSORS,
+        "lever_arm": ARM,
+    }
+    return found | changes
+
+
+def standardised(found, truth):
+    """Errors of the solution in their predicted standard deviations, (K, 9)."""
+    part = truth.segment(found.alignment.epoch * truth.dt, truth.duration)
+    return found.solution.errors(part) / found.solution.sd
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+def test_a_drive_comes_back_within_its_own_standard_deviations(tmp_path, velocity):
+    squares, fits = [], 0
+    for seed in range(4):
+        truth = drive(tmp_path, seed, velocity=velocity)
+        found = Navigated.of(Measured.of(content(), tmp_path))
+        squares.append(np.mean(standardised(found, truth) ** 2, axis=0))
+        fits += found.fits
+        assert found.hole.end - found.hole.start == pytest.approx(20.0)
+    # Errors are correlated over some 10 s, so a run counts as 16 draws at least: 64 in all, of
+    # which the mean square lies within 1 +- 5 sqrt(2 / 64); less is allowed, for the biases drawn
+    # are smaller than what the filter is told to expect.
+    assert np.all(np.mean(squares, axis=0) < 1.9)
+    assert np.all(np.mean(squares, axis=0)[:3] > 0.4)
+    assert fits == 4
+
+
+def test_a_record_that_begins_in_flight_takes_heading_and_speed_from_gnss(tmp_path):
+    truth = drive(tmp_path, 3, fixed_wing_loiter(duration=120.0, dt=1.0 / RATE), hole=(80.0, 90.0))
+    found = Navigated.of(Measured.of(content(), tmp_path))
+    assert "in steady motion" in " ".join(found.alignment.notes)
+    assert found.alignment.gyro_bias_sd is None
+    assert np.all(np.abs(standardised(found, truth)[0]) < 4.5)
+    assert np.all(np.abs(standardised(found, truth)[-1]) < 4.5)
+
+
+def test_a_heading_that_is_given_is_taken(tmp_path):
+    truth = drive(tmp_path)
+    true = np.degrees(truth.rpy[int(RATE), 2])
+    found = Navigated.of(
+        Measured.of(content(heading=f"{true + 0.5} deg", heading_sd="1 deg"), tmp_path)
+    )
+    assert np.degrees(found.alignment.state.rpy[2]) == pytest.approx(true + 0.5)
+    assert np.degrees(found.alignment.sd.heading) == pytest.approx(1.0)
+
+
+def test_a_vehicle_that_never_moves_has_no_heading_unless_its_gyros_feel_the_earth(tmp_path):
+    drive(tmp_path)
+    for name, rows in (("imu.csv", int(19 * RATE)), ("fixes.csv", 19)):
+        lines = (tmp_path / name).read_text().splitlines()[: rows + 1]
+        (tmp_path / name).write_text("\n".join(lines))
+    with pytest.raises(InputError, match="give it \\(--heading DEG"):
+        Navigated.of(Measured.of(content(), tmp_path))
+    assert Navigated.of(Measured.of(content(heading=1.0), tmp_path)).solution.time[
+        -1
+    ] == pytest.approx(18.0)
+
+
+def test_a_good_gyro_finds_north_by_itself(tmp_path):
+    truth = car_drive(duration=18.0, dt=1.0 / RATE)
+    imu = emulate(truth)
+    stamps = START + imu.dt * (1.0 + np.arange(imu.n))
+    table(tmp_path / "imu.csv", IMU_HEADER, [stamps, imu.rotation / imu.dt, imu.velocity / imu.dt])
+    fixes = gnss(truth).fixes[0]
+    table(tmp_path / "fixes.csv", "time_s,latitude_deg,longitude_deg,height_m",
+          [START + fixes.time, np.degrees(fixes.value[:, :2]), fixes.value[:, 2]])  # fmt: skip
+    navigation_grade = {"gyro": {"N": "0.01 deg/h/sqrt(Hz)"}, "accel": {"N": "5 ug/sqrt(Hz)"}}
+    bias = {"gyro": "0.01 deg/h", "accel": "50 ug"}
+    found = Navigated.of(Measured.of(content(sensors=navigation_grade, bias=bias,
+                                             lever_arm=0), tmp_path))  # fmt: skip
+    assert "Earth's rotation" in " ".join(found.alignment.notes)
+    assert found.alignment.state.rpy[2] == pytest.approx(truth.rpy[0, 2], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}, "The filter is lost: innovations"),
+        ({"sensors": {"gyro": {"N": "1 deg/s/sqrt(Hz)"}, "accel": {"N": "30000 ug/sqrt(Hz)"}}},
+         "sensors are better than their models say"),
+        ({"position_sd": 0.3}, "the fixes than their standard deviations"),
+    ],
+)  # fmt: skip
+def test_a_wrong_model_is_told(tmp_path, changes, verdict):
+    drive(tmp_path, deviations=False)
+    found = Navigated.of(Measured.of(content(**changes), tmp_path))
+    assert not found.fits
+    assert found.verdict.startswith(("The filter is lost", "The filter's model does not fit"))
+    assert verdict in found.verdict
+
+
+def test_outliers_are_told_apart_from_a_wrong_model(tmp_path):
+    drive(tmp_path)
+    path = tmp_path / "fixes.csv"
+    lines = path.read_text().splitlines()
+    for row in (40, 60, 90):
+        cells = lines[row].split(",")
+        cells[3] = str(float(cells[3]) + 60.0)
+        lines[row] = ",".join(cells)
+    path.write_text("\n".join(lines))
+    found = Navigated.of(Measured.of(content(), tmp_path))
+    assert "some fixes are outliers" in found.verdict
+    size, at = found.farthest
+    assert size > 20.0
+    assert at in (START + 40.0, START + 60.0, START + 90.0)
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", "navigate", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code
+        return code, *capsys.readouterr()
+
+    return _run
+
+
+def test_the_command_writes_the_solution_and_a_report(run):
+    folder = Path("data")
+    folder.mkdir()
+    truth = drive(folder)
+    (folder / "run.yaml").write_text(yaml.safe_dump(content()))
+    code, printed, told = run(folder / "run.yaml", "-o", "out")
+    assert (code, told) == (0, "")
+    assert max(map(len, printed.splitlines())) <= 80
+    for text in ("Innovations: NIS", "Predicted accuracy at the end", "do not contradict",
+                 "Longest time without a position fix: 20 s, from 1100 s to 1120 s"):  # fmt: skip
+        assert text in printed
+    rows = np.genfromtxt("out/solution.csv", delimiter=",", names=True)
+    epoch = np.rint((rows["time_s"] - START) * RATE).astype(int)
+    lla = np.column_stack([np.radians(rows["latitude_deg"]), np.radians(rows["longitude_deg"]),
+                           rows["height_m"]])  # fmt: skip
+    error = ned_difference(lla, truth.lla[epoch])
+    sd = np.column_stack([rows[f"sd_{axis}_m"] for axis in ("north", "east", "down")])
+    assert np.max(np.abs(error / sd)) < 5.0
+    turn = (rows["yaw_deg"] - np.degrees(truth.rpy[epoch, 2]) + 180.0) % 360.0 - 180.0
+    assert np.max(np.abs(turn / rows["sd_heading_deg"])) < 5.0
+    page = Path("out/report.html").read_text()
+    assert "do not contradict the filter&#39;s model" in page
+    assert "<script" not in page
+
+
+def test_the_command_without_a_file(run):
+    drive(Path())
+    calibrated = yaml.safe_dump(content(imu="imu.csv"))
+    Path("run.yaml").write_text(calibrated)
+    by_options = run("run.yaml", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--heading",
+                     57.3, "--lever-arm", "1,0.3,-1", "--gyro-bias", "0.1 deg/s")  # fmt: skip
+    assert by_options[0] == 0
+    assert "heading as given: 57.30 deg" in by_options[1]
+
+
+BAD = {
+    "no sensors": ({"sensors": None}, "there is no sensors: filtering needs"),
+    "no imu": ({"imu": None}, "there is no imu"),
+    "imu: number": ({"imu": 5}, "imu: 5: write the name of a file"),
+    "imu: missing": ({"imu": {"file": "no.csv", "units": UNITS}}, "no.csv does not exist"),
+    "imu: unit": ({"imu": {"file": "imu.csv", "units": {"gyro": "rad/s", "accel": "g"}}},
+                  "far from gravity"),
+    "imu: key": ({"imu": {"file": "imu.csv", "unit": 1}}, "'unit' is unknown"),
+    "imu: fixes": ({"imu": {"file": "fixes.csv", "units": UNITS}}, "fixes.csv"),
+    "fixes: imu": ({"gnss_fixes": "imu.csv"}, "has no column for latitude, longitude, height"),
+    "fixes: number": ({"gnss_fixes": 5}, "write the name of a file"),
+    "fixes: folder": ({"gnss_fixes": "."}, "is a directory"),
+    "both": ({"trajectory": "car"}, "'trajectory' is unknown"),
+    "arm": ({"lever_arm": [1, 2]}, "lever_arm: [1, 2]: give three numbers"),
+    "heading": ({"heading": "north"}, "heading: 'north' is no number"),
+    "heading unit": ({"heading": "3 m"}, "same as rad"),
+    "heading sd": ({"heading_sd": 0}, "give a positive number"),
+    "sd": ({"position_sd": -1}, "position_sd = -1.0"),
+    "bias": ({"bias": {"mag": 1}}, "'mag' is unknown"),
+    "bias: negative": ({"bias": {"gyro": -1}}, "bias, gyro = -1.0"),
+    "sensors": ({"sensors": 5}, "sensors: 5: give a calibration.json"),
+    "flicker": ({"sensors": SENSORS | {"gyro": {"B": "1 deg/h"}}}, "approximate it by"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_used_is_refused_in_one_sentence(run, case):
+    drive(Path(), trajectory=car_drive(duration=30.0, dt=1.0 / RATE), hole=(10.0, 12.0))
+    changes, message = BAD[case]
+    Path("run.yaml").write_text(yaml.safe_dump(content(**changes)))
+    code, printed, told = run("run.yaml", "-o", "out")
+    assert (code, printed) == (2, "")
+    assert told.startswith("gmwm: ")
+    assert told.count("\n") == 1
+    assert message in told, told
+    assert not Path("out").exists()
+
+
+def test_files_of_two_clocks_are_refused_with_both_spans(tmp_path):
+    drive(tmp_path)
+    path = tmp_path / "fixes.csv"
+    path.write_text(path.read_text().replace("\n1", "\n9"))
+    with pytest.raises(InputError, match=r"none in the time of imu.csv, 1000 s to 1160 s"):
+        Measured.of(content(), tmp_path)
+
+
+def test_an_imu_that_is_shaken_all_the_time_cannot_be_levelled(tmp_path):
+    truth = drive(tmp_path)
+    assert truth.duration == 160.0
+    rows = np.genfromtxt(tmp_path / "imu.csv", delimiter=",", skip_header=1)
+    rows[:, 4] += 3.0 * np.sin(2.0 * np.pi * 0.37 * rows[:, 0])
+    table(tmp_path / "imu.csv", IMU_HEADER, [rows])
+    with pytest.raises(InputError, match="steady for 2 s nowhere"):
+        Navigated.of(Measured.of(content(), tmp_path))
+
+
+def test_misfits_of_two_kinds_do_not_make_each_other_good(tmp_path):
+    """Fixes whose positions are worse than said and whose velocities are better."""
+    drive(tmp_path, deviations=False)
+    found = Navigated.of(
+        Measured.of(content(position_sd=[0.8, 0.8, 1.2], velocity_sd=0.2), tmp_path)
+    )
+    assert not found.fits
+    assert " in position and " in found.verdict
+    assert "do not go together" in found.verdict
+    assert "which it is not" in str(found)

@@ -1,0 +1,155 @@
+"""Rows, residuals, corrections and the loop of the navigation filter."""
+
+import numpy as np
+import pytest
+
+from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
+from gmwm.ins.filter.filter_kernels import (
+    IS_HEIGHT,
+    IS_POSITION,
+    IS_STANDSTILL,
+    IS_VELOCITY,
+    axis_sums,
+    correct,
+    measurement_row,
+    residual,
+    sample_error,
+)
+from gmwm.ins.filter.states import SensorStates
+from gmwm.ins.geometry.earth import ned_difference, offset
+from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.imu.sensors import SensorModels
+
+DT = 0.01
+ATTITUDE = np.array([0.3, -0.4, 2.1])
+VELOCITY = np.array([40.0, -25.0, 3.0])
+RATE = np.array([0.2, -0.5, 0.7])
+LEVER = np.array([1.5, -0.4, -2.0])
+PLACES = [(0.8, 0.1, 300.0), (-0.6, np.pi - 1e-8, 20.0), (1.38, -np.pi, 5000.0)]
+
+
+def measured(kind, C, v, lla):
+    """What an instrument without errors reads."""
+    if kind == IS_POSITION:
+        return offset(lla, C @ LEVER)
+    if kind == IS_VELOCITY:
+        return v + C @ np.cross(RATE, LEVER)
+    if kind == IS_STANDSTILL:
+        return v
+    return np.array([lla[2], 0.0, 0.0])
+
+
+def estimated(C, v, lla, x):
+    """The estimate that has the errors x."""
+    turned = matrix_from_rotation_vector(-x[6:])
+    return turned @ C, turned @ v + x[3:6], offset(lla, x[:3])
+
+
+def difference(kind, component, value, C, v, lla):
+    return residual(kind, component, value, C, v, lla, RATE, LEVER)
+
+
+@pytest.mark.parametrize("lla", PLACES)
+@pytest.mark.parametrize("kind", [IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL])
+def test_rows_are_the_derivatives_of_the_residuals(kind, lla):
+    C, v, lla = matrix_from_rpy(ATTITUDE), VELOCITY, np.array(lla)
+    value = measured(kind, C, v, lla)
+    for component in range(1 if kind == IS_HEIGHT else 3):
+        h = np.full(9, np.nan)
+        measurement_row(kind, component, C, v, RATE, LEVER, h)
+        found = np.zeros(9)
+        for i in range(9):
+            x = np.zeros(9)
+            x[i] = 1.0 if i < 3 else 1e-4
+            there = [difference(kind, component, value, *estimated(C, v, lla, s * x))
+                     for s in (1.0, -1.0)]  # fmt: skip
+            found[i] = (there[0] - there[1]) / (2.0 * x[i])
+        # Metres and metres per second; the Earth's curvature is 1e-7 per metre, times a tangent.
+        np.testing.assert_allclose(found, h, atol=3e-6)
+
+
+@pytest.mark.parametrize("lla", PLACES)
+@pytest.mark.parametrize("kind", [IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL])
+def test_the_residual_of_the_truth_is_zero(kind, lla):
+    C, lla = matrix_from_rpy(ATTITUDE), np.array(lla)
+    value = measured(kind, C, VELOCITY, lla)
+    for component in range(1 if kind == IS_HEIGHT else 3):
+        # The way to the antenna is straight in the residual and half-way on the Earth in `offset`.
+        assert difference(kind, component, value, C, VELOCITY, lla) == pytest.approx(0.0, abs=3e-6)
+
+
+@pytest.mark.parametrize("turns", [-2, -1, 1, 3])
+def test_full_turns_of_longitude_do_not_count(turns):
+    C, lla = matrix_from_rpy(ATTITUDE), np.array(PLACES[1])
+    value = measured(IS_POSITION, C, VELOCITY, lla)
+    value[1] += 2.0 * np.pi * turns
+    assert difference(IS_POSITION, 1, value, C, VELOCITY, lla) == pytest.approx(0.0, abs=2e-5)
+
+
+@pytest.mark.parametrize("lla", PLACES)
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_a_correction_takes_the_errors_off(lla, scale):
+    x = scale * np.array([0.3, -0.5, 0.2, 0.04, -0.02, 0.05, 2e-4, -3e-4, 5e-4])
+    truth = matrix_from_rpy(ATTITUDE), VELOCITY, np.array(lla)
+    C, v, position = (each.copy() for each in estimated(*truth, x))
+    taken = x.copy()
+    correct(C, v, position, taken)
+    assert not np.any(taken)
+    # What is left is of third order in the angle.
+    angle = np.linalg.norm(x[6:])
+    np.testing.assert_allclose(C, truth[0], atol=angle**3)
+    np.testing.assert_allclose(v, VELOCITY, atol=angle**3 * np.linalg.norm(VELOCITY))
+    np.testing.assert_allclose(ned_difference(position, truth[2]), 0.0,
+                               atol=1e-8 + 1e-6 * scale**2)  # fmt: skip
+    np.testing.assert_allclose(C @ C.T, np.eye(3), atol=1e-13)
+
+
+def tables(term):
+    models = {"gyro": WhiteNoise(1.0), "accel": WhiteNoise(1.0), "gyro_y": term}
+    return SensorStates.of(SensorModels.of(models), DT, 1)
+
+
+def predicted(states, x, n):
+    """Errors of gyro_y that the states predict over n samples."""
+    first = np.searchsorted(states.axis, np.arange(7)).astype(np.int64)
+    paired = bool(np.any(states.partner != np.arange(states.m)))
+    x, held, error, found = x.copy(), np.zeros(states.m), np.zeros(6), []
+    for _ in range(n):
+        sample_error(first, states.output, states.phi[1], states.phi_off[1], states.partner,
+                     paired, x, held, error)  # fmt: skip
+        found.append(error[1])
+        assert not np.any(error[[0, 2, 3, 4, 5]])
+    return np.array(found)
+
+
+def test_a_gauss_markov_estimate_decays_and_a_random_walk_stays():
+    found = predicted(tables(GaussMarkov(1.0, 0.5) + RandomWalk(1.0)), np.array([2.0, 3.0]), 100)
+    time = DT * np.arange(100)
+    np.testing.assert_allclose(found, 2.0 * np.exp(-time / 0.5) + 3.0)
+
+
+@pytest.mark.parametrize("term", [Resonance(1.0, 3.0, 0.1), AR([1.6, -0.8], 1.0), RateRamp(2.0)])
+def test_pairs_of_states_are_predicted_by_their_model(term):
+    form, x = term.state_space(DT), np.array([0.7, -0.3])
+    expected = [form.output @ np.linalg.matrix_power(form.transition, k) @ x for k in range(50)]
+    np.testing.assert_allclose(predicted(tables(term), x, 50), expected, atol=1e-12)
+
+
+def test_sums_of_the_states_of_an_axis():
+    rng = np.random.default_rng(4)
+    models = {
+        "gyro": WhiteNoise(1.0) + GaussMarkov(1.0, 2.0) + GaussMarkov(1.0, 9.0),
+        "accel": Resonance(1.0, 3.0, 0.1),
+        "accel_y": WhiteNoise(1.0),
+    }
+    states = SensorStates.of(SensorModels.of(models), DT, 1)
+    m = states.m
+    first = np.searchsorted(states.axis, np.arange(7)).astype(np.int64)
+    root, x = rng.standard_normal((9 + m, 9 + m)), rng.standard_normal(m)
+    P, mean, covariance = root @ root.T, np.empty(6), np.empty((6, 6))
+    axis_sums(P, first, states.output, mean, x, covariance)
+    H = np.zeros((6, m))
+    H[states.axis, np.arange(m)] = states.output
+    np.testing.assert_allclose(mean, H @ x, atol=1e-12)
+    np.testing.assert_allclose(covariance, H @ P[9:, 9:] @ H.T, atol=1e-12)
+    assert mean[4] == 0.0 and not np.any(covariance[4])

@@ -1,0 +1,198 @@
+import math
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.ins.filter.mechanization import integrate, step
+from gmwm.ins.geometry.earth import RATE, ned_difference, offset
+from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.imu.emulation import Imu, emulate
+from gmwm.ins.trajectory.manoeuvres import (
+    Accelerate,
+    Climb,
+    Manoeuvre,
+    Stop,
+    Straight,
+    Turn,
+    perform,
+)
+from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
+from gmwm.ins.trajectory.trajectory import NavState, Trajectory
+
+NORTH = (math.radians(46.5), 0.1, 400.0)
+SOUTH = (math.radians(-33.0), -2.0, 20.0)
+DATE_LINE = (math.radians(-17.0), math.pi - 1e-5, 5.0)
+
+
+def attitude_error(found: Trajectory, true: Trajectory) -> np.ndarray:
+    """Angle between two attitudes, rad."""
+    between = matrix_from_rpy(found.rpy) @ np.swapaxes(matrix_from_rpy(true.rpy), 1, 2)
+    x = between[:, 2, 1] - between[:, 1, 2]
+    y = between[:, 0, 2] - between[:, 2, 0]
+    z = between[:, 1, 0] - between[:, 0, 1]
+    return 0.5 * np.sqrt(x * x + y * y + z * z)
+
+
+def assert_comes_back(true: Trajectory, metres: float = 0.1, degrees: float = 1e-5) -> None:
+    found = integrate(emulate(true), true.state(0))
+    assert np.max(np.abs(ned_difference(found.lla, true.lla))) < metres
+    assert np.max(attitude_error(found, true)) < math.radians(degrees)
+    assert np.max(np.abs(found.velocity - true.velocity)) < 1e-3
+
+
+@pytest.mark.parametrize("start", [NORTH, SOUTH, DATE_LINE, (math.radians(84.0), 3.0, 3000.0)])
+def test_a_helicopter_comes_back_after_half_an_hour(start: tuple[float, float, float]) -> None:
+    true = helicopter_mapping(start=start)
+    assert true.duration == pytest.approx(1800.0)
+    assert_comes_back(true)
+
+
+@pytest.mark.parametrize("start", [NORTH, DATE_LINE])
+def test_a_car_comes_back(start: tuple[float, float, float]) -> None:
+    assert_comes_back(car_drive(start=start))
+
+
+@pytest.mark.parametrize("start", [SOUTH, (0.0, 0.0, 100.0)])
+def test_a_loiter_comes_back(start: tuple[float, float, float]) -> None:
+    assert_comes_back(fixed_wing_loiter(start=start))
+
+
+@pytest.mark.parametrize(
+    ("manoeuvres", "level"),
+    [
+        pytest.param([Climb(800.0, 5.0), Climb(-500.0, 8.0)], True, id="vertical"),
+        pytest.param([Straight(1800.0)], False, id="standing"),
+        pytest.param(
+            [Accelerate(20.0), Stop(600.0), Accelerate(20.0), Stop(300.0)], False, id="stops"
+        ),
+        pytest.param(
+            [Accelerate(50.0, 3.0), Turn(20 * math.pi, 0.2), Turn(-20 * math.pi, 0.2)],
+            False,
+            id="round and round",
+        ),
+    ],
+)
+def test_other_ways_come_back(manoeuvres: list[Manoeuvre], level: bool) -> None:
+    start = (SOUTH[0], -math.pi + 1e-6, 50.0)
+    assert_comes_back(perform(manoeuvres, start=start, heading=-2.5, level=level))
+
+
+def test_errors_fall_with_the_square_of_the_interval() -> None:
+    def largest(dt: float) -> tuple[float, float]:
+        true = helicopter_mapping(dt=dt, duration=300.0, start=NORTH)
+        found = integrate(emulate(true), true.state(0))
+        position = np.max(np.abs(ned_difference(found.lla, true.lla)))
+        return float(position), float(np.max(attitude_error(found, true)))
+
+    coarse, fine = largest(0.08), largest(0.02)
+    # Fourfold steps: 16 for order 2; 4 would be order 1.
+    assert coarse[0] > 10.0 * fine[0]
+    assert coarse[1] > 10.0 * fine[1]
+
+
+@pytest.mark.filterwarnings("ignore:The copy keyword")  # of their pandas calls
+def test_positions_follow_pyins() -> None:
+    strapdown = pytest.importorskip("pyins.strapdown")
+    pandas = pytest.importorskip("pandas")
+    true = helicopter_mapping(duration=240.0, start=(*SOUTH[:2], 0.0))
+    flat = Trajectory.from_arrays(
+        true.dt, true.lla * [1.0, 1.0, 0.01], true.rpy
+    )  # their gravity is of first order in the height
+    imu = emulate(flat).with_errors(
+        np.full((true.n, 3), 1e-5), np.tile([0.01, -0.02, 0.005], (true.n, 1))
+    )
+    found = integrate(imu, flat.state(0))
+
+    from pyins.util import ACCEL_COLS, GYRO_COLS, LLA_COLS, RPH_COLS, TRAJECTORY_COLS
+
+    readings = np.hstack([imu.rotation, imu.velocity])
+    readings = np.vstack([readings[:1], readings])
+    frame = pandas.DataFrame(readings, index=flat.time, columns=GYRO_COLS + ACCEL_COLS)
+    first = np.hstack([flat.lla[0], flat.velocity[0], flat.rpy[0]])
+    first[[0, 1, 6, 7, 8]] = np.degrees(first[[0, 1, 6, 7, 8]])
+    integrator = strapdown.Integrator(pandas.Series(first, index=TRAJECTORY_COLS, name=0.0))
+    theirs = integrator.integrate(strapdown.compute_increments_from_imu(frame, "increment"))
+
+    lla = theirs[LLA_COLS].to_numpy() * [math.pi / 180, math.pi / 180, 1.0]
+    rpy = np.radians(theirs[RPH_COLS].to_numpy())
+    # The errors carry both far off, together; theirs neglects third-order terms of the steps.
+    assert np.max(np.abs(ned_difference(found.lla, flat.lla))) > 200.0
+    assert (
+        np.max(np.abs(ned_difference(found.lla, lla))) < 0.02
+    )  # theirs has 1 cm of first-order gravity in it
+    other = Trajectory(flat.dt, lla, found.velocity, rpy)
+    assert np.max(attitude_error(found, other)) < 1e-8
+
+
+@pytest.mark.parametrize("corrected", [False, True])
+def test_coning_leaves_what_savage_says(corrected: bool) -> None:
+    # The axis of a body that does not turn on average describes a cone.
+    angle, dt, n = 0.02, 0.01, 2000
+    x = 2 * math.pi * 5.0 * dt  # phase in one interval
+    phase = x * np.arange(n + 1)
+    rotation = math.sin(angle) * np.stack(
+        [np.diff(np.cos(phase)), np.diff(np.sin(phase)), np.zeros(n)], axis=-1
+    )
+    rotation[:, 2] = -x * (1.0 - math.cos(angle))
+
+    start = matrix_from_rotation_vector(np.array([angle, 0.0, 0.0]))
+    C, v, lla = start.copy(), np.zeros(3), np.zeros(3)
+    for i in range(n):
+        v[:] = lla[:] = 0.0  # it would fall
+        before = rotation[max(i - 1, 0)] if corrected else rotation[i]
+        step(C, v, lla, *rotation[i], 0.0, 0.0, 0.0, *before, 0.0, 0.0, 0.0, dt)
+
+    # After whole turns only the frame has moved: at the equator about north.
+    end = matrix_from_rotation_vector(np.array([-RATE * n * dt, 0.0, 0.0])) @ start
+    error = (C @ end.T)[1, 0]
+    # Savage (1998), Part 1: the integral of coning, less the product of two increments over 12.
+    scale = n * math.sin(angle) ** 2
+    missing = whole = 0.5 * (x - math.sin(x))
+    if corrected:
+        missing -= math.sin(x / 2) ** 2 * math.sin(x) / 3.0
+    # His formulas are of second order in the angle.
+    assert abs(error) == pytest.approx(scale * missing, abs=2.0 * angle**2 * scale * whole)
+
+
+def test_the_step_returns_the_specific_force_of_the_frame() -> None:
+    C = matrix_from_rpy(np.array([0.1, 0.2, 0.3]))
+    force = np.array([0.02, -0.01, -0.1])
+    expected = C @ force
+    v, lla = np.array([1.0, 2.0, 0.0]), np.array([0.5, 0.1, 0.0])
+    found = step(C, v, lla, 0.0, 0.0, 0.0, *force, 0.0, 0.0, 0.0, *force, 0.01)
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
+def test_no_step_has_none_before_it() -> None:
+    # One interval alone, of constant rate and force in inertial space, is exact but for the Earth.
+    rotation, dt = np.array([[0.3, -0.2, 0.5]]), 1e-3
+    imu = Imu(dt, rotation, np.zeros((1, 3)))
+    state = NavState(np.array(NORTH), np.zeros(3), np.zeros(3))
+    found = integrate(imu, state)
+    expected = matrix_from_rotation_vector(rotation[0])
+    np.testing.assert_allclose(matrix_from_rpy(found.rpy[1]), expected, atol=1e-7)
+
+
+def test_the_attitude_stays_orthonormal() -> None:
+    rng = np.random.default_rng(8)
+    C, v, lla = np.eye(3), np.zeros(3), np.array(NORTH)
+    for turn in rng.normal(0.0, 0.05, size=(5000, 3)):
+        v[:] = 0.0  # it would fall
+        step(C, v, lla, *turn, 0.0, 0.0, -0.098, *turn, 0.0, 0.0, -0.098, 0.01)
+    assert np.max(np.abs(C @ C.T - np.eye(3))) < 5000 * 1e-15
+
+
+def test_a_start_at_a_pole_is_refused() -> None:
+    imu = Imu(0.01, np.zeros((3, 3)), np.zeros((3, 3)))
+    state = NavState(np.array([1.565, 0.0, 0.0]), np.zeros(3), np.zeros(3))
+    with pytest.raises(InputError, match=r"latitude 89\.\d+ deg is too near the pole"):
+        integrate(imu, state)
+
+
+def test_the_longitude_runs_on() -> None:
+    true = perform([Straight(20.0)], start=DATE_LINE, heading=math.pi / 2, speed=80.0)
+    found = integrate(emulate(true), true.state(0))
+    assert found.lla[-1, 1] > math.pi
+    expected = offset(np.array(DATE_LINE), np.array([0.0, 1600.0, 0.0]))
+    assert np.max(np.abs(ned_difference(found.lla[-1], expected))) < 0.1

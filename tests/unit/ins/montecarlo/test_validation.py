@@ -1,0 +1,66 @@
+import re
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from places import GOLDEN
+
+
+def test_the_table_reads_as_it_did(made_up):
+    assert str(made_up()) + "\n" == (GOLDEN / "validation.txt").read_text()
+
+
+@pytest.mark.parametrize("outages", [(), ((20, 10),), ((10, 5), (20, 10), (40, 15))])
+@pytest.mark.parametrize("names", [("A",), ("ten_letter", "ten_lette2"), tuple("ABCDEF")])
+@pytest.mark.parametrize(("runs", "scale"), [(1, 1.0), (2, 1e-4), (30, 1e5)])
+def test_the_table_fits_a_terminal(outages, names, runs, scale, made_up):
+    text = str(made_up(dict.fromkeys(names, scale), outages, runs))
+    assert max(map(len, text.splitlines())) <= 80
+    assert "nan" not in re.sub(r"band nan .. nan|p = nan", "", text)
+
+
+def test_filters_are_starred_if_and_only_if_they_misjudge_themselves(made_up):
+    text = str(made_up(runs=400))
+    nees = text.split("NEES")[1].split("\n\n")[0].splitlines()[2:]
+    stars = {name: [line.count("*") for line in nees if line.startswith(name)]
+             for name in ("right", "bold", "timid")}  # fmt: skip
+    assert stars["bold"] == stars["timid"] == [4, 4, 4]
+    assert sum(stars["right"]) <= 3  # of 12 at 5 %
+
+
+def test_errors_and_predictions_are_those_of_the_runs(made_up):
+    found = made_up(runs=4000)
+    for name, factor in (("right", 1.0), ("bold", 3.0), ("timid", 0.3)):
+        for i, (_, length) in enumerate(((20, 10), (40, 15))):
+            sd = 1.0 + 0.2 * length**1.5
+            spread = found.spreads(name)[i]["horizontal"]
+            assert spread.predicted == pytest.approx(sd * np.sqrt(2.0))
+            # The mean square of 8000 components has a relative error of 1.6 %, its root half.
+            assert spread.rms == pytest.approx(factor * sd * np.sqrt(2.0), rel=0.04)
+    d = found.against_first("bold", "horizontal")
+    assert d.significant
+    assert d.ratio == pytest.approx(3.0)
+    assert (d.ratio_lower, d.ratio_upper) == (pytest.approx(3.0), pytest.approx(3.0))
+
+
+def test_a_filter_that_diverged_is_named_and_left_out(made_up):
+    found = made_up(dead=("right",))
+    text = str(found)
+    assert found.reached == ("bold", "timid")
+    assert "- right diverged in 40 of 40 runs" in text
+    assert "nan" not in text
+    for figure in (found.plot_track(), found.plot_growth(), found.plot_errors(0)):
+        plt.close(figure)
+
+
+def test_figures_need_an_outage(made_up):
+    found = made_up(outages=())
+    plt.close(found.plot_track())
+    with pytest.raises(InputError, match="has no outage"):
+        found.plot_growth()
+    with pytest.raises(InputError, match="has 0 of them"):
+        found.plot_errors()
+    with pytest.raises(InputError, match="has 2 of them"):
+        made_up().plot_errors(2)

@@ -1,0 +1,79 @@
+import math
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.imu.emulation import emulate
+from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
+
+
+@pytest.mark.parametrize("spacing", [150.0, 300.0, 570.0])
+@pytest.mark.parametrize("speed", [30.0, 35.0])
+def test_strips_lie_side_by_side(spacing: float, speed: float) -> None:
+    found = helicopter_mapping(
+        heading=0.0, spacing=spacing, speed=speed, strip=1500.0, dt=0.1, duration=900.0
+    )
+    ned = ned_difference(found.lla, found.lla[0])
+    on_strip = (np.abs(np.sin(found.rpy[:, 2])) < 1e-9) & (np.abs(found.velocity[:, 0]) > 0.99 * 30)
+    edges = np.flatnonzero(np.diff(on_strip.astype(int), prepend=0, append=0))
+    strips = [ned[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 100][:-1]
+    assert len(strips) >= 4
+    sides = [np.mean(strip[:, 1]) for strip in strips]
+    np.testing.assert_allclose(np.diff(sides), spacing, atol=1.0)
+    begin = max(np.min(strip[:, 0]) for strip in strips)
+    end = min(np.max(strip[:, 0]) for strip in strips)
+    assert end - begin == pytest.approx(1500.0, abs=2.0 * speed * 2.0)
+
+
+def test_the_helicopter_climbs_first_and_keeps_its_height() -> None:
+    found = helicopter_mapping(dt=0.1)
+    assert (found.n, found.duration) == (18_000, pytest.approx(1800.0))
+    moving = np.hypot(*found.velocity[:, :2].T) > 0.1
+    np.testing.assert_allclose(found.lla[moving, 2], 550.0, atol=1e-6)
+    assert np.max(np.abs(found.rpy[:, 0])) < math.radians(25.0)
+    assert np.ptp(found.rpy[:, 2]) > math.pi
+
+
+def test_the_car_stops_turns_and_climbs() -> None:
+    found = car_drive(dt=0.1)
+    speed = np.hypot(*found.velocity[:, :2].T)
+    assert found.duration == pytest.approx(1200.0)
+    assert np.mean(speed < 0.01) > 0.1
+    assert np.max(speed) == pytest.approx(24.0, abs=0.01)
+    assert np.ptp(found.lla[:, 2]) > 20.0
+    force = emulate(found).velocity / 0.1
+    assert np.max(np.abs(force[:, :2])) < 3.0
+    assert np.max(np.abs(found.rpy[:, 1])) < math.radians(5.0)
+
+
+def test_the_aircraft_circles_both_ways() -> None:
+    found = fixed_wing_loiter(dt=0.1, start=(-0.5, math.pi, 0.0), radius=150.0)
+    assert found.duration == pytest.approx(1200.0)
+    assert np.max(found.rpy[:, 0]) == pytest.approx(math.atan(22.0**2 / 150.0 / 9.79), rel=0.02)
+    assert np.min(found.rpy[:, 0]) == pytest.approx(-math.atan(22.0**2 / 150.0 / 9.79), rel=0.02)
+    np.testing.assert_allclose(np.hypot(*found.velocity[:, :2].T), 22.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"spacing": 600.0}, "at 30 m/s turns are 573 m wide"),
+        ({"spacing": 0.0}, "spacing = 0"),
+        ({"strip": -1.0}, "strip = -1"),
+        ({"speed": math.nan}, "speed = nan"),
+        ({"duration": 0.0}, "duration = 0"),
+        ({"duration": 1e9}, "10,000,000 steps"),
+        ({"dt": 0.0}, "dt = 0"),
+        ({"start": (1.56, 0.0, 0.0)}, "too near a pole"),
+    ],
+)
+def test_impossible_missions_are_refused(options: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        helicopter_mapping(**options)
+
+
+def test_impossible_loiters_are_refused() -> None:
+    with pytest.raises(InputError, match="radius = 0"):
+        fixed_wing_loiter(radius=0.0)

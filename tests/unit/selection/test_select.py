@@ -1,0 +1,161 @@
+"""Model choice: the right size where the data can tell, nothing invented where they cannot."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Sinusoid, WhiteNoise
+from gmwm.selection.select import describe
+
+
+@pytest.mark.parametrize(
+    ("truth", "words"),
+    [
+        (WhiteNoise(1.0), "white noise"),
+        (WhiteNoise(1.0) + RandomWalk(0.01), "white noise + random walk"),
+        (QuantizationNoise(3.0) + WhiteNoise(1.0), "white noise + quantization noise"),
+        (WhiteNoise(1.0) + GaussMarkov(0.5, 50.0), "white noise + Gauss-Markov"),
+        (
+            WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0),
+            "white noise + 2 Gauss-Markov",
+        ),
+        (WhiteNoise(1.0) + RateRamp(1e-4), "white noise + rate ramp"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_the_true_model_is_chosen(truth, words):
+    truth = gmwm.process.as_model(truth)
+    chosen = []
+    for seed in range(6):
+        selection = gmwm.select(truth.simulate(100_000, 1.0, seed), dt=1.0)
+        chosen.append(describe(selection.model))
+        assert selection.fit.valid, selection.fit.message
+        assert len(selection.model.terms) <= len(truth.terms) + 1
+    assert chosen.count(words) >= 5, chosen
+
+
+def test_a_larger_model_is_never_worse():
+    truth = WhiteNoise(1.0) + GaussMarkov(0.5, 50.0)
+    selection = gmwm.select(truth.simulate(50_000, 1.0, 1), dt=1.0)
+    objectives = {}
+    for item in selection:
+        terms = {type(t).__name__ for t in item.model.terms}
+        if terms <= {"WhiteNoise", "GaussMarkov"} and "WhiteNoise" in terms:
+            objectives[len(item.model.terms)] = item.objective
+    sizes = sorted(objectives)
+    assert len(sizes) >= 1
+    assert all(objectives[b] <= objectives[a] + 1e-6 for a, b in pairwise(sizes))
+
+
+def test_ranking_is_sorted_and_printed():
+    selection = gmwm.select(gmwm.simulate(WhiteNoise(1.0), 5000, 1.0, 1), dt=1.0)
+    criteria = [item.criterion for item in selection if "ramp" not in describe(item.model)]
+    assert criteria == sorted(criteria)
+    lines = str(selection).splitlines()
+    assert lines[0].split() == ["difference", "objective", "p-value", "param.", "model"]
+    assert sum(line.startswith(">") for line in lines) == 1
+    assert max(map(len, lines)) <= 80
+    assert selection[0].model in [item.model for item in selection]
+
+
+@pytest.mark.parametrize("n", [8, 16, 64, 100])
+def test_short_records_get_a_small_model(n):
+    selection = gmwm.select(np.random.default_rng(n).normal(size=n), dt=1.0)
+    assert len(selection.model.terms) <= 2
+
+
+def test_limit_on_gauss_markov_terms():
+    truth = WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0)
+    x = truth.simulate(50_000, 1.0, 1)
+    selection = gmwm.select(x, dt=1.0, max_gauss_markov=1)
+    assert all(describe(item.model).count("2 Gauss-Markov") == 0 for item in selection)
+    with pytest.raises(gmwm.InputError, match="from 0 to 5"):
+        gmwm.select(x, dt=1.0, max_gauss_markov=6)
+
+
+def test_a_line_is_taken_where_there_is_one():
+    noise = WhiteNoise(1.0) + GaussMarkov(0.5, 100.0)
+    line = Sinusoid(frequency=0.013)
+    with_line = (noise + Sinusoid(0.3, 0.013)).simulate(50_000, 1.0, 1)
+    assert describe(gmwm.select(with_line, dt=1.0, extra=[line]).model) == (
+        "white noise + sinusoid + Gauss-Markov"
+    )
+    without = noise.simulate(50_000, 1.0, 1)
+    selection = gmwm.select(without, dt=1.0, extra=[line])
+    assert describe(selection.model) == "white noise + Gauss-Markov"
+
+
+def test_an_extra_term_must_have_a_shape():
+    x = gmwm.simulate(WhiteNoise(1.0), 100, 1.0, 1)
+    for extra in (Sinusoid(), Sinusoid(1.0, 0.1), RateRamp()):
+        with pytest.raises(gmwm.InputError, match="leave its amplitude open"):
+            gmwm.select(x, dt=1.0, extra=[extra])
+
+
+def test_criteria_and_ties():
+    selection = gmwm.select(gmwm.simulate(WhiteNoise(1.0), 5000, 1.0, 1), dt=1.0)
+    assert selection.chosen.wic == selection.chosen.chi_square + 2 * selection.chosen.n_parameters
+    assert 0.0 < selection.chosen.p_value < 1.0
+    assert selection.chosen in selection.ties
+    smallest = min(selection.ties, key=lambda item: item.n_parameters)
+    assert selection.chosen.n_parameters == smallest.n_parameters
+
+
+def test_several_recordings_have_one_model():
+    truth = WhiteNoise(1.0) + GaussMarkov(0.3, 60.0) + GaussMarkov(0.3, 1500.0)
+    rng = np.random.default_rng(3)
+    parts = [truth.simulate(n, 1.0, rng) for n in (60_000, 50_000, 80_000)]
+    selection = gmwm.select(parts, dt=1.0)
+    assert describe(selection.model) == "white noise + 2 Gauss-Markov"
+    assert len(selection.fit.parts) == 3
+
+
+def test_no_random_walk_is_invented():
+    """White noise of 3 h at 100 Hz: K is none, or its interval goes down to zero."""
+    truth = WhiteNoise(0.005)
+    held = 0
+    for seed in range(20):
+        fit = gmwm.fit(WhiteNoise() + RandomWalk(), truth.simulate(1_080_000, 0.01, seed), dt=0.01)
+        held += fit.interval()["K"][0] == 0.0
+    # 5 % of the bounds may fail: at least 16 of 20 hold in all but 0.3 % of cases.
+    assert held >= 16
+
+
+@pytest.mark.parametrize(
+    ("truth", "count"),
+    [
+        (WhiteNoise(1.0), 0),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 50.0), 1),
+        (WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0), 2),
+    ],
+)
+def test_merging_ends_at_the_true_number(truth, count):
+    truth = gmwm.process.as_model(truth)
+    found = []
+    for seed in range(3):
+        selection = gmwm.select(truth.simulate(20_000, 1.0, seed), dt=1.0, rule="merge")
+        found.append(sum(isinstance(term, GaussMarkov) for term in selection.model.terms))
+        assert selection.chosen is selection[0]
+        assert selection.chosen.model == selection.model.opened()
+        assert max(map(len, str(selection).splitlines())) <= 80
+    assert found.count(count) >= 2, found
+
+
+def test_merging_stops_where_it_must():
+    x = np.random.default_rng(1).normal(size=60)
+    selection = gmwm.select(x, dt=1.0, rule="merge", max_gauss_markov=2)
+    assert all(len(item.model.terms) <= 3 for item in selection)
+    # White noise that is not there is no reason to leave Gauss-Markov processes out.
+    slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 50_000, 1.0, 2)
+    kept = gmwm.select(slow, dt=1.0, rule="merge").model
+    assert sum(isinstance(term, GaussMarkov) for term in kept.terms) == 1
+    with pytest.raises(gmwm.InputError, match="rule = 'magic': known are criterion, merge"):
+        gmwm.select(x, dt=1.0, rule="magic")
+
+
+def test_bias_instability_as_a_candidate():
+    truth = WhiteNoise(1.0) + gmwm.BiasInstability(0.5)
+    selection = gmwm.select(truth.simulate(100_000, 1.0, 2), dt=1.0, extra=[gmwm.BiasInstability()])
+    assert "bias instability" in describe(selection.ranking[0].model)

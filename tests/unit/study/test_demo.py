@@ -1,0 +1,150 @@
+"""The simulated IMU of the demonstration, and truth beside estimate."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.study.demo import RATE, compare, simulated_imu, table_six
+
+DEG_PER_HOUR = pi / 180.0 / 3600.0
+MICRO_G = 9.80665e-6
+
+
+def test_table_six_in_si():
+    models = table_six()
+    assert list(models) == ["gyro", "accel"]
+    gyro = {"N": 140.0 * DEG_PER_HOUR}
+    # By rising correlation time, 1/beta.
+    for i, (sigma, beta) in enumerate([(206.0, 10.0), (65.0, 0.05), (113.0, 0.0005)], start=1):
+        gyro |= {f"sigma_{i}": sigma * DEG_PER_HOUR, f"tau_{i}": 1.0 / beta}
+    accel = {"N": 140.0 * MICRO_G}
+    for i, (sigma, beta) in enumerate([(5.0, 0.04), (13.0, 0.002)], start=1):
+        accel |= {f"sigma_{i}": sigma * MICRO_G, f"tau_{i}": 1.0 / beta}
+    assert models["gyro"].params == pytest.approx(gyro, rel=1e-12, abs=0.0)
+    assert models["accel"].params == pytest.approx(accel, rel=1e-12, abs=0.0)
+
+
+def test_gyro_white_noise_in_numbers():
+    # 140 deg/h/sqrt(Hz) = 2.333 deg/sqrt(h) = 6.787e-4 rad/s/sqrt(Hz)
+    assert table_six()["gyro"].params["N"] == pytest.approx(6.787e-4, rel=1e-3)
+    assert table_six()["accel"].params["N"] == pytest.approx(1.373e-3, rel=1e-3)
+
+
+def test_simulated_recording():
+    recording, truth = simulated_imu(100.0, seed=3)
+    names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+    assert recording.names == names
+    assert tuple(truth) == names
+    assert recording.rate == pytest.approx(RATE)
+    assert recording.n == 100 * RATE
+    assert "seed 3" in recording.source
+    models = table_six()
+    for channel in recording:
+        model = models[channel.quantity]
+        assert channel.name.startswith(channel.quantity)
+        assert channel.unit == {"gyro": "rad/s", "accel": "m/s^2"}[channel.quantity]
+        assert truth[channel.name] == model
+        # At one sample the level is known to 1.7 % (1 sigma).
+        wv = gmwm.wavelet_variance(channel)
+        expected = model.haar_variance(wv.tau[:1], wv.dt)
+        np.testing.assert_allclose(wv.variance[:1], expected, rtol=0.08)
+
+
+def test_the_seed_decides():
+    one, again, other = (simulated_imu(10.0, seed)[0] for seed in (1, 1, 2))
+    for name in one.names:
+        np.testing.assert_array_equal(one[name].values, again[name].values)
+        assert not np.array_equal(one[name].values, other[name].values)
+    axes = np.array([one[f"gyro_{axis}"].values for axis in "xyz"])
+    assert np.abs(np.corrcoef(axes)[np.triu_indices(3, 1)]).max() < 0.2  # axes are independent
+
+
+def test_a_ramp_is_tried_on_three_minutes_of_it():
+    # The coarsest level is two averages of the whole record; without its slope little is left.
+    gyro = simulated_imu(180.0, seed=1)[0]["gyro_x"]
+    fit = gmwm.fit(WhiteNoise() + GaussMarkov() + RateRamp(), gyro)
+    assert np.all(np.isfinite(list(fit.params.values())))
+    assert np.all(np.diag(fit.covariance) > 0.0)
+
+
+# -- truth beside estimate ------------------------------------------------------------------------
+
+
+TRUTH = WhiteNoise(3e-4) + RandomWalk(1e-4)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    channel = gmwm.Channel("gyro_x", TRUTH.simulate(20_000, 0.01, 5), 0.01, "gyro", "rad/s")
+    return gmwm.fit(TRUTH.opened(), channel)
+
+
+def test_comparison_is_in_the_units_of_the_field(fit):
+    white, walk = compare(fit, TRUTH)
+    assert (white.channel, white.what, white.unit) == ("gyro_x", "N", "deg/sqrt(h)")
+    assert (walk.channel, walk.what, walk.unit) == ("gyro_x", "K", "deg/h/sqrt(h)")
+    for row, key, scale in ((white, "N", 60.0), (walk, "K", 3600.0 * 60.0)):
+        scale *= 180.0 / pi
+        assert row.truth == pytest.approx(TRUTH.params[key] * scale)
+        assert row.estimate == pytest.approx(fit.params[key] * scale)
+        low, high = fit.interval()[key]
+        assert (row.lower, row.upper) == pytest.approx((low * scale, high * scale))
+        assert row.determined
+        assert row.covered
+
+
+def test_a_truth_outside_its_interval_is_not_covered(fit):
+    white, walk = compare(fit, TRUTH.with_params({"N": 4e-4}))
+    assert not white.covered
+    assert walk.covered
+    assert not compare(fit, TRUTH.with_params({"K": 1e-6}))[1].covered
+
+
+def test_accelerometers_have_their_own_units():
+    truth = WhiteNoise(140.0 * MICRO_G) + GaussMarkov(500.0 * MICRO_G, 2.0)
+    channel = gmwm.Channel("accel_z", truth.simulate(20_000, 0.01, 5), 0.01, "accel", "m/s^2")
+    rows = compare(gmwm.fit(truth.opened(), channel), truth)
+    assert [(row.what, row.unit) for row in rows] == [
+        ("N", "ug/sqrt(Hz)"),
+        ("sigma", "ug"),
+        ("tau", "s"),
+    ]
+    assert [row.truth for row in rows] == pytest.approx([140.0, 500.0, 2.0])
+
+
+def test_a_signed_truth_keeps_its_sign():
+    truth = WhiteNoise(1e-4) + RateRamp(-1e-5)
+    channel = gmwm.Channel("gyro_x", truth.simulate(5000, 0.01, 5), 0.01, "gyro", "rad/s")
+    ramp = compare(gmwm.fit(truth.opened(), channel), truth)[1]
+    assert ramp.unit == "deg/h/h"
+    assert ramp.truth == pytest.approx(-1e-5 * 180.0 / pi * 3600.0**2)
+    assert ramp.covered
+    assert ramp.upper < 0.0
+
+
+def test_what_the_record_does_not_tell_is_marked(fit):
+    # A relative error of more than one: the interval says nothing.
+    vague = replace(fit, covariance=np.diag([fit.stderr["N"] ** 2, (3.0 * fit.params["K"]) ** 2]))
+    white, walk = compare(vague, TRUTH)
+    assert white.determined
+    assert not walk.determined
+    assert np.isinf(walk.upper)
+
+
+def test_a_bound_is_an_interval_from_zero(fit):
+    nil = replace(
+        fit,
+        model=fit.model.with_params({"K": 0.0}),
+        keys=("N",),
+        covariance=fit.covariance[:1, :1],
+        upper_bounds={"K": 2e-4},
+    )
+    walk = compare(nil, TRUTH)[1]
+    assert (walk.estimate, walk.lower) == (0.0, 0.0)
+    assert walk.upper == pytest.approx(2e-4 * 180.0 / pi * 3600.0 * 60.0)
+    assert walk.determined
+    assert walk.covered

@@ -1,0 +1,121 @@
+"""The house: rooms with faces, no circles, nothing lost in a crowd."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from places import REPOSITORY
+
+ROOT = REPOSITORY / "src" / "gmwm"
+FILES = sorted(ROOT.rglob("*.py"))
+NATURAL = {"process.base", "process.model"}
+"""A Process makes a Model with +, and a Model is made of Processes."""
+
+MOST_FILES = 14
+INNER = ("estimate", "ins")
+"""Rooms whose own rooms have faces for each other."""
+
+
+def dotted(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {dotted(path) for path in FILES}
+PACKAGES = {dotted(path) for path in FILES if path.name == "__init__.py"}
+FACES = {
+    dotted(path): {
+        alias.asname or alias.name
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    for path in FILES
+    if path.name == "__init__.py"
+}
+"""Names that the rooms show; a function may have the name of its file."""
+
+
+def imports(path):
+    """Modules of the package that a file imports when it runs."""
+    tree = ast.parse(path.read_text())
+    typing_only = {
+        id(node)
+        for branch in ast.walk(tree)
+        if isinstance(branch, ast.If) and "TYPE_CHECKING" in ast.dump(branch.test)
+        for node in ast.walk(branch)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and id(node) not in typing_only:
+            module = (node.module or "").removeprefix("gmwm").removeprefix(".")
+            if not (node.module or "").startswith("gmwm"):
+                continue
+            for alias in node.names:
+                below = f"{module}.{alias.name}".removeprefix(".")
+                named = alias.name in FACES.get(module, ())
+                yield module if named or below not in MODULES else below
+
+
+def circles(graph):
+    """Strongly connected components of more than one file (Tarjan's algorithm, by recursion)."""
+    index, low, stack, found = {}, {}, [], []
+
+    def visit(node):
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for other in graph[node]:
+            if other not in index:
+                visit(other)
+                low[node] = min(low[node], low[other])
+            elif other in stack:
+                low[node] = min(low[node], index[other])
+        if low[node] == index[node]:
+            component = set()
+            while node not in component:
+                component.add(stack.pop())
+            if len(component) > 1:
+                found.append(component)
+
+    for node in list(graph):
+        if node not in index:
+            visit(node)
+    return found
+
+
+def test_files_import_each_other_in_one_direction_only():
+    graph = defaultdict(set)
+    for path in FILES:
+        graph[dotted(path)] |= set(imports(path)) - {dotted(path), ""}
+    assert circles(graph) == [NATURAL]
+
+
+def room(name):
+    """Where a module lives, as far as others must not look inside."""
+    parts = name.split(".")
+    depth = len(parts) if name in PACKAGES else len(parts) - 1
+    return ".".join(parts[: min(depth, 2 if parts[0] in INNER else 1)])
+
+
+@pytest.mark.parametrize("path", FILES, ids=dotted)
+def test_outsiders_import_faces_only(path):
+    own = room(dotted(path))
+    for name in imports(path):
+        inside = room(name)
+        outside = inside not in ("", "_core", "estimate", "ins") and inside != own
+        assert not outside or name in PACKAGES, f"{dotted(path)} looks into {name}"
+
+
+def test_no_folder_is_a_crowd_and_nothing_stands_loose():
+    for folder in {path.parent for path in FILES}:
+        files = [path for path in folder.glob("*.py") if not path.name.startswith("__")]
+        assert len(files) <= MOST_FILES, folder
+    assert {path.name for path in ROOT.glob("*.py")} == {"__init__.py", "__main__.py", "errors.py"}
+
+
+def test_tests_mirror_the_rooms():
+    tests = REPOSITORY / "tests" / "unit"
+    folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}
+    rooms = {Path(name.replace(".", "/")) for name in PACKAGES}
+    assert folders <= rooms

@@ -1,0 +1,97 @@
+"""The covariance of the wavelet variances against its definition, summed term by term."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+
+import gmwm
+from gmwm.variance.covariance import haar as module, lags
+from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance, mean_covariance
+
+PROCESSES = [
+    gmwm.WhiteNoise(1.0),
+    gmwm.GaussMarkov(1.0, 30.0),
+    gmwm.GaussMarkov(1.0, 1e5),
+    gmwm.RandomWalk(1.0),
+    gmwm.QuantizationNoise(1.0),
+    gmwm.AR([-0.6], 1.0),
+]
+
+
+def series_covariance(process, n):
+    """Covariance matrix of n samples, or of n samples of a walk from its start."""
+    if isinstance(process, gmwm.RandomWalk):
+        k = np.arange(n, dtype=float)
+        return process.K**2 * np.minimum.outer(k, k)
+    return toeplitz(process.autocovariance(np.arange(n), 1.0))
+
+
+def filters(n):
+    """All Haar coefficients free of end effects as matrices, one a level."""
+    result = []
+    for m in dyadic_levels(n).astype(int):
+        count = n - 2 * m + 1
+        matrix = np.zeros((count, n))
+        for t in range(count):
+            matrix[t, t : t + m] = -0.5 / m
+            matrix[t, t + m : t + 2 * m] = 0.5 / m
+        result.append(matrix)
+    return result
+
+
+def brute_force(process, n):
+    series = series_covariance(process, n)
+    levels = filters(n)
+    squares = np.empty((len(levels), len(levels)))
+    means = np.empty_like(squares)
+    for j, first in enumerate(levels):
+        for k, second in enumerate(levels):
+            cross = first @ series @ second.T
+            squares[j, k] = 2.0 * np.mean(cross**2)
+            means[j, k] = np.mean(cross)
+    return squares, means
+
+
+@pytest.mark.parametrize("n", [64, 200, 333])
+@pytest.mark.parametrize("process", PROCESSES, ids=repr)
+def test_covariance_equals_the_sum_over_all_pairs_of_coefficients(process, n):
+    expected, means = brute_force(process, n)
+    found = haar_covariance(process.psd, n, 1.0)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    # The finite-lag ends of the fine levels are the approximation that is left.
+    assert np.max(np.abs(found - expected) / scale) < 0.04
+    np.testing.assert_allclose(np.diag(found), np.diag(expected), rtol=0.04)
+    coarse = slice(module._lag_sums(n).first, None)
+    spread = np.sqrt(np.outer(np.diag(means), np.diag(means)))[coarse, coarse]
+    difference = mean_covariance(process.psd, n, 1.0)[coarse, coarse] - means[coarse, coarse]
+    assert np.max(np.abs(difference) / spread) < 0.02
+
+
+@pytest.mark.parametrize("process", PROCESSES, ids=repr)
+def test_means_of_blocks_give_the_same_as_all_samples(process, monkeypatch):
+    n = 1500
+    exact = haar_covariance(process.psd, n, 1.0)
+    monkeypatch.setattr(lags, "EXACT_SAMPLES", 256)
+    monkeypatch.setattr(lags, "_BLOCKS", 128)
+    module._lag_sums.cache_clear()
+    blocks = haar_covariance(process.psd, n, 1.0)
+    module._lag_sums.cache_clear()
+    scale = np.sqrt(np.outer(np.diag(exact), np.diag(exact)))
+    assert np.max(np.abs(blocks - exact) / scale) < 0.03
+
+
+@pytest.mark.parametrize("n", [64, 1000, 4099, 100_000, 3_000_000])
+def test_covariance_is_symmetric_and_positive_definite(n):
+    model = gmwm.WhiteNoise(1.0) + gmwm.GaussMarkov(0.3, 40.0) + gmwm.RandomWalk(1e-3)
+    found = haar_covariance(model.psd, n, 1.0)
+    np.testing.assert_array_equal(found, found.T)
+    scale = np.sqrt(np.diag(found))
+    assert np.linalg.eigvalsh(found / np.outer(scale, scale))[0] > 1e-3
+
+
+def test_sampling_interval_is_only_a_unit():
+    fast = gmwm.WhiteNoise(1.0) + gmwm.GaussMarkov(0.3, 0.4)
+    slow = gmwm.WhiteNoise(10.0) + gmwm.GaussMarkov(0.3, 40.0)
+    np.testing.assert_allclose(
+        haar_covariance(fast.psd, 1000, 0.01), haar_covariance(slow.psd, 1000, 1.0), rtol=1e-9
+    )
