@@ -111,8 +111,8 @@ def _outcome() -> Outcome:
                 estimates += [fit.params[key] for key in right.params]
                 errors += [fit.stderr.get(key, np.nan) for key in right.params]
     lines = gmwm.fit(WhiteNoise() + RandomWalk(), TRUTHS["white + walk"][0].simulate(
-        20 * SAMPLES, DT, 7), DT, method="allan")  # fmt: skip
-    estimates += [lines.params[key] for key in ("N", "K")]
+        40 * SAMPLES, DT, 7), DT, method="allan")  # fmt: skip
+    estimates += [lines.params.get(key, np.nan) for key in ("N", "K")]
     errors += [lines.stderr.get(key, np.nan) for key in ("N", "K")]
     return Outcome(
         float(np.mean(valid)), float(np.mean(refused)), float(np.mean(chosen)),
