@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -71,6 +72,19 @@ class Document:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"the {what} is damaged ({error!r}): make it again") from None
 
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Inverse of `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is not JSON, or holds something else or a damaged result.
+        """
+        content = read_json(path)
+        with named(path):
+            return cls.from_dict(content)
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything as JSON; the file appears whole or not at all.
 
@@ -101,6 +115,31 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         raise InputError(f"{path}: is not JSON ({error}): give a file that was saved") from None
 
 
+@contextmanager
+def named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the file's name before messages."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}", error.code) from None
+
+
+def rebuilt(content: Any) -> Any:
+    """The result that a dictionary of `Document.to_dict` is of, whatever its kind.
+
+    Raises
+    ------
+    InputError
+        If it is of no kind known here, or damaged.
+    """
+    schema = content.get("schema") if isinstance(content, Mapping) else None
+    kind = Document._kinds.get(schema) if isinstance(schema, str) else None
+    if kind is None:
+        known = ", ".join(sorted(Document._kinds))
+        raise InputError(f"this is not a result of gmwm (known are {known}): check the path")
+    return kind.from_dict(content)
+
+
 def load_document(path: str | os.PathLike[str]) -> Any:
     """A result from the file that its ``save`` wrote.
 
@@ -110,12 +149,5 @@ def load_document(path: str | os.PathLike[str]) -> Any:
         If the file is missing, is not JSON, or holds no result of a kind known here.
     """
     content = read_json(path)
-    schema = content.get("schema") if isinstance(content, Mapping) else None
-    kind = Document._kinds.get(schema) if isinstance(schema, str) else None
-    if kind is None:
-        known = ", ".join(sorted(Document._kinds))
-        raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")
-    try:
-        return kind.from_dict(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    with named(path):
+        return rebuilt(content)

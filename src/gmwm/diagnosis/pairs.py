@@ -7,14 +7,14 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import norm, t as t_distribution
 
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis.drift import PARTS, part_means
-from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import FEWEST
 from gmwm.readers import Recording
 
 FALSE_ALARM = 1e-3
-"""Chance of a finding where no two channels depend on each other."""
+"""Chance of a notice where no two channels depend on each other."""
 
 _WORTH_A_WORD = 0.05
 _STRONG = 0.3
@@ -23,7 +23,7 @@ _FEWEST_PARTS = 16
 _PART = 32  # samples
 
 
-def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
+def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
     """Find pairs of channels whose prediction errors are correlated.
 
     The correlation of two white series has the variance 1/n, whatever the spectra of the channels
@@ -38,7 +38,7 @@ def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
     pairs = list(combinations(errors, 2))
     # Zero counts for nothing in a sum of products.
     clipped = {name: np.nan_to_num(np.clip(e, -_CLIP, _CLIP)) for name, e in errors.items()}
-    findings = []
+    notices = []
     for one, other in pairs:
         a, b = clipped[one], clipped[other]
         n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
@@ -49,28 +49,30 @@ def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
             continue
         if abs(r) > _WORTH_A_WORD:
             severity: Severity = "warning" if abs(r) > _STRONG else "note"
-            findings.append(
-                Finding(
-                    "", "crosstalk", severity,
+            notices.append(
+                Notice(
+                    "crosstalk",
+                    severity,
+                    "",
                     f"fast noise of {one} and {other} is correlated by {r:.2g}",
-                    "each channel is modelled for itself; a filter may want their covariance",
                     {"correlation": r, "samples": float(n)},
+                    "each channel is modelled for itself; a filter may want their covariance",
                 )
-            )  # fmt: skip
-    return findings
+            )
+    return notices
 
 
-def temperature_findings(recording: Recording) -> list[Finding]:
+def temperature_notices(recording: Recording) -> list[Notice]:
     """Find channels that follow a temperature channel (one whose name begins with ``temp``).
 
     Changes from one of 64 parts of the record to the next are correlated: what only drifts in
     the same direction does not count.
     """
-    thermometers = [c for c in recording if c.name.lower().startswith("temp")]
-    others = [c for c in recording if c not in thermometers]
+    thermometers = [c for c in recording.values() if c.name.lower().startswith("temp")]
+    others = [c for c in recording.values() if c not in thermometers]
     if recording.n < PARTS * _PART:
         return []
-    findings = []
+    notices = []
     for thermometer in thermometers:
         warmer = np.diff(part_means(thermometer.values))
         for channel in others:
@@ -84,13 +86,15 @@ def temperature_findings(recording: Recording) -> list[Finding]:
             if size <= t_distribution.isf(0.5 * FALSE_ALARM / len(others), n - 2):
                 continue
             slope = float(np.polyfit(warmer[known], step[known], 1)[0])
-            findings.append(
-                Finding(
-                    channel.name, "temperature", "warning",
+            notices.append(
+                Notice(
+                    "temperature",
+                    "warning",
+                    channel.name,
                     f"follows {thermometer.name} by {slope:.2g} {channel.unit} a degree "
                     f"(correlation {r:.2g})",
-                    "compensate for it first, or slow terms of the model will stand for it",
                     {"correlation": r, "slope": slope},
+                    "compensate for it first, or slow terms of the model will stand for it",
                 )
-            )  # fmt: skip
-    return findings
+            )
+    return notices

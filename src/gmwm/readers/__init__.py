@@ -8,10 +8,11 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import TIME, bare, meaning
 from gmwm.readers.reader import read
-from gmwm.readers.recording import Channel, Recording
+from gmwm.readers.recording import READING, Channel, Recording
 from gmwm.readers.table import label
 
 __all__ = [
+    "READING",
     "TIME",
     "Channel",
     "CsvTable",

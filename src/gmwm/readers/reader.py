@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.arrays import ArrayTable
@@ -59,7 +60,7 @@ def read(
     Recording
         In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
         the time stamps jump forward, as many as fit on the grid of the sampling interval. Its
-        ``notes`` tell what was assumed, which columns were not used and what is missing.
+        ``notices`` say what was assumed, which columns were not used and what is missing.
 
     Raises
     ------
@@ -77,11 +78,11 @@ def read(
     roles = assign_roles(columns, table.tentative, units, channels, time)
     if roles.time is None:
         _required_rate(table, stated)  # complain before a long file is read, not after
-    unit_of, unit_notes = channel_units(table, roles, units)
+    unit_of, unit_notices = channel_units(table, roles, units)
 
     arrays = table.load(roles.columns)
     _check_size(table, roles, arrays)
-    used_rate, timing, clock_notes = _timing(table, roles.time, arrays, stated)
+    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -90,7 +91,7 @@ def read(
         rate=used_rate,
         units=unit_of,
         source=table.source,
-        notes=(*table.notes, *roles.notes, *unit_notes, *clock_notes),
+        notices=(*table.notices, *roles.notices, *unit_notices, *clock_notices),
     )
     return replace(recording, jitter=timing.jitter) if timing is not None else recording
 
@@ -144,7 +145,7 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
 
 def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
-) -> tuple[float, Timing | None, tuple[str, ...]]:
+) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return _required_rate(table, stated), None, ()
@@ -157,6 +158,7 @@ def _timing(
     )
     timing = clock.timing(stated)
     if stated is None:
-        return timing.rate, timing, timing.notes
-    used = f"The rate stated, {stated:g} Hz, is used."
-    return stated, timing, (*timing.notes, used)
+        return timing.rate, timing, timing.notices
+    text = f"the rate stated, {stated:g} Hz, is used"
+    used = Notice("rate-stated", "note", "", text, {"rate": stated})
+    return stated, timing, (*timing.notices, used)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor, quantity_of
-from gmwm.errors import InputError
+from gmwm.errors import InputError, MissingNameError
 
 _SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
+
+READING = frozenset(
+    {"column-numbers", "columns-not-used", "time-column", "units-from-names", "units-contradicted"}
+    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-stated", "missing-samples"}
+)
+"""Codes of the notices about how a file was read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +85,17 @@ class Channel:
         return f"{size}, mean {self.mean:.6g} {self.unit}{gone}"
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Named channels with one sampling rate.
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Mapping[str, Channel]):
+    """Channels with one sampling rate: a mapping of their names to `Channel`.
 
     Attributes
     ----------
     channels : tuple of Channel
     source : str
         Where it came from, for messages and reports.
-    notes : tuple of str
-        What the reader noticed, one sentence each.
+    notices : tuple of Notice
+        What the reader noticed; see `READING`.
     jitter : float or None
         Standard deviation of the steps of its time stamps, as a share of the sampling interval;
         None if it has none.
@@ -95,7 +103,7 @@ class Recording:
 
     channels: tuple[Channel, ...]
     source: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notices: tuple[Notice, ...] = ()
     jitter: float | None = None
 
     @classmethod
@@ -105,7 +113,7 @@ class Recording:
         rate: float,
         units: Mapping[str, str],
         source: str = "",
-        notes: tuple[str, ...] = (),
+        notices: Sequence[Notice] = (),
     ) -> Recording:
         """Build a recording from arrays in any unit.
 
@@ -118,8 +126,8 @@ class Recording:
         units : mapping of str to str
             Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
         source : str, optional
-        notes : tuple of str, optional
-            What else is to be known; one sentence on missing samples is added.
+        notices : sequence of Notice, optional
+            What else there is to know; what is missing is added.
 
         Raises
         ------
@@ -143,7 +151,7 @@ class Recording:
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
             raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
-        return cls(tuple(channels), source, (*notes, *_notes_of_gaps(channels)))
+        return cls(tuple(channels), source, (*notices, *_notices_of_gaps(channels)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -174,17 +182,28 @@ class Recording:
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        raise InputError(f"the recording has no channel {name!r}: it has {', '.join(self.names)}")
+        raise MissingNameError(
+            f"the recording has no channel {name!r}: it has {', '.join(self.names)}"
+        )
 
-    def __iter__(self) -> Iterator[Channel]:
-        return iter(self.channels)
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
 
     def __len__(self) -> int:
         return len(self.channels)
 
+    def __repr__(self) -> str:
+        size = f"{self.rate:g} Hz, {self.duration:.6g} s"
+        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
     def __str__(self) -> str:
         head = f"{self.source or 'recording'}: {self.rate:g} Hz, {self.duration:.6g} s"
-        return "\n".join([head, *(f"  {channel}" for channel in self.channels), *self.notes])
+        return "\n".join(
+            [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
+        )
 
 
 def _series(name: str, values: FloatArray) -> FloatArray:
@@ -203,26 +222,28 @@ def _series(name: str, values: FloatArray) -> FloatArray:
     return series
 
 
-def _notes_of_gaps(channels: Iterable[Channel]) -> list[str]:
-    """One sentence for all channels that miss equally many samples in equally many gaps."""
-    names: dict[str, list[str]] = {}
+def _notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
+    """One for all channels that miss equally many samples in equally many gaps."""
+    alike: dict[tuple[int, int, int], list[Channel]] = {}
     for channel in channels:
         gone = np.isnan(channel.values)
-        if not np.any(gone):
-            continue
-        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
-        lengths = edges[1::2] - edges[::2]
-        text = f"{channel.missing:,} of {channel.n:,} samples missing"
-        if channel.missing == channel.n:
-            text = f"all {channel.n:,} samples missing"
-        elif lengths.size == 1:
-            text += ", in one gap"
-        else:
-            longest = int(np.max(lengths))
-            plural = "s" if longest > 1 else ""
-            text += f", in {lengths.size:,} gaps, the longest {longest:,} sample{plural}"
-        names.setdefault(text, []).append(channel.name)
-    return [
-        f"{', '.join(alike)}: {'each ' if len(alike) > 1 else ''}{text}."
-        for text, alike in names.items()
-    ]
+        if np.any(gone):
+            edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+            lengths = edges[1::2] - edges[::2]
+            key = (channel.missing, lengths.size, int(np.max(lengths)))
+            alike.setdefault(key, []).append(channel)
+    return [_notice_of_gaps(found, *key) for key, found in alike.items()]
+
+
+def _notice_of_gaps(channels: Sequence[Channel], missing: int, gaps: int, longest: int) -> Notice:
+    n = channels[0].n
+    text = f"all {n:,} samples missing" if missing == n else f"{missing:,} of {n:,} samples missing"
+    if gaps > 1:
+        plural = "s" if longest > 1 else ""
+        text += f", in {gaps:,} gaps, the longest {longest:,} sample{plural}"
+    elif missing < n:
+        text += ", in one gap"
+    names = ", ".join(channel.name for channel in channels)
+    values = {"missing": missing, "gaps": gaps, "longest": longest}
+    each = "each " if len(channels) > 1 else ""
+    return Notice("missing-samples", "note", names, f"{each}{text}", values)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
@@ -27,13 +28,13 @@ class Roles:
         Channel name -> index of its column.
     time : int or None
         Index of the column of time stamps.
-    notes : tuple of str
+    notices : tuple of Notice
         Which columns are not used.
     """
 
     channels: dict[str, int]
     time: int | None
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -129,7 +130,7 @@ def assign_roles(
         If it cannot be decided.
     """
     given_time = None if time is None or time is False else columns.find(time, "time")
-    notes: list[str] = []
+    notices: list[Notice] = []
     if channels is not None:
         chosen = _given_channels(columns, channels)
         stamps = [i for i in _time_columns(columns) if i not in chosen.values()]
@@ -146,13 +147,14 @@ def assign_roles(
                 )
             chosen, stamp = _by_number(columns, rest, bool(taken - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
-    chosen_time = _choose_time(columns, given_time, stamps, time, notes)
+    chosen_time = _choose_time(columns, given_time, stamps, time, notices)
     used = {*chosen.values(), chosen_time}
     ignored = [label(columns.names, i) for i in range(len(columns.names)) if i not in used]
     if ignored:
         plural = "s" if len(ignored) > 1 else ""
-        notes.append(f"Column{plural} not used: {', '.join(ignored)}.")
-    return Roles(chosen, chosen_time, tuple(notes))
+        text = f"column{plural} not used: {', '.join(ignored)}"
+        notices.append(Notice("columns-not-used", "note", "", text, {"count": len(ignored)}))
+    return Roles(chosen, chosen_time, tuple(notices))
 
 
 def _given_channels(columns: Columns, channels: Mapping[str, Reference]) -> dict[str, int]:
@@ -211,11 +213,12 @@ def _choose_time(
     given: int | None,
     stamps: Sequence[int],
     time: Reference | Literal[False] | None,
-    notes: list[str],
+    notices: list[Notice],
 ) -> int | None:
     if time is False or given is not None:
         return given
     if len(stamps) > 1:
         others = ", ".join(label(columns.names, i) for i in stamps[1:])
-        notes.append(f"Time is column {label(columns.names, stamps[0])}; time= takes {others}.")
+        text = f"time is column {label(columns.names, stamps[0])}; time= selects {others}"
+        notices.append(Notice("time-column", "note", "", text, {"column": stamps[0]}))
     return stamps[0] if stamps else None
