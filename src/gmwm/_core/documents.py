@@ -49,13 +49,16 @@ class Document:
 
     @classmethod
     def from_dict(cls, content: Any) -> Self:
-        """Inverse of `to_dict`.
+        """Inverse of `to_dict`; gives an object of a subclass where the content is of one.
 
         Raises
         ------
         InputError
             If the content is of another schema or version, or damaged.
         """
+        kind = cls._kind_of(content)
+        if kind is not None and kind is not cls and issubclass(kind, cls):
+            return kind.from_dict(content)
         what = cls.SCHEMA.rpartition(".")[2]
         if not isinstance(content, Mapping) or content.get("schema") != cls.SCHEMA:
             raise InputError(f"this is not a {what}: give a file that was saved from one")
@@ -72,6 +75,11 @@ class Document:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"the {what} is damaged ({error!r}): make it again") from None
 
+    @staticmethod
+    def _kind_of(content: Any) -> type[Document] | None:
+        schema = content.get("schema") if isinstance(content, Mapping) else None
+        return Document._kinds.get(schema) if isinstance(schema, str) else None
+
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Inverse of `save`.
@@ -82,7 +90,7 @@ class Document:
             If the file is missing, is not JSON, or holds something else or a damaged result.
         """
         content = read_json(path)
-        with named(path):
+        with _named(path):
             return cls.from_dict(content)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -115,31 +123,6 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         raise InputError(f"{path}: is not JSON ({error}): give a file that was saved") from None
 
 
-@contextmanager
-def named(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the file's name before messages."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{path}: {error}", error.code) from None
-
-
-def rebuilt(content: Any) -> Any:
-    """The result that a dictionary of `Document.to_dict` is of, whatever its kind.
-
-    Raises
-    ------
-    InputError
-        If it is of no kind known here, or damaged.
-    """
-    schema = content.get("schema") if isinstance(content, Mapping) else None
-    kind = Document._kinds.get(schema) if isinstance(schema, str) else None
-    if kind is None:
-        known = ", ".join(sorted(Document._kinds))
-        raise InputError(f"this is not a result of gmwm (known are {known}): check the path")
-    return kind.from_dict(content)
-
-
 def load_document(path: str | os.PathLike[str]) -> Any:
     """A result from the file that its ``save`` wrote.
 
@@ -149,5 +132,18 @@ def load_document(path: str | os.PathLike[str]) -> Any:
         If the file is missing, is not JSON, or holds no result of a kind known here.
     """
     content = read_json(path)
-    with named(path):
-        return rebuilt(content)
+    kind = Document._kind_of(content)
+    if kind is None:
+        known = ", ".join(sorted(Document._kinds))
+        raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")
+    with _named(path):
+        return kind.from_dict(content)
+
+
+@contextmanager
+def _named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the file's name before messages."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}", error.code) from None

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 from joblib import Parallel, delayed
 
 from gmwm._core import checks
-from gmwm._core.documents import Document, load_document, rebuilt
+from gmwm._core.documents import Document, load_document
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
@@ -123,7 +123,7 @@ class Calibration(Mapping[str, Fit], Document):
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         return cls(
-            fits={str(name): _fit(item) for name, item in content["channels"].items()},
+            fits={str(name): Fit.from_dict(item) for name, item in content["channels"].items()},
             skipped={
                 str(name): Notice.from_dict(item) for name, item in content["skipped"].items()
             },
@@ -138,13 +138,6 @@ class Calibration(Mapping[str, Fit], Document):
         # By name: this room knows none above it, but a result shows itself.
         written: Path = import_module("gmwm.report").write_report(self, path)
         return written
-
-
-def _fit(content: Any) -> Fit:
-    fit = rebuilt(content)
-    if not isinstance(fit, Fit):
-        raise TypeError(f"a {type(fit).__name__} where a fit should be")
-    return fit
 
 
 def load(path: str | os.PathLike[str]) -> Any:

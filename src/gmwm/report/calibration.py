@@ -102,7 +102,6 @@ def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
         "floor": _in_field_unit(low.deviation, "u", fit),
         "floor_tau": number(low.tau),
         "sentence": sentence(fit),
-        "notices": list(map(str, fit.notices)),
         "ambiguity": ambiguity(calibration, name),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
         "figure": _script(deviation_figure(fit)),

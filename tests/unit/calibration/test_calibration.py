@@ -114,10 +114,11 @@ def test_unknown_channel_lists_those_there_are(calibration):
 def test_valid_only_if_every_fit_is(calibration):
     sound = replace(calibration, skipped={})
     assert sound.valid == all(fit.valid for fit in calibration.fits.values())
-    fits = {name: replace(fit, valid=True) for name, fit in calibration.fits.items()}
+    fits = {name: replace(fit, notices=()) for name, fit in calibration.fits.items()}
     assert replace(sound, fits=fits).valid
     assert not replace(calibration, fits=fits).valid  # one is skipped
-    assert not replace(sound, fits=fits | {"gyro_x": replace(fits["gyro_x"], valid=False)}).valid
+    bad = replace(fits["gyro_x"], notices=(Notice("misfit", "bad", "", "misses the data"),))
+    assert not replace(sound, fits=fits | {"gyro_x": bad}).valid
 
 
 def test_all_channels_dead():
@@ -243,11 +244,11 @@ def assert_same(one, other):
         assert a.interval() == b.interval()
         assert a.interval(0.5) == b.interval(0.5)
         assert a.upper_bounds == b.upper_bounds
-        assert a.remarks == b.remarks
+        assert a.notices == b.notices
         numbers = [(f.objective, f.dof, f.discrepancy, f.p_value) for f in (a, b)]
         np.testing.assert_array_equal(*numbers)
-        assert (a.method, a.omega, a.valid) == (b.method, b.omega, b.valid)
-        assert a.rows() == b.rows()
+        assert (a.method, a.weights, a.reasons) == (b.method, b.weights, b.reasons)
+        assert a.estimates == b.estimates
         for array in ("tau", "variance", "mean", "blocks", "lower", "upper", "covariance"):
             np.testing.assert_array_equal(getattr(a.wv, array), getattr(b.wv, array))
         scalars = ("block", "n", "dt", "confidence", "name", "quantity", "unit")
@@ -268,14 +269,14 @@ def test_round_trip_through_a_file(which, request, tmp_path):
 
 
 def test_an_upper_bound_is_in_the_round_trip(mapped):
-    # What `mapped` is for: a bound and a remark must exist to be lost.
+    # What `mapped` is for: a bound and a notice must exist to be lost.
     fit = mapped["accel_x"]
     assert fit.upper_bounds.keys() == {"K"}
-    assert any("K is not identifiable" in remark for remark in fit.remarks)
+    assert [(n.code, n.where) for n in fit.notices] == [("amplitude-bound", "K")]
 
 
 def test_a_missing_p_value_survives(calibration, tmp_path):
-    fits = {"gyro_x": replace(calibration["gyro_x"], p_value=float("nan"), dof=0)}
+    fits = {"gyro_x": replace(calibration["gyro_x"], chi_square=float("nan"), dof=0)}
     odd = replace(calibration, fits=fits)
     odd.save(tmp_path / "cal.json")
     assert_same(gmwm.load(tmp_path / "cal.json"), odd)
@@ -346,9 +347,9 @@ def test_missing_file_and_folder(tmp_path):
         (b"time,gyro_x\n0,1\n", "is not JSON"),
         (b'{"schema": "gmwm.calibration", "schema_ver', "is not JSON"),
         (b"\xff\xfe\x00\x93NUMPY", "is not JSON"),
-        (b"[1, 2, 3]", "not a result of gmwm"),
-        (b"null", "not a result of gmwm"),
-        (b'{"type": "FeatureCollection"}', "not a result of gmwm"),
+        (b"[1, 2, 3]", "holds no result of gmwm"),
+        (b"null", "holds no result of gmwm"),
+        (b'{"type": "FeatureCollection"}', "holds no result of gmwm"),
         (b'{"schema": "gmwm.calibration"}', "schema version None"),
     ],
 )
@@ -377,7 +378,7 @@ FIT = ("channels", "gyro_x")
         *[((key,), GONE) for key in ("channels", "skipped", "source", "rate_hz", "n", "notices")],
         *[
             ((*FIT, key), GONE)
-            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "remarks")
+            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "notices")
         ],
         ((*FIT, "wavelet_variance", "variance"), GONE),
         ((*FIT, "wavelet_variance", "dt"), GONE),
