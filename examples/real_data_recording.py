@@ -40,7 +40,7 @@ class Recorded:
 
     def largest_event(self, channels: str) -> Finding | None:
         """The highest shock of the channels whose names begin so."""
-        events = [e for e in self.health.of(kind="event") if e.channel.startswith(channels)]
+        events = [e for e in self.health.of(code="event") if e.where.startswith(channels)]
         return max(events, key=lambda event: abs(event.values["height"]), default=None)
 
 

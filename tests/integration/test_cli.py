@@ -536,6 +536,22 @@ def test_health_says_what_is_wrong(run, tmp_path):
     assert words.endswith("wrote health.json")
 
 
+def test_health_finds_a_channel_that_follows_the_temperature(run, tmp_path):
+    rng = np.random.default_rng(7)
+    n = 20_000
+    warm = 25.0 + 0.02 * rng.normal(size=n).cumsum()
+    gyro = 0.3 * rng.normal(size=n) + 0.2 * warm
+    slow = np.where(np.arange(n) % 50 == 0, warm, np.nan)  # sampled at 2 Hz
+    columns = {"gyro_x": gyro, "gyro_y": 0.3 * rng.normal(size=n), "temp [degC]": slow}
+    write_csv(tmp_path / "static.csv", columns)
+    code, printed, told = run("health", "static.csv", *RATE, "--gyro-unit", "deg/s")
+    assert (code, told) == (0, "")
+    words = " ".join(printed.split())
+    assert re.search(r"warning follows temp by 0\.(19|2)\d* deg/s per degC", words)
+    assert words.count("follows temp") == 1
+    assert "note auxiliary channels: 'temp' (temperature)" in words
+
+
 def test_health_writes_nothing_unless_asked(run, tmp_path):
     shaken_csv(tmp_path / "static.csv")
     code, _, _ = run("health", "static.csv", *RATE, *SI)

@@ -166,7 +166,8 @@ def calibrate(
     The recording is examined first: samples of shocks and spikes are left out, periodic lines and
     resonances are terms that a selected model may have, and the wavelet variances of a channel
     with outliers all over the record are robust; notices say what was found and done. A
-    channel that is constant, or of which more than half of the samples are missing, is skipped.
+    channel that is constant, or of which more than half of the samples are missing, is skipped;
+    auxiliary channels (temperature, voltage, clock) have no model.
 
     Parameters
     ----------
@@ -290,7 +291,7 @@ def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], 
     alive: dict[str, list[Channel]] = {}
     dead: dict[str, Notice] = {}
     for recording in recordings:
-        for channel in recording.values():
+        for channel in recording.inertial:
             why = _reason_to_skip(channel)
             if why is not None:
                 dead.setdefault(channel.name, why)
@@ -301,7 +302,8 @@ def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], 
 
 def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) -> str:
     which = "; ".join(f"{name}: {why.text}" for name, why in dead.items())
-    if all(why.code == "constant" for why in dead.values()):
+    which = which or "only auxiliary channels"
+    if dead and all(why.code == "constant" for why in dead.values()):
         which = "every channel is constant"
     return (
         f"{recordings[0].source or 'the recording'}: {which}, nothing to calibrate: check the "

@@ -70,10 +70,11 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     if not chosen:
         return Screened(recording, {}, notices=recording.notices)
     found = health(recording)
+    names = tuple(channel.name for channel in recording.inertial)
     robust = frozenset(
-        name for name in recording if "outliers" in chosen and found.outliers(name) > 0.0
+        name for name in names if "outliers" in chosen and found.outliers(name) > 0.0
     )
-    masked, kept = recording, frozenset(recording)
+    masked, kept = recording, frozenset(names)
     if "events" in chosen:
         masked = found.masked(recording)
         kept = frozenset(name for name in robust if _is_torn(recording[name], masked[name]))
@@ -85,7 +86,7 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     ]
     return Screened(
         masked,
-        {name: _terms(found, name, chosen) for name in recording},
+        {name: _terms(found, name, chosen) for name in names},
         robust,
         (*masked.notices, *issues),
     )

@@ -76,13 +76,14 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
     whole = [_length(recording), *read, *_clock(recording)]
     examined: dict[str, _Examined] = {}
-    for name, channel in recording.items():
+    channels = recording.inertial
+    for channel in channels:
         if progress is not None:
-            progress(len(examined), len(recording), name)
-        examined[name] = _examined(channel)
+            progress(len(examined), len(channels), channel.name)
+        examined[channel.name] = _examined(channel)
     if progress is not None:
-        progress(len(recording), len(recording), "")
-    shared = gap_notices(recording.values(), recording.dt)
+        progress(len(channels), len(channels), "")
+    shared = gap_notices(channels, recording.dt)
     shared += crosstalk_notices(
         {name: one.errors for name, one in examined.items() if one.errors is not None}
     )

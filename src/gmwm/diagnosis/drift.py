@@ -25,14 +25,14 @@ _CHANGE = 0.05  # of the standard deviation between halves that is worth a word
 _LARGE_CHANGE = 0.2
 
 
-def part_means(values: FloatArray, parts: int = PARTS) -> FloatArray:
-    """Means of equal parts of a series; NaN where more than half of a part is missing."""
+def part_means(values: FloatArray, parts: int = PARTS, least: float = 0.5) -> FloatArray:
+    """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
     rows = values[: size * parts].reshape(parts, size)
     known = ~np.isnan(rows)
     count = np.count_nonzero(known, axis=1)
     total = np.sum(np.where(known, rows, 0.0), axis=1)
-    return np.where(count > size / 2, total / np.maximum(count, 1), np.nan)
+    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
 def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice | None:

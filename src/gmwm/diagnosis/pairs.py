@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import norm, t as t_distribution
 
 from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis.drift import PARTS, part_means
 from gmwm.diagnosis.innovations import FEWEST
@@ -63,38 +64,47 @@ def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
 
 
 def temperature_notices(recording: Recording) -> list[Notice]:
-    """Find channels that follow a temperature channel (one whose name begins with ``temp``).
+    """Find channels that follow a temperature channel, each with the one it follows most closely.
 
     Changes from one of 64 parts of the record to the next are correlated: what only drifts in
     the same direction does not count.
     """
-    thermometers = [c for c in recording.values() if c.name.lower().startswith("temp")]
-    others = [c for c in recording.values() if c not in thermometers]
-    if recording.n < PARTS * _PART:
+    thermometers = [c for c in recording.values() if c.quantity == "temperature"]
+    if recording.n < PARTS * _PART or not thermometers:
         return []
+    pairs = len(thermometers) * len(recording.inertial)
+    # Thermometers are often slower than the other sensors.
+    warmer = {c.name: np.diff(part_means(c.values, least=0.0)) for c in thermometers}
     notices = []
-    for thermometer in thermometers:
-        warmer = np.diff(part_means(thermometer.values))
-        for channel in others:
-            step = np.diff(part_means(channel.values))
-            known = ~np.isnan(warmer + step)
-            n = int(np.count_nonzero(known))
-            if n < _FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
-                continue
-            r = float(np.corrcoef(warmer[known], step[known])[0, 1])
-            size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-            if size <= t_distribution.isf(0.5 * FALSE_ALARM / len(others), n - 2):
-                continue
-            slope = float(np.polyfit(warmer[known], step[known], 1)[0])
-            notices.append(
-                Notice(
-                    "temperature",
-                    "warning",
-                    channel.name,
-                    f"follows {thermometer.name} by {slope:.2g} {channel.unit} a degree "
-                    f"(correlation {r:.2g})",
-                    {"correlation": r, "slope": slope},
-                    "compensate for it first, or slow terms of the model will stand for it",
-                )
+    for channel in recording.inertial:
+        step = np.diff(part_means(channel.values))
+        found = [
+            (size, r, slope, thermometer)
+            for thermometer in thermometers
+            for size, r, slope in _correlation(warmer[thermometer.name], step, pairs)
+        ]
+        if found:
+            _, r, slope, thermometer = max(found, key=lambda one: one[0])
+            text = (
+                f"follows {thermometer.name} by {spoken(slope, channel.unit)} per "
+                f"{thermometer.unit or 'unit'} (correlation {r:.2g})"
             )
+            values = {"correlation": r, "slope": slope}
+            action = "compensate for it first, or slow terms of the model will stand for it"
+            notices.append(Notice("temperature", "warning", channel.name, text, values, action))
     return notices
+
+
+def _correlation(
+    warmer: FloatArray, step: FloatArray, pairs: int
+) -> list[tuple[float, float, float]]:
+    """Student's t, correlation and slope, if there is a correlation."""
+    known = ~np.isnan(warmer + step)
+    n = int(np.count_nonzero(known))
+    if n < _FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
+        return []
+    r = float(np.corrcoef(warmer[known], step[known])[0, 1])
+    size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
+    if size <= t_distribution.isf(0.5 * FALSE_ALARM / pairs, n - 2):
+        return []
+    return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

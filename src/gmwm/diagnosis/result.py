@@ -142,14 +142,15 @@ class Health(Document):
         InputError
             If the recording has other channels or another length.
         """
-        if recording.names != tuple(self.channels) or recording.n != self.n:
+        names = tuple(channel.name for channel in recording.inertial)
+        if names != tuple(self.channels) or recording.n != self.n:
             raise InputError(
                 f"{recording.source or 'the recording'} is not the one that was examined "
                 f"({self.source or 'without a name'}): give that, or examine this one"
             )
         channels, notices = [], list(recording.notices)
         for name, channel in recording.items():
-            events = self.events(name)
+            events = () if channel.is_auxiliary else self.events(name)
             if events and name not in but:
                 values = np.array(channel.values, dtype=float)
                 for start, stop in events:

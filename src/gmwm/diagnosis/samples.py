@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,9 +24,8 @@ _LONG = 32  # equal samples in a row that are not asked whether noise tells samp
 _FEWEST_AT_END = 8
 
 
-def gap_notices(channels: Iterable[Channel], dt: float) -> list[Notice]:
+def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
     """How much is missing; one notice for the recording where all channels miss the same."""
-    channels = list(channels)
     notices = [found for channel in channels if (found := _gap_notice(channel, dt))]
     if len(notices) == len(channels) > 1 and all(n.values == notices[0].values for n in notices):
         return [replace(notices[0], where="")]

@@ -68,11 +68,12 @@ def _sensor(channel: str, column: str) -> str | None:
 
 
 def _check_keys(units: Mapping[str, str], roles: Roles) -> None:
+    known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
-        if key not in SI_UNIT and key not in roles.channels:
+        if key not in SI_UNIT and key not in known:
             raise InputError(
                 f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
-                f"are {', '.join(roles.channels)}"
+                f"are {', '.join(known)}"
             )
 
 

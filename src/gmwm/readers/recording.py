@@ -12,11 +12,13 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError
+from gmwm.readers.auxiliary import AUXILIARY, AuxiliaryUnit, auxiliary_unit
 
 _SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
 
 READING = frozenset(
-    {"column-numbers", "columns-not-used", "time-column", "units-from-names", "units-contradicted"}
+    {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
+    | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-stated", "missing-samples"}
 )
 """Codes of the notices about how a file was read."""
@@ -34,11 +36,11 @@ class Channel:
         Samples in the SI unit of the quantity, mean not removed; NaN where one is missing.
     dt : float
         Sampling interval, s.
-    quantity : {"gyro", "accel", None}
-        Angular rate (rad/s), specific force (m/s^2) or, if ``None``, something else in its own
-        unit.
+    quantity : {"gyro", "accel", "temperature", "voltage", "clock", None}
+        Angular rate (rad/s), specific force (m/s^2), an auxiliary quantity (degC, V, s) or, if
+        ``None``, something else in its own unit.
     unit : str
-        The unit of ``values``.
+        The unit of ``values``; empty if it is not known.
     """
 
     name: str
@@ -46,6 +48,11 @@ class Channel:
     dt: float
     quantity: str | None = None
     unit: str = ""
+
+    @property
+    def is_auxiliary(self) -> bool:
+        """Whether it is kept for what it explains, and no error model is fitted to it."""
+        return self.quantity in AUXILIARY
 
     @property
     def n(self) -> int:
@@ -124,7 +131,8 @@ class Recording(Mapping[str, Channel]):
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
-            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
+            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``. A
+            channel in degC, K, V, mV or s is auxiliary.
         source : str, optional
         notices : sequence of Notice, optional
             What else there is to know; what is missing is added.
@@ -143,10 +151,13 @@ class Recording(Mapping[str, Channel]):
             unit = units.get(name) or units.get(name.partition("_")[0])
             if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
+            series, auxiliary = _series(name, values), auxiliary_unit(unit)
+            if auxiliary is not None:
+                channels.append(auxiliary_channel(name, series, 1.0 / rate, auxiliary))
+                continue
             quantity = quantity_of(unit)
             si = SI_UNIT[quantity]
-            scaled = _series(name, values) * factor(unit, si)
-            channels.append(Channel(name, scaled, 1.0 / rate, quantity, si))
+            channels.append(Channel(name, series * factor(unit, si), 1.0 / rate, quantity, si))
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
@@ -157,6 +168,11 @@ class Recording(Mapping[str, Channel]):
     def names(self) -> tuple[str, ...]:
         """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
+
+    @property
+    def inertial(self) -> tuple[Channel, ...]:
+        """Channels that can be calibrated: all but the auxiliary ones."""
+        return tuple(channel for channel in self.channels if not channel.is_auxiliary)
 
     @property
     def dt(self) -> float:
@@ -204,6 +220,11 @@ class Recording(Mapping[str, Channel]):
         return "\n".join(
             [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
         )
+
+
+def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryUnit) -> Channel:
+    """A channel of an auxiliary quantity in its usual unit."""
+    return Channel(name, values * unit.scale + unit.offset, dt, unit.quantity, unit.unit)
 
 
 def _series(name: str, values: FloatArray) -> FloatArray:

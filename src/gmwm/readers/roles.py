@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
+from gmwm.readers.auxiliary import AUXILIARY, AuxiliaryUnit, auxiliary_unit
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import label
 
@@ -25,22 +26,49 @@ class Roles:
     Attributes
     ----------
     channels : dict of str to int
-        Channel name -> index of its column.
+        Name of a gyro's or accelerometer's channel -> index of its column.
+    auxiliary : tuple of AuxiliaryColumn
+        Other channels that are kept.
     time : int or None
         Index of the column of time stamps.
     notices : tuple of Notice
-        Which columns are not used.
+        Which columns are auxiliary, and which are not used.
     """
 
     channels: dict[str, int]
+    auxiliary: tuple[AuxiliaryColumn, ...]
     time: int | None
     notices: tuple[Notice, ...]
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """Indices of all columns that are needed, each once, in the order of the file."""
+        """Indices of the columns that are needed, each once, in the order of the file."""
         time = () if self.time is None else (self.time,)
         return tuple(sorted({*self.channels.values(), *time}))
+
+
+@dataclass(frozen=True)
+class AuxiliaryColumn:
+    """A column of temperatures, voltages or time stamps of another clock.
+
+    Attributes
+    ----------
+    name : str
+        Of its channel.
+    index : int
+    quantity : str
+        One of `AUXILIARY`.
+    unit : AuxiliaryUnit or None
+        That of the file, if it is known.
+    """
+
+    name: str
+    index: int
+    quantity: str
+    unit: AuxiliaryUnit | None
+
+    def __str__(self) -> str:
+        return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
 
 
 @dataclass(frozen=True)
@@ -148,13 +176,63 @@ def assign_roles(
             chosen, stamp = _by_number(columns, rest, bool(taken - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
     chosen_time = _choose_time(columns, given_time, stamps, time, notices)
-    used = {*chosen.values(), chosen_time}
+    auxiliary = _given_auxiliary(columns, chosen, units)
+    chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
+    if channels is None:
+        left = {*chosen.values(), chosen_time, *(() if time is not False else stamps)}
+        auxiliary += _found_auxiliary(columns, left, chosen, units)
+    if auxiliary:
+        text = f"auxiliary channels: {', '.join(map(str, auxiliary))}"
+        values = {column.name: column.quantity for column in auxiliary}
+        notices.append(Notice("columns-auxiliary", "note", "", text, values))
+    used = {*chosen.values(), chosen_time, *(column.index for column in auxiliary)}
     ignored = [label(columns.names, i) for i in range(len(columns.names)) if i not in used]
     if ignored:
         plural = "s" if len(ignored) > 1 else ""
         text = f"column{plural} not used: {', '.join(ignored)}"
         notices.append(Notice("columns-not-used", "note", "", text, {"count": len(ignored)}))
-    return Roles(chosen, chosen_time, tuple(notices))
+    return Roles(chosen, tuple(auxiliary), chosen_time, tuple(notices))
+
+
+def _given_auxiliary(
+    columns: Columns, chosen: Mapping[str, int], units: Mapping[str, str]
+) -> list[AuxiliaryColumn]:
+    """Those of the chosen channels that are auxiliary by unit, by name, or by the column's name."""
+    found = []
+    for name, index in chosen.items():
+        unit = auxiliary_unit(units.get(name, ""))
+        column = meaning(columns.names[index])
+        if unit is not None:
+            found.append(AuxiliaryColumn(name, index, unit.quantity, unit))
+        elif (role := meaning(name).role) in AUXILIARY or (
+            role is None and column.role in AUXILIARY and name not in units
+        ):
+            unit = auxiliary_unit(column.unit or "")
+            found.append(AuxiliaryColumn(name, index, role or str(column.role), unit))
+    return found
+
+
+def _found_auxiliary(
+    columns: Columns,
+    used: Collection[int | None],
+    chosen: Mapping[str, int],
+    units: Mapping[str, str],
+) -> list[AuxiliaryColumn]:
+    """Columns that are not used otherwise and are auxiliary by their names."""
+    found: list[AuxiliaryColumn] = []
+    for index, column in enumerate(columns.names):
+        role = meaning(column)
+        quantity = "clock" if role.role == TIME else role.role
+        if index in used or quantity not in AUXILIARY:
+            continue
+        name = bare(column)
+        if name in chosen or name in {other.name for other in found}:
+            name = f"{name}_{index}"
+        unit = auxiliary_unit(units.get(name, role.unit or ""))
+        if quantity == "clock" and role.seconds is not None:
+            unit = AuxiliaryUnit("clock", "s", role.seconds)
+        found.append(AuxiliaryColumn(name, index, quantity, unit))
+    return found
 
 
 def _given_channels(columns: Columns, channels: Mapping[str, Reference]) -> dict[str, int]:

@@ -106,7 +106,7 @@ def test_temperature_that_a_channel_follows():
     channels = (
         Channel("gyro_x", rng.normal(size=n) + 0.5 * warm, DT, "gyro", "rad/s"),
         Channel("gyro_y", rng.normal(size=n), DT, "gyro", "rad/s"),
-        Channel("temp", warm, DT, None, "K"),
+        Channel("temp", warm, DT, "temperature", "degC"),
     )
     found = gmwm.health(Recording(channels))
     (notice,) = found.of(code="temperature")
