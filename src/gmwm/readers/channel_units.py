@@ -91,12 +91,14 @@ def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
     if sensor is None:
         return InputError(
             f"{table.source} does not say the unit of {channel}: give it, e.g. "
-            f'units={{"{channel}": "deg/s"}}'
+            f'units={{"{channel}": "deg/s"}}',
+            "unit-missing",
         )
     example = _EXAMPLES[sensor]
     return InputError(
         f"{table.source} does not say the unit of {channel}: give it, e.g. "
-        f'units={{"{sensor}": "{example}"}} (on the command line --{sensor}-unit {example})'
+        f'units={{"{sensor}": "{example}"}}',
+        f"{sensor}-unit-missing",
     )
 
 

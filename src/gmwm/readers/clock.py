@@ -105,7 +105,9 @@ class Clock:
             jitter = float(np.std(np.delete(steps, jumps.rows - 1)))
         step = jumps.interval
         if not _SHORTEST_STEP < step < 1.0 / _SHORTEST_STEP:
-            raise InputError(f"{self.place}: steps of {step:g} are no clock's: {_WAY_OUT}")
+            raise InputError(
+                f"{self.place}: steps of {step:g} are not those of a clock: {_WAY_OUT}", "clock"
+            )
         self._check_jumps(jumps)
         seconds, guessed = self._unit(step, expected)
         rate = 1.0 / (step * seconds)
@@ -129,7 +131,8 @@ class Clock:
             others = f", and {bad.size - 1:,} more such" if bad.size > 1 else ""
             raise InputError(
                 f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: take such lines "
-                f"out, or, {_WAY_OUT}"
+                f"out, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_increasing(self, steps: FloatArray) -> None:
@@ -139,7 +142,8 @@ class Clock:
             what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
             raise InputError(
                 f"{self.place}, {self.where(row)}: time stamp {self.stamps[row]:.15g} {what}: "
-                f"take such lines out, or, {_WAY_OUT}"
+                f"take such lines out, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_not_short(self, steps: FloatArray) -> None:
@@ -149,7 +153,8 @@ class Clock:
             row = int(bad[0]) + 1
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of {steps[row - 1]:.6g} where "
-                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}"
+                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_jumps(self, jumps: Jumps) -> None:
@@ -158,7 +163,8 @@ class Clock:
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of two intervals, and "
                 f"{jumps.rows.size - 1:,} more such at even distances, as if the stamps were "
-                f"rounded too coarsely: {_WAY_OUT}"
+                f"rounded too coarsely: {_WAY_OUT}",
+                "clock",
             )
         n = self.stamps.size
         if jumps.total > n:
@@ -167,7 +173,8 @@ class Clock:
                 f"{self.place}, {self.where(row)}: the clock jumps by "
                 f"{jumps.missing[jumps.longest]:,.6g} sampling intervals, and in all "
                 f"{jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
-                f"the recording: use the part before or after, or, {_WAY_OUT}"
+                f"the recording: use the part before or after, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _notices_of_jumps(self, jumps: Jumps, seconds: float) -> list[Notice]:

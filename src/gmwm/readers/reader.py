@@ -121,7 +121,7 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
         return table.rate
     rate = float(rate)
     if not (0.0 < rate < math.inf and 1.0 / rate < math.inf):
-        raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz, e.g. --rate 100")
+        raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz", "rate")
     if table.rate is not None and not agree(rate, table.rate):
         raise InputError(
             f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
@@ -133,8 +133,8 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
 def _required_rate(table: Table, stated: float | None) -> float:
     if stated is None:
         raise InputError(
-            f"{table.source} has no time column and no rate was given: give it in Hz, e.g. "
-            "rate=100 (on the command line --rate 100)"
+            f"{table.source} has no time column and no rate was given: give it in Hz, rate=100",
+            "rate",
         )
     return stated
 

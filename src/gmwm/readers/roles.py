@@ -171,7 +171,8 @@ def assign_roles(
             if not rest or (any(columns.names[i] for i in rest) and not tentative):
                 raise InputError(
                     f"{columns.source}: no column is known as a gyro's or an accelerometer's, "
-                    f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}"
+                    f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}",
+                    "channel-unknown",
                 )
             chosen, stamp = _by_number(columns, rest, bool(taken - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
@@ -250,7 +251,8 @@ def _named_channels(columns: Columns) -> dict[str, int]:
             names = " and ".join(label(columns.names, i) for i in indices[:2])
             raise InputError(
                 f"{columns.source}: columns {names} may both be {channel}: say which to use, "
-                f'e.g. channels={{"{channel}": {indices[0]}}}'
+                f'e.g. channels={{"{channel}": {indices[0]}}}',
+                "channel-unknown",
             )
         if indices:
             found[channel] = indices[0]
@@ -273,14 +275,16 @@ def _by_number(
     if len(rest) not in (1, len(AXES)):
         raise InputError(
             f"{columns.source} has {len(columns.names)} columns without names that are known: say "
-            f"which is which, e.g. {_EXAMPLE}"
+            f"which is which, e.g. {_EXAMPLE}",
+            "channel-unknown",
         )
     sensors = [sensor for sensor in SI_UNIT if sensor in units]
     if len(sensors) != 1:
         raise InputError(
             f"{columns.source}: column names do not tell whether this is a gyro or an "
             f'accelerometer: say it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
-            "only one of them"
+            "only one of them",
+            "channel-unknown",
         )
     names = [f"{sensors[0]}_{axis}" for axis in AXES]
     return dict(zip(names, rest, strict=False)), stamp
