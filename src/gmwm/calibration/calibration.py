@@ -8,22 +8,26 @@ from dataclasses import dataclass, replace
 from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from joblib import Parallel, delayed
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, load_document
+from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration.screening import SCREENING, screened, with_outcomes
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate import Fit, estimate
+from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording
 from gmwm.selection import Selection, select, wider_ranges
 from gmwm.variance import MIN_SAMPLES, wavelet_variance
+
+if TYPE_CHECKING:
+    import pandas
 
 AMBIGUITY = "ambiguity"
 """Code of the notice that several models describe a channel equally well."""
@@ -107,6 +111,15 @@ class Calibration(Mapping[str, Fit], Document):
         blocks = [str(fit) for fit in self.fits.values()]
         blocks += [f"{name}: skipped, {notice.text}" for name, notice in self.skipped.items()]
         return "\n\n".join(blocks)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the parameters of all channels, one a row, in SI units; needs pandas."""
+        rows = [
+            {"channel": name, **estimate.to_dict(), "valid": fit.valid}
+            for name, fit in self.fits.items()
+            for estimate in fit.estimates
+        ]
+        return frame(rows, ("channel", *Estimate.COLUMNS, "valid"))
 
     # -- files ------------------------------------------------------------------------------------
 
@@ -226,7 +239,7 @@ def calibrate(
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
             if given_model is not None:
-                return estimate(given_model, data), ()
+                return estimated(given_model, data), ()
             selection = select(data, extra=offered[name])
             return selection.fit, _ambiguity(name, selection)
         except InputError as error:

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from html import escape
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from gmwm._core.documents import Document
+from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
 from gmwm._core.text import wrapped
 from gmwm.errors import InputError, MissingNameError
 from gmwm.readers import Recording
+
+if TYPE_CHECKING:
+    import pandas
 
 _INDENT = 11
 
@@ -188,6 +192,11 @@ class Health(Document):
             for notice in found:
                 rows += _wrapped(notice)
         return "\n".join(rows)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the notices, one a row; needs pandas."""
+        columns = ("where", "code", "severity", "text", "action", "values")
+        return frame((notice.to_dict() for notice in self.notices), columns)
 
     def content(self) -> dict[str, Any]:
         return {
