@@ -119,6 +119,8 @@ def _fitness(fit: Fit) -> str:
     text = f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom"
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value:.2g}"
+        if fit.discrepancy > 0.0:
+            text += f" ({fit.p_value_allowed:.2g} with the discrepancy)"
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
