@@ -17,7 +17,7 @@ from gmwm.report.figure import deviation_figure, residual_figure
 from gmwm.report.health import ambiguity, health
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
-_DAYS, _YEARS = 5.0, 2.0  # from which on durations are told so
+_DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
 _AIM = 0.1  # relative standard error
 _MANY_YEARS = 100.0
 
@@ -127,7 +127,7 @@ def _fitness(fit: Fit) -> str:
 
 
 def needed(seconds: float | None, duration: float) -> str:
-    """Length of record that a parameter needs, in words; empty if nothing is to be said."""
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
     if seconds is None:
         return ""
     if seconds <= duration:
