@@ -801,4 +801,4 @@ def test_reproduce_does_not_touch_earlier_runs(run):
     run(*arguments)
     code, _, told = run(*arguments)
     assert code == 2
-    assert "add --resume" in told
+    assert "resume it, or give another folder (--resume, -o)" in told

@@ -327,7 +327,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
     Path("taken").mkdir()
     Path("taken/runs").write_text("mine")
     code, _, told = run("study.yaml", "-o", "taken", "--jobs", 1)
-    assert (code, "in the way" in told) == (2, True)
+    assert (code, "cannot be written" in told) == (2, True)
     assert Path("taken/runs").read_text() == "mine"
     code, _, told = run("study.yaml", "-o", "study.yaml", "--jobs", 1)
     assert (code, "cannot be written" in told) == (2, True)

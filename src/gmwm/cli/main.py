@@ -17,6 +17,13 @@ from gmwm.errors import InputError
 
 _EXIT_INPUT = 2
 
+_HINTS = {
+    "earlier-runs": " (--resume, -o)",
+    "other-runs": " (-o)",
+    "runs-in-use": " (-o)",
+}
+"""Options that mend an error of a code."""
+
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="gmwm")
@@ -33,7 +40,7 @@ def main() -> None:
     try:
         cli.main(standalone_mode=False)
     except InputError as error:
-        click.echo(f"gmwm: {error}", err=True)
+        click.echo(f"gmwm: {error}{_HINTS.get(error.code, '')}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.exceptions.Exit as error:
         sys.exit(error.exit_code)

@@ -40,6 +40,8 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-navigate"),
               show_default=True, help="Folder for the report, the table and the runs.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
+@click.option("--cluster", metavar="ADDRESS",
+              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
 @click.option("--imu", metavar="FILE", help="Your own data: IMU samples, with a header as for gmwm "
                                             "calibrate; axes forward, right, down.")  # fmt: skip
 @click.option("--gnss", "gnss_fixes", metavar="FILE",
@@ -69,6 +71,7 @@ def navigate(
     jobs: int | None,
     output: Path,
     resume: bool,
+    cluster: str | None,
     imu: str | None,
     gnss_fixes: str | None,
     sensors: str | None,
@@ -119,13 +122,20 @@ def navigate(
                 f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
                 "it out"
             )
-        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume)
+        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster)
     else:
         content["imu"] = _with_reading(content.get("imu"), reading)
         _filter(content, folder, output)
 
 
-def _validate(content: dict[str, Any], base: Path, output: Path, jobs: int, resume: bool) -> None:
+def _validate(
+    content: dict[str, Any],
+    base: Path,
+    output: Path,
+    jobs: int,
+    resume: bool,
+    cluster: str | None,
+) -> None:
     """Do the runs of a study."""
     from gmwm._core.files import folder_to_fill, replaceable, written
     from gmwm.ins.montecarlo import Validation
@@ -136,10 +146,11 @@ def _validate(content: dict[str, Any], base: Path, output: Path, jobs: int, resu
     with folder_to_fill(output) as folder:
         store = folder / "runs"
         table, page = (replaceable(folder / f"validation.{end}") for end in ("txt", "html"))
-        if not resume:
-            _cleared(store)
         with progress_bar("navigating", "runs") as bar:
-            validation = Validation.of(experiment, jobs=jobs, folder=store, progress=bar)
+            validation = Validation.of(
+                experiment, jobs=jobs, cluster=cluster, folder=store,
+                earlier="resume" if resume else "replace", progress=bar,
+            )  # fmt: skip
         text = str(validation)
         with written(table) as stream:
             stream.write(text + "\n")
@@ -271,16 +282,3 @@ def _span(text: str) -> list[float]:
     except ValueError:
         raise InputError(f"--outage {text}: write START:LENGTH in seconds, e.g. 600:60") from None
     return [start, length]
-
-
-def _cleared(store: Path) -> None:
-    """Forget the runs of an earlier study."""
-    if store.exists() and not store.is_dir():
-        raise InputError(f"{store}: a file of that name is in the way, move it")
-    try:
-        for path in [*store.glob("runs-*.npz"), store / "study.json"]:
-            path.unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{store}: cannot be cleared ({error.strerror}): choose another place with -o"
-        ) from None

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
+from gmwm.estimate import EM, GMWM, MLE, AllanLines, Whittle
+from gmwm.estimate.entrance import Method
 from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
 
 
@@ -34,6 +35,23 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Estimator:
+    """A method with its options, and what it is given.
+
+    Attributes
+    ----------
+    method : method object
+        See `gmwm.fit`.
+    wavelet, robust
+        Of the wavelet variance; see `gmwm.wavelet_variance`.
+    """
+
+    method: Method = field(default_factory=GMWM)
+    wavelet: str = "haar"
+    robust: bool = False
+
+
+@dataclass(frozen=True)
 class Scenario:
     """A true model, the quantities to estimate, and the ways to do so.
 
@@ -48,8 +66,7 @@ class Scenario:
     runs : int
         Customary number of runs.
     quantities : tuple of Quantity
-    methods : mapping of str to mapping
-        Method -> options of `gmwm.fit` and `gmwm.wavelet_variance`.
+    methods : mapping of str to Estimator
     notes : tuple of str
         What a reader of the table has to know.
     """
@@ -61,7 +78,7 @@ class Scenario:
     dt: float
     runs: int
     quantities: tuple[Quantity, ...]
-    methods: Mapping[str, Mapping[str, Any]]
+    methods: Mapping[str, Estimator]
     notes: tuple[str, ...] = ()
 
     def true_value(self, quantity: Quantity) -> float:
@@ -85,12 +102,12 @@ TABLE_2 = Scenario(
                  {"EM": 8.4e-2, "EM*": 7.88e-2, "AV": 0.394, "GMWM": 0.176}),
     ),
     methods={
-        "EM": {"method": "em", "start": WhiteNoise(0.5) + RandomWalk(1e-4)},
-        "EM*": {"method": "em", "start": WhiteNoise(5.0) + RandomWalk(10.0),
-                "accelerate": False, "tolerance": 1e-3},
-        "AV": {"method": "allan", "regions": {"N": (1, 4), "K": (16, 32), "R": (128, 2048)}},
-        "MLE": {"method": "mle"},
-        "GMWM": {},
+        "EM": Estimator(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
+        "EM*": Estimator(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
+                            accelerate=False, tolerance=1e-3)),
+        "AV": Estimator(AllanLines(regions={"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
+        "MLE": Estimator(MLE()),
+        "GMWM": Estimator(),
     },
     notes=(
         "EM from the paper's good start (0.25, 1e-8), run to convergence; EM* from its bad one "
@@ -116,10 +133,10 @@ TABLE_3 = Scenario(
         Quantity("omega", "R", 1, {"EM": 0.549, "EM*": 1.68, "GMWM": 0.181}),
     ),
     methods={
-        "EM": {"method": "em"},
-        "EM*": {"method": "em", "drift": "state", "tolerance": 1e-6},
-        "MLE": {"method": "mle"},
-        "GMWM": {},
+        "EM": Estimator(EM()),
+        "EM*": Estimator(EM(drift="state", tolerance=1e-6)),
+        "MLE": Estimator(MLE()),
+        "GMWM": Estimator(),
     },
     notes=(
         "EM has the ramp beside the Gauss-Markov state; EM* has it inside, as in Stebler et al. "
@@ -147,7 +164,7 @@ TABLE_4 = Scenario(
         Quantity("beta_3", "tau_1", -1, {"GMWM": 4.53e-3}),
         Quantity("sigma2_3", "sigma_1", 2, {"GMWM": 1.56e-3}),
     ),
-    methods={"GMWM": {}, "Whittle": {"method": "whittle"}},
+    methods={"GMWM": Estimator(), "Whittle": Estimator(Whittle())},
     notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
@@ -170,20 +187,20 @@ FIVE = Scenario(
         *(Quantity(f"sigma_{i}", f"sigma_{i}") for i in range(1, 6)),
         *(Quantity(f"tau_{i}", f"tau_{i}") for i in range(1, 6)),
     ),
-    methods={"GMWM": {}, "Whittle": {"method": "whittle"}},
+    methods={"GMWM": Estimator(), "Whittle": Estimator(Whittle())},
 )
 
 FIGURES = {"fig2": TABLE_2, "fig3": TABLE_3, "fig4": TABLE_4}
 
 
-_WEIGHTS: Mapping[str, Mapping[str, Any]] = {
-    "model": {},
-    "diagonal": {"omega": "diagonal"},
-    "identity": {"omega": "identity"},
-    "data": {"omega": "data"},
-    "db2": {"wavelet": "db2"},
-    "db2 data": {"wavelet": "db2", "omega": "data"},
-    "robust": {"robust": True},
+_WEIGHTS = {
+    "model": Estimator(),
+    "diagonal": Estimator(GMWM(weights="diagonal")),
+    "identity": Estimator(GMWM(weights="identity")),
+    "data": Estimator(GMWM(weights="data")),
+    "db2": Estimator(wavelet="db2"),
+    "db2 data": Estimator(GMWM(weights="data"), wavelet="db2"),
+    "robust": Estimator(robust=True),
 }
 
 _WEIGHT_NOTES = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -168,10 +167,3 @@ def _lag_one(solution: Solution) -> float:
     together = together[np.isfinite(together)]
     scale = np.sqrt(np.sum(together**2))
     return float(np.sum(together) / scale) if scale > 0.0 else float("nan")
-
-
-def joined(parts: Sequence[Runs]) -> Runs:
-    """The runs of several parts, in order."""
-    first = parts[0]
-    joined = {key: np.concatenate([getattr(part, key) for part in parts]) for key in PER_RUN}
-    return Runs(time=first.time, before=first.before, **joined)

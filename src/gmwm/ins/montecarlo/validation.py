@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.runs import Earlier
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins.geometry import ned_difference
@@ -60,13 +61,16 @@ class Validation:
         experiment: Experiment,
         *,
         jobs: int = 1,
+        cluster: str | None = None,
         folder: Path | None = None,
+        earlier: Earlier = "resume",
         progress: Progress | None = None,
     ) -> Validation:
         """Do the runs of an experiment; see `gmwm.ins.montecarlo.trials.monte_carlo`."""
         study = monte_carlo(
             experiment.scenario, experiment.source, experiment.filters, experiment.runs,
-            experiment.seed, jobs=jobs, folder=folder, progress=progress,
+            experiment.seed, jobs=jobs, cluster=cluster, folder=folder, earlier=earlier,
+            progress=progress,
         )  # fmt: skip
         return cls(experiment, study)
 
