@@ -18,7 +18,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.estimate import GMWM, estimate
 from gmwm.estimate.result import Fit
-from gmwm.study.scenario import SCENARIOS, Estimator, Quantity, Scenario
+from gmwm.study.scenario import SCENARIOS, Estimation, Quantity, Scenario
 from gmwm.variance import wavelet_variance
 
 
@@ -64,7 +64,7 @@ def _row(scenario: Scenario, method: str, series: FloatArray) -> dict[str, Any]:
     return row
 
 
-def _estimate(scenario: Scenario, series: FloatArray, by: Estimator) -> Fit:
+def _estimate(scenario: Scenario, series: FloatArray, by: Estimation) -> Fit:
     model = scenario.truth.opened()
     if by.wavelet == "haar" and not by.robust:
         return estimate(model, series, scenario.dt, by.method)

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from gmwm.estimate import EM, GMWM, MLE, AllanLines, Whittle
-from gmwm.estimate.entrance import Method
+from gmwm.estimate import EM, GMWM, MLE, AllanLines, Method, Whittle
 from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
 
 
@@ -35,7 +34,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Estimator:
+class Estimation:
     """A method with its options, and what it is given.
 
     Attributes
@@ -66,7 +65,7 @@ class Scenario:
     runs : int
         Customary number of runs.
     quantities : tuple of Quantity
-    methods : mapping of str to Estimator
+    methods : mapping of str to Estimation
     notes : tuple of str
         What a reader of the table has to know.
     """
@@ -78,7 +77,7 @@ class Scenario:
     dt: float
     runs: int
     quantities: tuple[Quantity, ...]
-    methods: Mapping[str, Estimator]
+    methods: Mapping[str, Estimation]
     notes: tuple[str, ...] = ()
 
     def true_value(self, quantity: Quantity) -> float:
@@ -102,12 +101,12 @@ TABLE_2 = Scenario(
                  {"EM": 8.4e-2, "EM*": 7.88e-2, "AV": 0.394, "GMWM": 0.176}),
     ),
     methods={
-        "EM": Estimator(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
-        "EM*": Estimator(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
+        "EM": Estimation(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
+        "EM*": Estimation(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
                             accelerate=False, tolerance=1e-3)),
-        "AV": Estimator(AllanLines(regions={"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
-        "MLE": Estimator(MLE()),
-        "GMWM": Estimator(),
+        "AV": Estimation(AllanLines(regions={"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
+        "MLE": Estimation(MLE()),
+        "GMWM": Estimation(),
     },
     notes=(
         "EM from the paper's good start (0.25, 1e-8), run to convergence; EM* from its bad one "
@@ -133,10 +132,10 @@ TABLE_3 = Scenario(
         Quantity("omega", "R", 1, {"EM": 0.549, "EM*": 1.68, "GMWM": 0.181}),
     ),
     methods={
-        "EM": Estimator(EM()),
-        "EM*": Estimator(EM(drift="state", tolerance=1e-6)),
-        "MLE": Estimator(MLE()),
-        "GMWM": Estimator(),
+        "EM": Estimation(EM()),
+        "EM*": Estimation(EM(drift="state", tolerance=1e-6)),
+        "MLE": Estimation(MLE()),
+        "GMWM": Estimation(),
     },
     notes=(
         "EM has the ramp beside the Gauss-Markov state; EM* has it inside, as in Stebler et al. "
@@ -164,7 +163,7 @@ TABLE_4 = Scenario(
         Quantity("beta_3", "tau_1", -1, {"GMWM": 4.53e-3}),
         Quantity("sigma2_3", "sigma_1", 2, {"GMWM": 1.56e-3}),
     ),
-    methods={"GMWM": Estimator(), "Whittle": Estimator(Whittle())},
+    methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
     notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
@@ -187,20 +186,20 @@ FIVE = Scenario(
         *(Quantity(f"sigma_{i}", f"sigma_{i}") for i in range(1, 6)),
         *(Quantity(f"tau_{i}", f"tau_{i}") for i in range(1, 6)),
     ),
-    methods={"GMWM": Estimator(), "Whittle": Estimator(Whittle())},
+    methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
 )
 
 FIGURES = {"fig2": TABLE_2, "fig3": TABLE_3, "fig4": TABLE_4}
 
 
 _WEIGHTS = {
-    "model": Estimator(),
-    "diagonal": Estimator(GMWM(weights="diagonal")),
-    "identity": Estimator(GMWM(weights="identity")),
-    "data": Estimator(GMWM(weights="data")),
-    "db2": Estimator(wavelet="db2"),
-    "db2 data": Estimator(GMWM(weights="data"), wavelet="db2"),
-    "robust": Estimator(robust=True),
+    "model": Estimation(),
+    "diagonal": Estimation(GMWM(weights="diagonal")),
+    "identity": Estimation(GMWM(weights="identity")),
+    "data": Estimation(GMWM(weights="data")),
+    "db2": Estimation(wavelet="db2"),
+    "db2 data": Estimation(GMWM(weights="data"), wavelet="db2"),
+    "robust": Estimation(robust=True),
 }
 
 _WEIGHT_NOTES = (
