@@ -19,10 +19,11 @@ _EXIT_INPUT = 2
 
 _HINTS = {
     "earlier-runs": " (--resume, -o)",
+    "missing-key": " (by options: gmwm navigate --help)",
     "other-runs": " (-o)",
     "runs-in-use": " (-o)",
 }
-"""Options that mend an error of a code."""
+"""What mends an error of a code on the command line."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +114,8 @@ def navigate(
     content: dict[str, Any] = {} if file is None else read_document(file)
     content |= options | data
     folder = Path() if file is None else file.parent
+    # Where options were given too, what is wrong may be theirs.
+    place = None if options or data else file
     reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
     if _OF_DATA.isdisjoint(content):
         # The rate is also that of a ready-made trajectory.
@@ -122,10 +126,20 @@ def navigate(
                 f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
                 "it out"
             )
-        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster)
+        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster, place)
     else:
         content["imu"] = _with_reading(content.get("imu"), reading)
-        _filter(content, folder, output)
+        _filter(content, folder, output, place)
+
+
+@contextmanager
+def _named_in_messages(file: Path | None) -> Iterator[None]:
+    """The file of a study before what is wrong with it."""
+    try:
+        yield
+    except InputError as error:
+        where = "" if file is None else f"{file}: "
+        raise InputError(f"{where}{error}", error.code) from None
 
 
 def _validate(
@@ -135,6 +149,7 @@ def _validate(
     jobs: int,
     resume: bool,
     cluster: str | None,
+    place: Path | None,
 ) -> None:
     """Do the runs of a study."""
     from gmwm._core.files import folder_to_fill, replaceable, written
@@ -142,7 +157,8 @@ def _validate(
     from gmwm.ins.spec import experiment_from
     from gmwm.report import write_validation_report
 
-    experiment = experiment_from(content, base)
+    with _named_in_messages(place):
+        experiment = experiment_from(content, base)
     with folder_to_fill(output) as folder:
         store = folder / "runs"
         table, page = (replaceable(folder / f"validation.{end}") for end in ("txt", "html"))
@@ -159,13 +175,14 @@ def _validate(
     click.echo(f"\nwrote {table}\nwrote {report}")
 
 
-def _filter(content: dict[str, Any], base: Path, output: Path) -> None:
+def _filter(content: dict[str, Any], base: Path, output: Path, place: Path | None) -> None:
     """Filter real data."""
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.ins.field import Measured, Navigated
     from gmwm.report import write_navigated_report
 
-    measured = Measured.of(content, base)
+    with _named_in_messages(place):
+        measured = Measured.of(content, base)
     with folder_to_fill(output) as folder:
         paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
         navigated = Navigated.of(measured)

@@ -13,7 +13,7 @@ from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
 from gmwm.ins.geometry.earth import ned_difference
-from gmwm.ins.spec.model_text import sensor_models
+from gmwm.ins.spec.sensors import sensor_models
 
 RATE, START = 25.0, 1000.0
 SENSORS = {
@@ -227,7 +227,7 @@ def test_the_command_without_a_file(run):
 BAD = {
     "no sensors": ({"sensors": None}, "there is no sensors: filtering needs"),
     "no imu": ({"imu": None}, "there is no imu"),
-    "imu: number": ({"imu": 5}, "imu: 5: write the name of a file"),
+    "imu: number": ({"imu": 5}, "imu, file: 5: write the name of a file"),
     "imu: missing": ({"imu": {"file": "no.csv", "units": UNITS}}, "no.csv does not exist"),
     "imu: unit": ({"imu": {"file": "imu.csv", "units": {"gyro": "rad/s", "accel": "g"}}},
                   "far from gravity"),
@@ -237,14 +237,14 @@ BAD = {
     "fixes: number": ({"gnss_fixes": 5}, "write the name of a file"),
     "fixes: folder": ({"gnss_fixes": "."}, "is a directory"),
     "both": ({"trajectory": "car"}, "'trajectory' is unknown"),
-    "arm": ({"lever_arm": [1, 2]}, "lever_arm: [1, 2]: give three numbers"),
-    "heading": ({"heading": "north"}, "heading: 'north' is no number"),
+    "arm": ({"lever_arm": [1, 2]}, "lever_arm: [1, 2]: write three values"),
+    "heading": ({"heading": "north"}, "heading: 'north' is not a number"),
     "heading unit": ({"heading": "3 m"}, "same as rad"),
-    "heading sd": ({"heading_sd": 0}, "give a positive number"),
-    "sd": ({"position_sd": -1}, "position_sd = -1.0"),
+    "heading sd": ({"heading_sd": 0}, "heading_sd: 0: input should be greater than 0"),
+    "sd": ({"position_sd": -1}, "position_sd[0]: -1: input should"),
     "bias": ({"bias": {"mag": 1}}, "'mag' is unknown"),
-    "bias: negative": ({"bias": {"gyro": -1}}, "bias, gyro = -1.0"),
-    "sensors": ({"sensors": 5}, "sensors: 5: give a calibration.json"),
+    "bias: negative": ({"bias": {"gyro": -1}}, "bias, gyro: -1: input should"),
+    "sensors": ({"sensors": 5}, "sensors: 5: write a calibration.json, or models"),
     "flicker": ({"sensors": SENSORS | {"gyro": {"B": "1 deg/h"}}}, "approximate it by"),
 }  # fmt: skip
 
