@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
@@ -10,6 +10,7 @@ from gmwm.ins.spec.sensors import sensor_models
 ACCEL = {"N": 1e-2}
 
 
+@settings(deadline=None)  # pint is imported in the first example
 @given(st.floats(min_value=-1e12, max_value=1e12))
 def test_a_number_is_itself_as_a_number_and_as_text(number: float) -> None:
     assert value(number, "s") == number
