@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gmwm.ins import MonteCarlo, Outage, Runs, car_drive
+from gmwm.ins import FilterErrors, MonteCarlo, Outage, car_drive
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.geometry.rotation import matrix_from_rpy
 from gmwm.ins.montecarlo.validation import Validation
@@ -57,7 +57,7 @@ def _runs(factor, spans, draws, rng, dead):
     nees = np.stack([np.sum(each, axis=-1) for each in groups], axis=-1)
     sensor = factor * rng.standard_normal((count, time.size, 6))
     white = rng.standard_normal((count, 300)) * factor
-    return Runs(
+    return FilterErrors(
         time=time, before=early, error=error, sd=sd, nees=nees, log_det=np.zeros_like(nees),
         sensor_error=sensor, sensor_sd=np.ones_like(sensor),
         sensor_nees=np.sum(sensor**2, axis=-1),

@@ -1,4 +1,4 @@
-"""Monte Carlo runs of a scenario, every method on the same series."""
+"""Monte Carlo runs of a study, every method on the same series."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.estimate import GMWM, estimate
 from gmwm.estimate.result import Fit
-from gmwm.study.scenario import SCENARIOS, Estimation, Quantity, Scenario
+from gmwm.study.studies import STUDIES, Estimation, Quantity, Study
 from gmwm.variance import wavelet_variance
 
 
@@ -28,7 +28,7 @@ def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str,
     Parameters
     ----------
     name : str
-        Of the scenario.
+        Of the study.
     methods : sequence of str
     seed, run : int
         Together the seed of the series.
@@ -38,18 +38,18 @@ def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str,
     dict
         Column -> its values by method.
     """
-    scenario = SCENARIOS[name]
-    series = scenario.truth.simulate(scenario.n, scenario.dt, np.random.default_rng([seed, run]))
-    rows = [_row(scenario, method, series) for method in methods]
+    study = STUDIES[name]
+    series = study.truth.simulate(study.n, study.dt, np.random.default_rng([seed, run]))
+    rows = [_row(study, method, series) for method in methods]
     return {column: np.array([row[column] for row in rows]) for column in rows[0]}
 
 
-def _row(scenario: Scenario, method: str, series: FloatArray) -> dict[str, Any]:
+def _row(study: Study, method: str, series: FloatArray) -> dict[str, Any]:
     start = perf_counter()
     result: Fit | None = None
     message, valid = "", False
     try:
-        result = _estimate(scenario, series, scenario.methods[method])
+        result = _estimate(study, series, study.methods[method])
         message, valid = result.message, result.valid
     except InputError as error:
         message = str(error)
@@ -59,18 +59,18 @@ def _row(scenario: Scenario, method: str, series: FloatArray) -> dict[str, Any]:
         "valid": valid,
         "message": message,
     }
-    for quantity in scenario.quantities:
+    for quantity in study.quantities:
         row |= _values(quantity, result)
     return row
 
 
-def _estimate(scenario: Scenario, series: FloatArray, by: Estimation) -> Fit:
-    model = scenario.truth.opened()
+def _estimate(study: Study, series: FloatArray, by: Estimation) -> Fit:
+    model = study.truth.opened()
     if by.wavelet == "haar" and not by.robust:
-        return estimate(model, series, scenario.dt, by.method)
+        return estimate(model, series, study.dt, by.method)
     of_data = isinstance(by.method, GMWM) and by.method.weights == "data"
     wv = wavelet_variance(
-        series, scenario.dt, wavelet=by.wavelet, robust=by.robust,
+        series, study.dt, wavelet=by.wavelet, robust=by.robust,
         data_covariance="octave" if of_data else None,
     )  # fmt: skip
     return estimate(model, wv, method=by.method)
@@ -90,8 +90,8 @@ def _values(quantity: Quantity, result: Fit | None) -> dict[str, float]:
     return dict(zip(names, powers, strict=True))
 
 
-def run_scenario(
-    scenario: Scenario,
+def run_study(
+    study: Study,
     folder: Path,
     *,
     runs: int,
@@ -102,19 +102,19 @@ def run_scenario(
     cluster: str | None = None,
     progress: Progress | None = None,
 ) -> pa.Table:
-    """Make (or complete) the runs of a scenario.
+    """Make (or complete) the runs of a study.
 
     Finished runs are kept in ``folder/NAME-runs`` every few seconds, also when the work is
     interrupted.
 
     Parameters
     ----------
-    scenario : Scenario
+    study : Study
     folder : Path
     runs : int
     seed : int, optional
     methods : sequence of str, optional
-        Some of ``scenario.methods``; all by default.
+        Some of ``study.methods``; all by default.
     jobs : int, optional
         Processes on this machine.
     resume : bool, optional
@@ -134,21 +134,21 @@ def run_scenario(
         If a method is unknown, or the folder holds runs and ``resume`` is not set, or it is and
         they are not of the same study.
     """
-    chosen = tuple(methods or scenario.methods)
+    chosen = tuple(methods or study.methods)
     for method in chosen:
-        if method not in scenario.methods:
+        if method not in study.methods:
             raise InputError(
-                f"{scenario.name} has no method {method!r}: it has {', '.join(scenario.methods)}"
+                f"{study.name} has no method {method!r}: it has {', '.join(study.methods)}"
             )
     if runs < 1:
         raise InputError(f"runs = {runs!r}: give a positive integer")
-    study = {"scenario": scenario.name, "seed": seed, "methods": list(chosen)}
+    what = {"study": study.name, "seed": seed, "methods": list(chosen)}
     found = do_runs(
-        partial(one_run, scenario.name, chosen, seed), runs, study,
-        folder=folder / f"{scenario.name}-runs", earlier="resume" if resume else "refuse",
+        partial(one_run, study.name, chosen, seed), runs, what,
+        folder=folder / f"{study.name}-runs", earlier="resume" if resume else "refuse",
         jobs=jobs, cluster=cluster, progress=progress,
     )  # fmt: skip
     columns = {"run": np.repeat(np.arange(runs), len(chosen))}
     columns |= {name: values.ravel() for name, values in found.items()}
-    table = pa.table(columns, metadata={"gmwm": json.dumps(study)})
+    table = pa.table(columns, metadata={"gmwm": json.dumps(what)})
     return table.sort_by([("run", "ascending"), ("method", "ascending")])

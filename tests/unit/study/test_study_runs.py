@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gmwm import AllanLines, InputError, RandomWalk, WhiteNoise
-from gmwm.study.runs import one_run, run_scenario
-from gmwm.study.scenario import SCENARIOS, Estimation, Quantity, Scenario
+from gmwm.study.runs import one_run, run_study
+from gmwm.study.studies import STUDIES, Estimation, Quantity, Study
 
-SMALL = Scenario(
+SMALL = Study(
     name="small",
     title="White noise + random walk",
     truth=WhiteNoise(0.2) + RandomWalk(0.02),
@@ -22,8 +22,8 @@ SMALL = Scenario(
 
 
 @pytest.fixture(autouse=True)
-def small_scenario(monkeypatch):
-    monkeypatch.setitem(SCENARIOS, "small", SMALL)
+def small_study(monkeypatch):
+    monkeypatch.setitem(STUDIES, "small", SMALL)
 
 
 def columns(table):
@@ -38,7 +38,7 @@ def same(a, b):
 
 
 def test_every_method_sees_the_same_series_and_every_run_another(tmp_path):
-    table = run_scenario(SMALL, tmp_path, runs=5)
+    table = run_study(SMALL, tmp_path, runs=5)
     assert table.num_rows == 10
     assert table["run"].to_pylist() == [run for run in range(5) for _ in range(2)]
     estimates = table["sigma2_WN"].to_numpy()[table["method"].to_numpy(False) == "GMWM"]
@@ -47,34 +47,34 @@ def test_every_method_sees_the_same_series_and_every_run_another(tmp_path):
 
 
 def test_a_seed_is_another_study(tmp_path):
-    first = run_scenario(SMALL, tmp_path / "a", runs=2, methods=["GMWM"])
-    other = run_scenario(SMALL, tmp_path / "b", runs=2, methods=["GMWM"], seed=1)
+    first = run_study(SMALL, tmp_path / "a", runs=2, methods=["GMWM"])
+    other = run_study(SMALL, tmp_path / "b", runs=2, methods=["GMWM"], seed=1)
     assert not set(first["sigma2_WN"].to_pylist()) & set(other["sigma2_WN"].to_pylist())
 
 
 def test_fewer_runs_are_taken_from_more(tmp_path):
-    run_scenario(SMALL, tmp_path, runs=4)
-    table = run_scenario(SMALL, tmp_path, runs=2, resume=True)
+    run_study(SMALL, tmp_path, runs=4)
+    table = run_study(SMALL, tmp_path, runs=2, resume=True)
     assert sorted(set(table["run"].to_pylist())) == [0, 1]
 
 
 def test_earlier_runs_are_not_overwritten(tmp_path):
-    run_scenario(SMALL, tmp_path, runs=2)
+    run_study(SMALL, tmp_path, runs=2)
     with pytest.raises(InputError, match="resume it, or give another folder"):
-        run_scenario(SMALL, tmp_path, runs=2)
+        run_study(SMALL, tmp_path, runs=2)
 
 
 @pytest.mark.parametrize("change", [{"seed": 1}, {"methods": ["GMWM"]}])
 def test_runs_of_another_study_are_not_mixed_in(tmp_path, change):
-    run_scenario(SMALL, tmp_path, runs=2)
+    run_study(SMALL, tmp_path, runs=2)
     other = rf"another study \(other {next(iter(change))}\): give another folder"
     with pytest.raises(InputError, match=other):
-        run_scenario(SMALL, tmp_path, runs=3, resume=True, **change)
+        run_study(SMALL, tmp_path, runs=3, resume=True, **change)
 
 
 def test_a_method_without_an_answer_is_a_row_without_numbers(tmp_path):
     # In so short a record of this mixture the Allan plot has no straight parts.
-    table = run_scenario(SMALL, tmp_path, runs=4, methods=["AV"])
+    table = run_study(SMALL, tmp_path, runs=4, methods=["AV"])
     absent = np.isnan(table["rate"].to_numpy())
     assert np.all(absent)
     assert not any(table["valid"].to_pylist())
@@ -82,27 +82,27 @@ def test_a_method_without_an_answer_is_a_row_without_numbers(tmp_path):
 
 
 def test_interval_of_an_inverse_is_in_order(tmp_path):
-    table = run_scenario(SMALL, tmp_path, runs=3, methods=["GMWM"])
+    table = run_study(SMALL, tmp_path, runs=3, methods=["GMWM"])
     lower, value, upper = (table["rate" + end].to_numpy() for end in ("_lower", "", "_upper"))
     assert np.all(lower < value) and np.all(value < upper)
 
 
 def test_unknown_method_and_no_runs(tmp_path):
     with pytest.raises(InputError, match="it has GMWM, AV"):
-        run_scenario(SMALL, tmp_path, runs=2, methods=["EM"])
+        run_study(SMALL, tmp_path, runs=2, methods=["EM"])
     with pytest.raises(InputError, match="runs = 0"):
-        run_scenario(SMALL, tmp_path, runs=0)
+        run_study(SMALL, tmp_path, runs=0)
 
 
 def test_the_table_says_what_it_is(tmp_path):
-    table = run_scenario(SMALL, tmp_path, runs=2)
+    table = run_study(SMALL, tmp_path, runs=2)
     assert b'"seed": 0' in table.schema.metadata[b"gmwm"]
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", STUDIES)
 def test_every_method_knows_its_options(name, tmp_path, monkeypatch):
     """A short series is estimated or refused with a sentence, never with an error in an option."""
-    short = replace(SCENARIOS[name], n=600)
-    monkeypatch.setitem(SCENARIOS, name, short)
-    table = run_scenario(short, tmp_path, runs=1)
+    short = replace(STUDIES[name], n=600)
+    monkeypatch.setitem(STUDIES, name, short)
+    table = run_study(short, tmp_path, runs=1)
     assert set(table["method"].to_pylist()) == set(short.methods)

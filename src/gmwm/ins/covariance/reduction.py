@@ -27,8 +27,7 @@ _KINDS = ("gyro", "accel")
 _SETTLING = 120.0  # s, before the first outage and between them
 _JUDGED = slice(0, 6)  # position and velocity
 _WHITE_TAU = 1.0  # s, where white noise is read off an Allan plot
-_PEAK = 0.382  # Allan variance of a Gauss-Markov process at its peak, over its variance
-_SHORTEST = 0.1  # of the correlation time read off, in s
+_SHORTEST = 0.189  # s, of the averaging time at which the top is read off
 _DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
 _SLOPE = 3e-3  # of the score over the logarithm of a factor, below which the search ends
 _INERTIA = 1e-3  # keeps a factor near 1 that does not matter
@@ -204,9 +203,8 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
             rest = np.sqrt(np.maximum(slow**2 - white**2 / tau, 0.0))
             top = int(np.argmax(rest))
             height = float(rest[top]) or float(deviation[-1])
-            reduced[axis] = WhiteNoise(white) + GaussMarkov(
-                height / np.sqrt(_PEAK), max(float(tau[top]) / 1.89, _SHORTEST)
-            )
+            at = max(float(tau[top]), _SHORTEST)
+            reduced[axis] = WhiteNoise(white) + GaussMarkov.of_peak(height, at)
         bias_sd[axis] = _initial_sd(models, axis, dt) if form == "N+K" else 0.0
     return SensorModels(reduced, bias_sd)
 

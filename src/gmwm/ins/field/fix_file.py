@@ -18,6 +18,7 @@ from gmwm.ins.logs import (
     angle_unit,
     check_angles,
     check_rising,
+    find_columns,
     is_time,
     length_factor,
     open_log,
@@ -197,25 +198,9 @@ def _quantities(name: str) -> tuple[str, ...]:
 
 def _columns(table: CsvTable) -> tuple[dict[str, int], list[str]]:
     """The column of each quantity, and the names of those that are none."""
-    columns: dict[str, int] = {}
-    unused = []
-    for column, name in enumerate(table.names):
-        found = _quantities(name)
-        if not found:
-            unused.append(name or str(column))
-        for quantity in found:
-            if quantity in columns:
-                raise InputError(
-                    f"{table.source}: columns {label(table.names, columns[quantity])} and "
-                    f"{label(table.names, column)} both look like {quantity}: rename one of them"
-                )
-            columns[quantity] = column
-    missing = [name for name in (TIME, *_POSITION) if name not in columns]
-    if missing:
-        raise InputError(
-            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
-            "like time_s,latitude_deg,longitude_deg,height_m"
-        )
+    columns, unused = find_columns(
+        table, _quantities, (TIME, *_POSITION), "time_s,latitude_deg,longitude_deg,height_m"
+    )
     for group in (_VELOCITY, tuple(f"sd {each}" for each in ("north", "east", "down")),
                   tuple(f"sd {each}" for each in _VELOCITY)):  # fmt: skip
         _check_all(table, columns, group)

@@ -15,7 +15,7 @@ from gmwm.errors import InputError
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
 from gmwm.ins.filter.filter_kernels import IS_POSITION, run
-from gmwm.ins.filter.solution import Innovations, Solution
+from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels
@@ -176,7 +176,7 @@ class Filter:
             covariance=unmodified(nav_P[:done], nav[:done, 3:]),
             sensor_errors=sensor[:done],
             sensor_covariance=sensor_P[:done],
-            innovations=Innovations(
+            innovations=FilterInnovations(
                 time=np.asarray(events.epoch * imu.dt, dtype=float),
                 kind=events.kind,
                 value=innovation,

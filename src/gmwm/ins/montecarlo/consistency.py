@@ -14,7 +14,7 @@ from scipy.stats import chi2, norm, t
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.montecarlo.runs import GROUPS, Runs
+from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
@@ -79,7 +79,7 @@ class Consistency:
     Attributes
     ----------
     nees : dict
-        Group of `gmwm.ins.montecarlo.runs.GROUPS`, or "sensors", -> NEES per degree of freedom.
+        Group of `GROUPS`, or "sensors", -> NEES per degree of freedom.
     coverage : dict
         Group -> `Coverage` at each of `LEVELS`, of its components' errors.
     rms : dict
@@ -101,14 +101,14 @@ class Consistency:
         return all(ratio.p_value > _FAR / len(self.nees) for ratio in self.nees.values())
 
 
-def at_epoch(runs: Runs, index: int) -> Consistency:
+def at_epoch(runs: FilterErrors, index: int) -> Consistency:
     """Consistency at one epoch, over independent runs: chi-square bands.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     index : int
-        Of the epoch; see `Runs.index`.
+        Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
     nees, coverage, rms, score = {}, {}, {}, {}
@@ -128,14 +128,14 @@ def at_epoch(runs: Runs, index: int) -> Consistency:
     return Consistency(nees, coverage, rms, score)
 
 
-def over_time(runs: Runs, start: float = 0.0, end: float = np.inf) -> Consistency:
+def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
     """Consistency over a time, averaged run by run: bands from the scatter between the runs.
 
     The errors of one run are correlated, so that a run counts as one draw; Student's t.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     start, end : float, optional
         s.
 
@@ -185,7 +185,7 @@ class InnovationTest:
     whiteness: float
 
 
-def innovation_test(runs: Runs) -> InnovationTest:
+def innovation_test(runs: FilterErrors) -> InnovationTest:
     """Innovations of all runs: their size and their whiteness."""
     total, count = np.nansum(runs.nis, axis=0)
     scores = runs.whiteness[np.isfinite(runs.whiteness)]
@@ -269,7 +269,9 @@ def _ratio(total: float, dof: float) -> Ratio:
 
 
 def _standard_sensors(
-    runs: Runs, alive: np.typing.NDArray[np.bool_], epochs: slice | np.typing.NDArray[np.intp]
+    runs: FilterErrors,
+    alive: np.typing.NDArray[np.bool_],
+    epochs: slice | np.typing.NDArray[np.intp],
 ) -> FloatArray:
     """Standardised errors of the sensors that have states, (R, K, d)."""
     error, sd = runs.sensor_error[alive][:, epochs], runs.sensor_sd[alive][:, epochs]

@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.montecarlo.runs import Runs
+from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
@@ -64,18 +64,18 @@ class Difference:
         return bool(self.lower > 0.0 or self.upper < 0.0)
 
 
-def sizes(runs: Runs, time: float) -> dict[str, FloatArray]:
+def sizes(runs: FilterErrors, time: float) -> dict[str, FloatArray]:
     """Size of each error of `QUANTITIES` in every run, (R,), before the fixes of an epoch."""
     error = runs.error[:, runs.index(time)]
     return _grouped(error)
 
 
-def spread(runs: Runs, time: float) -> dict[str, Spread]:
+def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
     """Errors before the first fix after an outage.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     time : float
         End of the outage, s.
 

@@ -17,7 +17,7 @@ from gmwm.errors import InputError
 from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
-from gmwm.ins.montecarlo.runs import PER_RUN, Runs, judged
+from gmwm.ins.montecarlo.filter_errors import PER_RUN, FilterErrors, judged
 from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
 from gmwm.ins.trajectory import NavState, Trajectory
 
@@ -29,7 +29,7 @@ class MonteCarlo:
     Attributes
     ----------
     filters : dict
-        Name -> `Runs`.
+        Name -> `FilterErrors`.
     outages : tuple of Outage
     example : dict
         Name -> `Solution` of the first run, once a second.
@@ -37,13 +37,13 @@ class MonteCarlo:
     notes : tuple of str
     """
 
-    filters: dict[str, Runs]
+    filters: dict[str, FilterErrors]
     outages: tuple[Outage, ...]
     example: dict[str, Solution]
     truth: Trajectory
     notes: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> Runs:
+    def __getitem__(self, name: str) -> FilterErrors:
         if name not in self.filters:
             raise InputError(f"no filter {name!r}: there are {', '.join(self.filters)}")
         return self.filters[name]
@@ -115,7 +115,7 @@ def monte_carlo(
     time, before = outputs.time(imu.dt), outputs.before == 1
     return MonteCarlo(
         filters={
-            name: Runs(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
+            name: FilterErrors(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
             for name in filters
         },
         outages=scenario.outages,

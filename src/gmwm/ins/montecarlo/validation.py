@@ -22,6 +22,7 @@ from gmwm.ins.montecarlo.consistency import (
     over_time,
 )
 from gmwm.ins.montecarlo.experiment import Experiment
+from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.outage_errors import (
     QUANTITIES,
     Difference,
@@ -30,7 +31,6 @@ from gmwm.ins.montecarlo.outage_errors import (
     pooled_sizes,
     spread,
 )
-from gmwm.ins.montecarlo.runs import Runs
 from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
 
 if TYPE_CHECKING:
@@ -301,7 +301,9 @@ class Validation:
         return self.study.outages[index]
 
 
-def _growth(runs: Runs, start: float, end: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _growth(
+    runs: FilterErrors, start: float, end: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times since the start, and horizontal and vertical RMS, true and predicted."""
     shown = (runs.time >= start) & (runs.time <= end) & (runs.before | (runs.time < end))
     alive = np.all(np.isfinite(runs.error[:, shown, 0]), axis=1)

@@ -13,7 +13,7 @@ from gmwm.ins.spec.fields import (
     Three,
     number,
 )
-from gmwm.ins.spec.sensors import Models, read_models, sensor_models
+from gmwm.ins.spec.sensor_terms import Models, read_models, sensor_models
 
 __all__ = [
     "FileName",

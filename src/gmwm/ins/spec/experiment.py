@@ -33,7 +33,7 @@ from gmwm.ins.spec.fields import (
     Three,
     written,
 )
-from gmwm.ins.spec.sensors import Models, ModelsSpec, OfFile, OfTerms, form_of, read_models
+from gmwm.ins.spec.sensor_terms import Models, ModelsSpec, OfFile, OfTerms, form_of, read_models
 from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter, helicopter_mapping
 from gmwm.readers import read
 

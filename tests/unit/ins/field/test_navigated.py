@@ -13,7 +13,7 @@ from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
 from gmwm.ins.geometry.earth import ned_difference
-from gmwm.ins.spec.sensors import sensor_models
+from gmwm.ins.spec.sensor_terms import sensor_models
 
 RATE, START = 25.0, 1000.0
 SENSORS = {

@@ -23,7 +23,7 @@ from gmwm.ins.montecarlo.consistency import (
     mean_ratio,
     over_time,
 )
-from gmwm.ins.montecarlo.runs import GROUPS, Runs
+from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
 SIZES = {"position": 3, "velocity": 3, "attitude": 3, "navigation": 9, "sensors": 6}
 
@@ -46,7 +46,7 @@ def synthetic(rng, runs, epochs=1, *, true=1.0, memory=0.0):
             "...i,ij,...j", error[..., part], np.linalg.inv(block), error[..., part]
         )
         log_det[..., i] = np.log(np.linalg.det(block))
-    return Runs(
+    return FilterErrors(
         time=np.arange(epochs, dtype=float),
         before=np.zeros(epochs, dtype=bool),
         error=error,

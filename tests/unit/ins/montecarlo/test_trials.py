@@ -14,7 +14,7 @@ from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.imu.recorded import Recorded
 from gmwm.ins.imu.sensors import AXES, SensorErrors, SensorModels
-from gmwm.ins.montecarlo.runs import GROUPS, PER_RUN, Runs
+from gmwm.ins.montecarlo.filter_errors import GROUPS, PER_RUN, FilterErrors
 from gmwm.ins.montecarlo.scenario import Scenario, Simulated
 from gmwm.ins.montecarlo.trials import disturbed, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
@@ -33,8 +33,8 @@ POOR = SensorModels.of({"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)})
 SCENARIO = Scenario(TRUTH, gnss(TRUTH), (Outage(30.0, 20.0),), interval=5.0)
 
 
-def assert_same(first: Runs, second: Runs):
-    for each in fields(Runs):
+def assert_same(first: FilterErrors, second: FilterErrors):
+    for each in fields(FilterErrors):
         np.testing.assert_array_equal(getattr(first, each.name), getattr(second, each.name))
 
 
@@ -66,7 +66,7 @@ def test_a_longer_study_begins_with_the_shorter_one(reference):
 def test_the_result_does_not_depend_on_workers(reference):
     """But for the last digit: vector instructions follow the alignment of arrays."""
     found = study(25, jobs=2)["good"]
-    for each in fields(Runs):
+    for each in fields(FilterErrors):
         expected = getattr(reference, each.name)
         scale = np.nanmax(np.abs(expected)) if expected.dtype == float else 0.0
         np.testing.assert_allclose(

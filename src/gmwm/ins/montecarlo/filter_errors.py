@@ -22,13 +22,13 @@ GROUPS = {
 
 PER_RUN = ("error", "sd", "nees", "log_det", "sensor_error", "sensor_sd", "sensor_nees", "nis",
             "whiteness")  # fmt: skip
-"""Arrays of `Runs` whose first axis is the run."""
+"""Arrays of `FilterErrors` whose first axis is the run."""
 
 _SAME_TIME = 1e-6  # s
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class FilterErrors:
     """Errors of one filter over R runs at K epochs.
 
     Attributes

@@ -51,7 +51,7 @@ class Estimation:
 
 
 @dataclass(frozen=True)
-class Scenario:
+class Study:
     """A true model, the quantities to estimate, and the ways to do so.
 
     Attributes
@@ -85,7 +85,7 @@ class Scenario:
         return float(self.truth.params[quantity.key] or 0.0) ** quantity.power
 
 
-TABLE_2 = Scenario(
+TABLE_2 = Study(
     name="table2",
     title="Table II: white noise + random walk + rate ramp",
     truth=WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003),
@@ -118,7 +118,7 @@ TABLE_2 = Scenario(
     ),
 )  # fmt: skip
 
-TABLE_3 = Scenario(
+TABLE_3 = Study(
     name="table3",
     title="Table III: white noise + Gauss-Markov + rate ramp",
     truth=WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001),
@@ -144,7 +144,7 @@ TABLE_3 = Scenario(
     ),
 )
 
-TABLE_4 = Scenario(
+TABLE_4 = Study(
     name="table4",
     title="Table IV: three Gauss-Markov processes",
     truth=(
@@ -167,7 +167,7 @@ TABLE_4 = Scenario(
     notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
-FIVE = Scenario(
+FIVE = Study(
     name="five-gm",
     title="White noise + five Gauss-Markov processes a decade apart (11 h at 100 Hz)",
     truth=(
@@ -209,10 +209,10 @@ _WEIGHT_NOTES = (
 )
 
 
-def _compared(scenario: Scenario, number: int, runs: int) -> Scenario:
-    title = scenario.title.split(": ", 1)[1]
+def _compared(study: Study, number: int, runs: int) -> Study:
+    title = study.title.split(": ", 1)[1]
     return replace(
-        scenario,
+        study,
         name=f"weights{number}",
         title=f"Weights and wavelets, Table {'I' * number if number < 4 else 'IV'}: {title}",
         runs=runs,
@@ -227,4 +227,4 @@ WEIGHTS = (
     _compared(TABLE_4, 4, 50),
 )
 
-SCENARIOS = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}
+STUDIES = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}
