@@ -237,3 +237,16 @@ def test_plot_shows_data_model_and_components():
     assert axes.get_xscale() == axes.get_yscale() == "log"
     assert axes.get_xlabel() == "averaging time [s]"
     plt.close(axes.figure)
+
+
+@pytest.mark.parametrize("weights", ["model", "diagonal", "identity"])
+def test_a_redundant_term_is_found_under_all_weights(weights):
+    truth = WhiteNoise(1.0) + GaussMarkov(0.5, 100.0)
+    sound = redundant = 0
+    for seed in range(6):
+        x = truth.simulate(20_000, 1.0, seed)
+        sound += gmwm.fit(truth.opened(), x, dt=1.0, weights=weights).reasons["terms_needed"]
+        rich = gmwm.fit(WhiteNoise() + 2 * GaussMarkov(), x, dt=1.0, weights=weights)
+        redundant += not rich.valid
+    assert sound >= 5
+    assert redundant >= 5

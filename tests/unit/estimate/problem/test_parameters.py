@@ -39,7 +39,7 @@ def test_every_example_comes_back(process):
 
 
 @given(st.sampled_from(EXAMPLES), st.lists(st.floats(-3.0, 3.0), min_size=5, max_size=5))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, deadline=None)
 def test_every_point_near_an_example_is_a_process_and_comes_back(process, steps):
     coordinates = opened(process)
     z = coordinates.pack([process])
@@ -52,7 +52,7 @@ def test_every_point_near_an_example_is_a_process_and_comes_back(process, steps)
 
 
 @given(st.sampled_from(EXAMPLES), st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5))
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None)
 def test_the_jacobian_is_that_of_finite_differences(process, steps):
     coordinates = opened(process)
     z = coordinates.pack([process])
