@@ -19,6 +19,7 @@ _EXIT_INPUT = 2
 
 _HINTS = {
     "earlier-runs": " (--resume, -o)",
+    "heading-unknown": " (--heading DEG, or heading: in the file)",
     "missing-key": " (by options: gmwm navigate --help)",
     "other-runs": " (-o)",
     "runs-in-use": " (-o)",

@@ -21,6 +21,7 @@ from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
 from gmwm.estimate import fit
 from gmwm.estimate.result import Fit
+from gmwm.ins import tuning
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.montecarlo import Experiment, Scenario, Simulated, Validation
@@ -120,7 +121,7 @@ def experiment(
     """
     trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
     outages = _HELICOPTER if vehicle == "helicopter" else _CAR
-    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=(0.1, 0.1, 0.15)), outages)
+    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=tuning.VELOCITY_SD), outages)
     lines = calibrated.line_models()
     filters = {"GMWM": SensorModels.of(calibrated.gmwm), "AV": lines}
     if recordings:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.logs import (
     POSITION_WORDS,
@@ -27,12 +28,6 @@ from gmwm.ins.logs import (
     words_of,
 )
 from gmwm.readers import TIME, CsvTable, label, meaning
-
-POSITION_SD = (1.0, 1.0, 1.5)
-"""Of fixes that say none, to the north, east and down, m."""
-
-VELOCITY_SD = (0.1, 0.1, 0.15)
-"""The same of velocities, m/s."""
 
 _POSITION = ("latitude", "longitude", "height")
 _VELOCITY = ("velocity north", "velocity east", "velocity down")
@@ -74,8 +69,8 @@ class FixLog:
     def aiding(
         self,
         start: float = 0.0,
-        position_sd: Sequence[float] = POSITION_SD,
-        velocity_sd: Sequence[float] = VELOCITY_SD,
+        position_sd: Sequence[float] = tuning.POSITION_SD,
+        velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
         lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> Aiding:
         """The fixes on the clock of an IMU.
@@ -106,8 +101,8 @@ def read_fixes(
     path: str | os.PathLike[str],
     *,
     start: float = 0.0,
-    position_sd: Sequence[float] = POSITION_SD,
-    velocity_sd: Sequence[float] = VELOCITY_SD,
+    position_sd: Sequence[float] = tuning.POSITION_SD,
+    velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
     lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Aiding:
     """Read GNSS fixes.

@@ -11,13 +11,13 @@ from typing import Literal
 import numpy as np
 
 from gmwm.errors import InputError
+from gmwm.ins import tuning
+from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
 from gmwm.readers import Recording, bare, read
 
 _CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
-_LEAST, _MOST = 0.5, 2.0  # of standard gravity
-_GRAVITY = 9.80665  # m/s^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,8 @@ def read_imu_log(
             "after the first, is missing: fill the gap, or use the part before or after it"
         )
     force = float(np.linalg.norm(np.mean(samples[:, 3:], axis=0)))
-    if not _LEAST * _GRAVITY < force < _MOST * _GRAVITY:
+    least, most = tuning.SPECIFIC_FORCE
+    if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
         raise InputError(
             f"{recording.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
             "check the unit of the accelerometers, and that gravity is not taken off"

@@ -12,7 +12,8 @@ from pydantic import BeforeValidator, Field
 
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
-from gmwm.ins.field.fix_file import POSITION_SD, VELOCITY_SD, read_fix_log
+from gmwm.ins import tuning
+from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log
 from gmwm.ins.filter import Aiding
 from gmwm.ins.imu import AXES, Imu, SensorModels
@@ -30,10 +31,6 @@ from gmwm.ins.spec import (
     number,
     read_models,
 )
-
-_TURN_ON = {"gyro": np.radians(0.1), "accel": 0.1}
-"""Standard deviation of what a static calibration takes off and a sensor changes when it is
-switched on, where nobody says better: rad/s, m/s^2."""
 
 
 class ImuSpec(ReadingSpec):
@@ -64,9 +61,9 @@ class MeasuredSpec(Spec):
     sensors: Models
     lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
     heading: Radians | None = None
-    heading_sd: PositiveRadians = float(np.radians(2.0))
-    position_sd: Three[PositiveMeters] = POSITION_SD
-    velocity_sd: Three[PositiveSpeed] = VELOCITY_SD
+    heading_sd: PositiveRadians = tuning.HEADING_SD
+    position_sd: Three[PositiveMeters] = tuning.POSITION_SD
+    velocity_sd: Three[PositiveSpeed] = tuning.VELOCITY_SD
     bias: BiasSpec = BiasSpec()
 
 
@@ -95,7 +92,7 @@ class Measured:
     sensors: SensorModels
     start: float = 0.0
     heading: float | None = None
-    heading_sd: float = np.radians(2.0)
+    heading_sd: float = tuning.HEADING_SD
     title: str = ""
     notes: tuple[str, ...] = ()
 
@@ -148,7 +145,7 @@ def _with_bias(
     bias_sd, assumed = {}, []
     for axis in AXES:
         kind = axis.partition("_")[0]
-        bias_sd[axis] = given.get(kind, models.bias_sd[axis] or _TURN_ON[kind])
+        bias_sd[axis] = given.get(kind, models.bias_sd[axis] or tuning.TURN_ON_SD[kind])
         if kind not in given and not models.bias_sd[axis] and kind not in assumed:
             assumed.append(kind)
     text = {"gyro": "gyros 0.1 deg/s", "accel": "accelerometers 0.1 m/s^2"}

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 from gmwm._core.files import written
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.field.alignment import Alignment, align, started
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.filter import KINDS, Solution, navigate
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH = 80
-_DOUBT = 0.001  # probability below which innovations contradict the model
-_LOST = 5.0  # times the expected size of innovations
-_MOSTLY_FINE = 1.5  # NIS by the median
 _COLUMNS = (
     "time_s", "latitude_deg", "longitude_deg", "height_m",
     "velocity_north_mps", "velocity_east_mps", "velocity_down_mps",
@@ -168,13 +166,15 @@ class Navigated:
         """Kinds whose innovations have another size than expected -> how many times it is."""
         tests = {kind: self.test(kind).nis for kind in self.kinds}
         tests["all"] = self.test().nis
-        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= _DOUBT}
+        found = {
+            k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= tuning.CONTRADICTED
+        }
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
 
     @property
     def _is_white(self) -> bool:
         whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > _DOUBT)
+        return bool(np.isnan(whiteness) or whiteness > tuning.CONTRADICTED)
 
     @property
     def verdict(self) -> str:
@@ -190,7 +190,7 @@ class Navigated:
                 "expects, and white."
             )
         sizes = self._misfits
-        if sizes and max(sizes.values()) > _LOST:
+        if sizes and max(sizes.values()) > tuning.LOST:
             return (
                 f"The filter is lost: innovations are {max(sizes.values()):.2g} times as large as "
                 "it expects, and the accuracy that it predicts is not to be believed; look first "
@@ -220,7 +220,7 @@ class Navigated:
                 "the sensors are better than their models say, or the fixes than their standard "
                 "deviations"
             )
-        if self._usual_size < _MOSTLY_FINE:
+        if self._usual_size < tuning.MOSTLY_FINE:
             return (
                 "most are not, so that some fixes are outliers, or errors without fixes grow "
                 "faster than the sensor models say"

@@ -12,6 +12,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
 from gmwm.ins.filter.filter_kernels import IS_POSITION, run
@@ -20,8 +21,6 @@ from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels
 from gmwm.ins.trajectory import NavState, check_latitudes
-
-_COVARIANCE_STEP = 0.1  # s
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ class Filter:
         sensors: SensorModels,
         aiding: Aiding,
         dt: float,
-        step: float = _COVARIANCE_STEP,
+        step: float = tuning.COVARIANCE_STEP,
         second_order: bool = True,
     ) -> Filter:
         """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s)."""
@@ -267,7 +266,7 @@ def navigate(
     aiding: Aiding,
     *,
     initial_sd: InitialSd | None = None,
-    step: float = _COVARIANCE_STEP,
+    step: float = tuning.COVARIANCE_STEP,
     interval: float = 1.0,
     before: Sequence[float] = (),
     second_order: bool = True,

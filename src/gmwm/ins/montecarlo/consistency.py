@@ -14,13 +14,11 @@ from scipy.stats import chi2, norm, t
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
-
-_CONFIDENCE = 0.95
-_FAR = 0.001  # probability below which a filter is called inconsistent
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,9 @@ class Consistency:
     @property
     def consistent(self) -> bool:
         """Whether no group's NEES is out of question."""
-        return all(ratio.p_value > _FAR / len(self.nees) for ratio in self.nees.values())
+        return all(
+            ratio.p_value > tuning.CONTRADICTED / len(self.nees) for ratio in self.nees.values()
+        )
 
 
 def at_epoch(runs: FilterErrors, index: int) -> Consistency:
@@ -207,7 +207,7 @@ def mean_ratio(values: FloatArray) -> Ratio:
     if runs < 2:
         return Ratio(mean, float("nan"), float("nan"), float("nan"))
     error = float(np.std(values, ddof=1) / np.sqrt(runs))
-    width = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1)) * error
+    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, runs - 1)) * error
     p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
@@ -244,7 +244,7 @@ def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
         draws = float(runs)
         error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
         if error > 0.0:
-            few, many = t.ppf(0.5 + 0.5 * _CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
+            few, many = t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
             draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
         result.append(_coverage(level, mean, draws))
     return tuple(result)
@@ -254,7 +254,7 @@ def _coverage(level: float, share: float, size: float) -> Coverage:
     """With its binomial interval."""
     if not size > 0.0:
         return Coverage(level, float("nan"), float("nan"), float("nan"))
-    hits, tail = share * size, 0.5 * (1.0 - _CONFIDENCE)
+    hits, tail = share * size, 0.5 * (1.0 - tuning.CONFIDENCE)
     lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
     return Coverage(level, share, lower, upper)
@@ -263,7 +263,9 @@ def _coverage(level: float, share: float, size: float) -> Coverage:
 def _ratio(total: float, dof: float) -> Ratio:
     if not dof > 0.0 or not np.isfinite(total):
         return Ratio(float("nan"), float("nan"), float("nan"), float("nan"))
-    lower, upper = chi2.ppf([0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE], dof) / dof
+    lower, upper = (
+        chi2.ppf([0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE], dof) / dof
+    )
     p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
     return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
 

@@ -12,6 +12,7 @@ import numpy as np
 from gmwm._core.runs import Earlier
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.montecarlo.consistency import (
     LEVELS,
@@ -36,7 +37,6 @@ from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SETTLED = 0.25  # share of the trajectory after which the filter with GNSS is judged
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("position", "velocity", "attitude", "sensors")
 _WIDTH = 80
@@ -114,7 +114,7 @@ class Validation:
         """Consistency of a filter while GNSS is on, once it has settled."""
         duration = self.study.truth.duration
         first = min((outage.start for outage in self.study.outages), default=duration)
-        start = min(_SETTLED * duration, 0.5 * first)
+        start = min(tuning.SETTLED * duration, 0.5 * first)
         return over_time(self.study[name], start, first)
 
     def innovations(self, name: str) -> InnovationTest:
