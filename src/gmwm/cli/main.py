@@ -11,20 +11,12 @@ from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.demo import demo
 from gmwm.cli.health import health
+from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError
 
 _EXIT_INPUT = 2
-
-_HINTS = {
-    "earlier-runs": " (--resume, -o)",
-    "heading-unknown": " (--heading DEG, or heading: in the file)",
-    "missing-key": " (by options: gmwm navigate --help)",
-    "other-runs": " (-o)",
-    "runs-in-use": " (-o)",
-}
-"""What mends an error of a code on the command line."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -42,7 +34,7 @@ def main() -> None:
     try:
         cli.main(standalone_mode=False)
     except InputError as error:
-        click.echo(f"gmwm: {error}{_HINTS.get(error.code, '')}", err=True)
+        click.echo(f"gmwm: {with_hint(error)}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.exceptions.Exit as error:
         sys.exit(error.exit_code)

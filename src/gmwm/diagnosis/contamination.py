@@ -1,6 +1,6 @@
-"""Contamination: outliers too many, and too far apart, to be knocks.
+"""Contamination: outliers too many, and too far apart, to be shocks.
 
-A knock is left out with the samples around it. Outliers spread over the record cannot be: what is
+A shock is left out with the samples around it. Outliers spread over the record cannot be: what is
 left between them has no long averaging times. The robust wavelet variance bounds their influence
 instead, at the price of standard errors 1.3 times as large, so that it is used only where outliers
 do more harm than that.
@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binom, norm
 
+from gmwm._core.notices import Notice
 from gmwm.diagnosis.events import FALSE_ALARM
-from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.innovations import Innovations
 
 _FAR = 4.0  # robust standard deviations
@@ -46,7 +46,7 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
     return 0.0 if is_chance or count <= _HARMFUL * known else count / known
 
 
-def contamination_finding(name: str, share: float) -> Finding | None:
+def contamination_notice(name: str, share: float) -> Notice | None:
     """Say how many outliers there are.
 
     Parameters
@@ -58,10 +58,12 @@ def contamination_finding(name: str, share: float) -> Finding | None:
     """
     if share == 0.0:
         return None
-    return Finding(
-        name, "outliers", "warning",
+    return Notice(
+        "outliers",
+        "warning",
+        name,
         f"{100.0 * share:.2g} % of the samples are outliers spread over the record, beyond four "
         f"standard deviations, where noise has {100.0 * _NOISE:.2g} %",
-        "gmwm calibrate takes robust wavelet variances (in Python robust=True)",
         {"share": share},
-    )  # fmt: skip
+        "gmwm calibrate takes robust wavelet variances (in Python robust=True)",
+    )

@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import f as f_distribution, norm
 
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import Innovations
 
 FALSE_ALARM = 1e-3
-"""Chance of each finding where noise is Gaussian and stationary."""
+"""Chance of each notice where noise is Gaussian and stationary."""
 
 PARTS = 64
 """Parts of the record whose means show the wander."""
@@ -25,17 +25,17 @@ _CHANGE = 0.05  # of the standard deviation between halves that is worth a word
 _LARGE_CHANGE = 0.2
 
 
-def part_means(values: FloatArray, parts: int = PARTS) -> FloatArray:
-    """Means of equal parts of a series; NaN where more than half of a part is missing."""
+def part_means(values: FloatArray, parts: int = PARTS, least: float = 0.5) -> FloatArray:
+    """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
     rows = values[: size * parts].reshape(parts, size)
     known = ~np.isnan(rows)
     count = np.count_nonzero(known, axis=1)
     total = np.sum(np.where(known, rows, 0.0), axis=1)
-    return np.where(count > size / 2, total / np.maximum(count, 1), np.nan)
+    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
-def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Finding | None:
+def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice | None:
     """Say how far the level wanders, and whether it does so in one direction.
 
     The variance of the means of 64 parts is compared with what the differences between means of
@@ -81,29 +81,31 @@ def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Findin
         return None
     numbers = {"wander": wander, "white": white, "change": change}
     if ramp:
-        return Finding(
-            name, "drift", "warning",
+        return Notice(
+            "drift",
+            "warning",
+            name,
             f"drifts by {spoken(change, unit, sign=True)} over the record, and wanders about "
             f"that by {spoken(wander, unit)} rms",
-            "add a RateRamp to the model, or leave out the warm-up",
             numbers,
-        )  # fmt: skip
+            "add a RateRamp to the model, or leave out the warm-up",
+        )
     text = (
         f"means of {size * dt:.3g} s wander by {spoken(wander, unit)} rms, {ratio:.2g} times "
         "what the fast noise leaves"
     )
     action = "estimated as random walk or slow Gauss-Markov process"
-    return Finding(name, "drift", "note", text, action, numbers)
+    return Notice("drift", "note", name, text, numbers, action)
 
 
-def variance_finding(
+def variance_notice(
     name: str,
     unit: str,
     dt: float,
     errors: Innovations,
     usable: BoolArray,
     step: float,
-) -> Finding | None:
+) -> Notice | None:
     """Say whether the noise is as large at the end as at the beginning.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
@@ -154,7 +156,7 @@ def variance_finding(
             "in the second half than in the first"
         )
         action = "the model is an average: use the part that is like the use"
-        return Finding(name, "variance", severity, text, action, numbers)
+        return Notice("variance", severity, name, text, numbers, action)
     if is_loud:
         start = loudest * errors.values.size // _TENTHS * dt
         text = (
@@ -162,7 +164,7 @@ def variance_finding(
             f"begins at {start:.4g} s"
         )
         action = "look for people or machines then, and leave it out if it is none of the sensor"
-        return Finding(name, "variance", "warning", text, action, numbers)
+        return Notice("variance", "warning", name, text, numbers, action)
     return None
 
 

@@ -1,19 +1,19 @@
-"""Spikes and knocks: samples that the noise does not explain."""
+"""Spikes and shocks: samples that the noise does not explain."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import norm
 
+from gmwm._core.notices import Notice
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray
-from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.innovations import Innovations
 
 FALSE_ALARM = 1e-3
 """Chance of an event in a channel of Gaussian noise, however long."""
 
-_RING = 4.0  # standard deviations: what belongs to a knock, once there is one
+_RING = 4.0  # standard deviations: what belongs to a shock, once there is one
 _JOINED = 24  # samples between exceedances of one event
 _GUARD = 8  # samples before and at least as many after that are left out with it
 _BESIDE = 200  # samples on both sides that tell the level without the event
@@ -57,14 +57,14 @@ def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def event_finding(
+def event_notice(
     name: str,
     unit: str,
     dt: float,
     values: FloatArray,
     events: tuple[tuple[int, int], ...],
     scatter: float,
-) -> Finding | None:
+) -> Notice | None:
     """Say when the events are, how large and how long.
 
     Parameters
@@ -97,7 +97,7 @@ def event_finding(
     harmful = share > np.sqrt(2.0 / known)
     length = (stop - start) * dt
     many = len(events) > 1
-    which = f"{len(events):,} spikes or knocks, the largest" if many else "a spike or knock"
+    which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
     height = spoken(heights[largest], unit, sign=True)
     text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
     if 1 < len(events) <= _LISTED + 1:
@@ -116,7 +116,7 @@ def event_finding(
         "samples": float(samples),
         "variance_share": float(share),
     }
-    return Finding(name, "event", "warning" if harmful else "note", text, action, numbers)
+    return Notice("event", "warning" if harmful else "note", name, text, numbers, action)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

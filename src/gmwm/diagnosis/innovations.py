@@ -141,7 +141,7 @@ def _complete(known: BoolArray, order: int) -> BoolArray:
 def _running_scale(errors: FloatArray, floor: float) -> FloatArray:
     """Scale in blocks, each replaced by the median of itself and its four neighbours.
 
-    A knock may fill a block; it does not fill three of five.
+    A shock may fill a block; it does not fill three of five.
     """
     blocks = max(errors.size // _BLOCK, 1)
     edges = np.linspace(0, errors.size, blocks + 1).astype(int)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from gmwm._core.notices import Notice
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.spectrum import FIRST, POWER_INFLATION, Spectrum
 
 FALSE_ALARM = 1e-3
@@ -22,7 +22,7 @@ _BESIDE_SHARE = 0.015  # this part of the frequency
 _CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
 _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
 _MOST = 40  # lines of one channel
-_NAMED = 4  # lines in the findings
+_NAMED = 4  # lines in the notices
 _ABOVE = 1.5  # ratio to the background that ends the foot of a line
 _FOOT = 0.05  # of the frequency: no foot reaches farther
 
@@ -92,10 +92,10 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     return tuple(sorted(lines, key=lambda line: -line.amplitude))
 
 
-def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding]:
-    """One finding for each of the strongest lines and its harmonics, one for the rest."""
+def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
+    """One notice for each of the strongest lines and its harmonics, one for the rest."""
     families = _families(lines)
-    findings = []
+    notices = []
     for main, harmonics in families[:_NAMED]:
         amplitude = spoken(main.amplitude, unit)
         text = (
@@ -105,10 +105,12 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
         if harmonics:
             at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
             text += f", with harmonics at {at} Hz"
-        findings.append(
-            Finding(
-                name, "line", "warning", text,
-                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
+        notices.append(
+            Notice(
+                "line",
+                "warning",
+                name,
+                text,
                 {
                     "frequency": main.frequency,
                     "amplitude": main.amplitude,
@@ -116,8 +118,9 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
                     "width": main.width,
                     "harmonics": float(len(harmonics)),
                 },
+                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
             )
-        )  # fmt: skip
+        )
     rest = families[_NAMED:]
     if rest:
         strongest = rest[0][0]
@@ -125,10 +128,13 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
             f"{len(rest)} weaker periodic line{'s' if len(rest) > 1 else ''}, the strongest at "
             f"{strongest.frequency:.4g} Hz, amplitude {spoken(strongest.amplitude, unit)}"
         )
-        numbers = {"count": float(len(rest)), "frequency": strongest.frequency,
-                   "amplitude": strongest.amplitude}  # fmt: skip
-        findings.append(Finding(name, "line", "note", text, "", numbers))
-    return findings
+        numbers = {
+            "count": float(len(rest)),
+            "frequency": strongest.frequency,
+            "amplitude": strongest.amplitude,
+        }
+        notices.append(Notice("line", "note", name, text, numbers))
+    return notices
 
 
 def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray]:

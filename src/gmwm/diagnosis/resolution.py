@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, inner
-from gmwm.diagnosis.findings import Finding, Severity
 
 _LOOKED_AT = 65_536  # samples; a lattice shows in fewer
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
@@ -62,7 +62,7 @@ def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
     return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
 
 
-def rounding_finding(name: str, unit: str, step: float, scatter: float) -> Finding | None:
+def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
@@ -85,21 +85,26 @@ def rounding_finding(name: str, unit: str, step: float, scatter: float) -> Findi
     values = {"lsb": step, "noise": noise}
     text = f"samples come in steps of {spoken(step, unit)}"
     if noise < step / 3.0:
-        return Finding(
-            name, "rounding", "bad",
+        return Notice(
+            "rounding",
+            "bad",
+            name,
             f"{text}, more than three times the noise below them",
-            "nothing mends it: the noise below the step cannot be estimated; use a finer range",
             values,
-        )  # fmt: skip
+            "nothing mends it: the noise below the step cannot be estimated; use a finer range",
+        )
     ratio = step / noise
     text = f"{text}, {ratio:.2g} times the white noise of {spoken(noise, unit)}"
     if ratio > 1.0:
-        return Finding(
-            name, "rounding", "warning", text,
-            "counted as additive noise, which is nearly true up to a step of twice the noise",
+        return Notice(
+            "rounding",
+            "warning",
+            name,
+            text,
             values,
-        )  # fmt: skip
+            "counted as additive noise, which is nearly true up to a step of twice the noise",
+        )
     severity: Severity = "note" if ratio > 0.5 else "good"
     share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
     action = f"counted as white noise: {100.0 * share:.2g} % of it"
-    return Finding(name, "rounding", severity, text, action, values)
+    return Notice("rounding", severity, name, text, values, action)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from gmwm._core.notices import Notice
 from gmwm._core.text import spoken
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm.diagnosis.findings import Finding
 from gmwm.diagnosis.spectrum import Bands, Spectrum
 from gmwm.process import Resonance
 
@@ -99,7 +99,7 @@ def find_resonances(
     return tuple(sorted(bumps, key=lambda bump: -bump.ratio))
 
 
-def resonance_finding(name: str, unit: str, bump: Bump) -> Finding:
+def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
     """Say where it is, how damped and how high."""
     text = (
         f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
@@ -112,7 +112,7 @@ def resonance_finding(name: str, unit: str, bump: Bump) -> Finding:
         "ratio": bump.ratio,
         "sigma": bump.sigma,
     }
-    return Finding(name, "resonance", "note", text, action, numbers)
+    return Notice("resonance", "note", name, text, numbers, action)
 
 
 def _sides(height: FloatArray, j: int) -> tuple[int, int]:
@@ -139,10 +139,14 @@ def _fitted(
     power = power / level
     place = np.log(f / centre)
 
-    starts = (np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
-              for damping in _STARTS)  # fmt: skip
-    free, _ = min((_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
-                  key=lambda result: result[1])  # fmt: skip
+    starts = (
+        np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
+        for damping in _STARTS
+    )
+    free, _ = min(
+        (_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
+        key=lambda result: result[1],
+    )
     unit = _unit(free, centre, spectrum.dt)
     bottom = float(np.interp(unit.frequency, f, _floor(free, place)))
     peak = float(np.exp(free[2]))

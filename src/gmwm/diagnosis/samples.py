@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import binom
 
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.diagnosis.findings import Finding, Severity
 from gmwm.diagnosis.innovations import Innovations
 from gmwm.readers import Channel
 
@@ -23,18 +24,15 @@ _LONG = 32  # equal samples in a row that are not asked whether noise tells samp
 _FEWEST_AT_END = 8
 
 
-def gap_findings(channels: Iterable[Channel], dt: float) -> list[Finding]:
-    """How much is missing; one finding for the recording where all channels miss the same."""
-    findings = [found for channel in channels if (found := _gap_finding(channel, dt))]
-    alike = {(found.sentence, found.severity) for found in findings}
-    channels = list(channels)
-    if len(findings) == len(channels) > 1 and len(alike) == 1:
-        first = findings[0]
-        return [Finding("", "gap", first.severity, first.sentence, first.action, first.values)]
-    return findings
+def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
+    """How much is missing; one notice for the recording where all channels miss the same."""
+    notices = [found for channel in channels if (found := _gap_notice(channel, dt))]
+    if len(notices) == len(channels) > 1 and all(n.values == notices[0].values for n in notices):
+        return [replace(notices[0], where="")]
+    return notices
 
 
-def _gap_finding(channel: Channel, dt: float) -> Finding | None:
+def _gap_notice(channel: Channel, dt: float) -> Notice | None:
     gone = np.isnan(channel.values)
     missing = int(np.count_nonzero(gone))
     if not missing:
@@ -49,8 +47,8 @@ def _gap_finding(channel: Channel, dt: float) -> Finding | None:
         "longest": float(np.max(lengths)) * dt,
     }
     if missing == channel.n:
-        return Finding(
-            channel.name, "gap", "bad", "all samples missing", "look at cable and columns", values
+        return Notice(
+            "gap", "bad", channel.name, "all samples missing", values, "look at cable and columns"
         )
     plural = "s" if lengths.size > 1 else ""
     text = (
@@ -58,22 +56,24 @@ def _gap_finding(channel: Channel, dt: float) -> Finding | None:
         f"gap{plural}, the longest {values['longest']:.3g} s"
     )
     if share > _TOO_MUCH_MISSING:
-        return Finding(channel.name, "gap", "bad", text, "too few are left: record again", values)
+        return Notice("gap", "bad", channel.name, text, values, "too few are left: record again")
     severity: Severity = "warning" if share > _MUCH_MISSING else "note"
     action = "the wavelet variance leaves out what gaps touch"
-    return Finding(channel.name, "gap", severity, text, action, values)
+    return Notice("gap", severity, channel.name, text, values, action)
 
 
-def dead_finding(channel: Channel) -> Finding | None:
+def dead_notice(channel: Channel) -> Notice | None:
     """Say that a channel never changes."""
     if channel.missing == channel.n or not channel.is_constant:
         return None
-    return Finding(
-        channel.name, "dead", "bad",
+    return Notice(
+        "dead",
+        "bad",
+        channel.name,
         f"every sample is {spoken(channel.mean, channel.unit, digits=6)}: the channel is dead",
-        "check sensor and columns; it is skipped in the calibration",
         {"value": channel.mean},
-    )  # fmt: skip
+        "check sensor and columns; it is skipped in the calibration",
+    )
 
 
 def is_dithered(values: FloatArray, step: float) -> bool:
@@ -100,9 +100,9 @@ def run_lengths(values: FloatArray) -> IntArray:
     return np.diff(np.concatenate([[0], changes, [values.size]]))
 
 
-def stuck_finding(
+def stuck_notice(
     name: str, unit: str, dt: float, values: FloatArray, step: float, errors: Innovations
-) -> Finding | None:
+) -> Notice | None:
     """Find runs of equal samples longer than rounding explains.
 
     Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
@@ -149,8 +149,8 @@ def stuck_finding(
         f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
     ).replace("  ", " ")
     severity: Severity = "bad" if share > _MUCH_MISSING else "warning"
-    return Finding(
-        name, "stuck", severity, text, "make such samples missing (NaN) before the fit", numbers
+    return Notice(
+        "stuck", severity, name, text, numbers, "make such samples missing (NaN) before the fit"
     )
 
 
@@ -176,7 +176,7 @@ def _longest_by_chance(n: int, step: float, scale: float) -> int:
     return max(int(np.ceil(np.log(FALSE_ALARM / n) / np.log(same))) + 1, fewest)
 
 
-def saturation_finding(name: str, unit: str, values: FloatArray, step: float) -> Finding | None:
+def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> Notice | None:
     """Find more samples at the largest or smallest value than at the one before it.
 
     A tail falls outwards, and for noise faster and faster: from the last step but one to the last
@@ -217,12 +217,14 @@ def saturation_finding(name: str, unit: str, values: FloatArray, step: float) ->
     count = sum(ends.values())
     share = count / values.size
     where = " and ".join(spoken(end, unit, digits=5) for end in ends)
-    return Finding(
-        name, "saturation", "bad" if share > FALSE_ALARM else "warning",
+    return Notice(
+        "saturation",
+        "bad" if share > FALSE_ALARM else "warning",
+        name,
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
-        "use a wider range; make such samples missing (NaN) if they are few",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
-    )  # fmt: skip
+        "use a wider range; make such samples missing (NaN) if they are few",
+    )
 
 
 def _slowest_fall(near: int, far: int) -> float:

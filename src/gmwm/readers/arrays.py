@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, meaning
@@ -54,7 +55,7 @@ class ArrayTable:
     arrays: tuple[_AnyArray, ...]
     rate: float | None = None
     tentative: bool = False
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @classmethod
     def open(cls, path: Path) -> ArrayTable:

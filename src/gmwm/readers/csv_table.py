@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.cells import BLANKS, number, split_line
@@ -69,9 +70,9 @@ class CsvTable:
         return None
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """What was noticed in the header."""
-        return self.layout.notes
+        return self.layout.notices
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns.

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import mode
 
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.readers.cells import BLANKS, number, split_header, split_line
 from gmwm.readers.names import meaning
@@ -40,7 +41,7 @@ class Layout:
         Bytes before the first line of data.
     line : int
         Number of that line, counted from 1.
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     delimiter: str
@@ -50,7 +51,7 @@ class Layout:
     trailing: bool
     offset: int
     line: int
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def width(self) -> int:
@@ -117,10 +118,13 @@ def find_layout(source: str, head: bytes) -> Layout:
         trailing=trailing,
         offset=data[0].offset,
         line=data[0].number,
-        notes=(f"Line {first.number} was taken for column numbers and left out.",)
-        if data is following and not has_header
-        else (),
+        notices=(_numbering(first.number),) if data is following and not has_header else (),
     )
+
+
+def _numbering(line: int) -> Notice:
+    text = f"line {line} was read as column numbers and left out"
+    return Notice("column-numbers", "note", "", text, {"line": line})
 
 
 def _check_is_text(source: str, head: bytes) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
 from gmwm.report.budget import navigation
 from gmwm.report.figure import deviation_figure, residual_figure
-from gmwm.report.findings import choice, health
+from gmwm.report.health import ambiguity, health
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
 _DAYS, _YEARS = 5.0, 2.0  # from which on durations are told so
@@ -103,7 +102,7 @@ def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
         "floor": _in_field_unit(low.deviation, "u", fit),
         "floor_tau": number(low.tau),
         "sentence": sentence(fit),
-        "choice": [str(replace(found, channel="")) for found in choice(calibration, name)],
+        "ambiguity": ambiguity(calibration, name),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
         "figure": _script(deviation_figure(fit)),
         "residuals": _script(residual_figure(fit)),

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from typing import Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
+from gmwm._core.frames import frame
 from gmwm._core.text import wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
@@ -25,6 +26,9 @@ from gmwm.selection.ranking import (
 )
 from gmwm.selection.ties import ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
+
+if TYPE_CHECKING:
+    import pandas
 
 RULES = ("criterion", "merge")
 _SHOWN = 12
@@ -103,6 +107,18 @@ class Selection(Document):
 
     def __getitem__(self, index: int) -> Candidate:
         return self.ranking[index]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the candidates, best first; needs pandas."""
+        names = ("criterion", "objective", "chi_square", "n_parameters", "dof", "p_value")
+        ties = self.ties
+        rows = [
+            {"model": item.model.title()}
+            | {name: getattr(item, name) for name in names}
+            | {"chosen": item is self.chosen, "tie": item in ties}
+            for item in self.ranking
+        ]
+        return frame(rows, ("model", *names, "chosen", "tie"))
 
     def content(self) -> dict[str, Any]:
         """What it cannot be rebuilt without, in JSON types."""

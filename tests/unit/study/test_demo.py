@@ -44,7 +44,7 @@ def test_simulated_recording():
     assert recording.n == 100 * RATE
     assert "seed 3" in recording.source
     models = {"gyro": TABLE_6.models["gyro_x"], "accel": TABLE_6.models["accel_x"]}
-    for channel in recording:
+    for channel in recording.values():
         model = models[channel.quantity]
         assert channel.name.startswith(channel.quantity)
         assert channel.unit == {"gyro": "rad/s", "accel": "m/s^2"}[channel.quantity]

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
+from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
@@ -29,6 +30,7 @@ from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
 
 METHOD_NAMES = {
@@ -384,6 +386,10 @@ class Fit(Document):
         return plotting.trace(np.array(self.trace), ax=ax)
 
     # -- tables and files -------------------------------------------------------------------------
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the parameters, one a row, in SI units; needs pandas."""
+        return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
     def content(self) -> dict[str, Any]:
         """What it cannot be rebuilt without, and what readers of the file want, in JSON types."""
