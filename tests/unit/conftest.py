@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gmwm._core.notices import Notice
 from gmwm.ins import FilterErrors, MonteCarlo, Outage, car_drive
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.geometry.rotation import matrix_from_rpy
@@ -12,6 +13,8 @@ from gmwm.ins.montecarlo.validation import Validation
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}
 """Name -> true errors in units of the predicted ones."""
+
+NOTE = Notice("made-up", "note", "", "a note")
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +35,7 @@ def _made_up(factors=None, outages=((20, 10), (40, 15)), runs=40, seed=1, durati
     experiment = SimpleNamespace(title="made up", seed=seed, filters={
         name: SimpleNamespace(models={"gyro_x": f"model of {name}"}) for name in factors
     })  # fmt: skip
-    return Validation(experiment, MonteCarlo(filters, spans, example, truth, ("a note",)))
+    return Validation(experiment, MonteCarlo(filters, spans, example, truth, (NOTE,)))
 
 
 def _runs(factor, spans, draws, rng, dead):

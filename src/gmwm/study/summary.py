@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import cramer_rao
 from gmwm.study.studies import Quantity, Study
@@ -111,7 +112,7 @@ class Summary:
             "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for",
             "estimates by Haar wavelet variances only; covers: 95 % intervals",
         ]
-        return "\n".join([*lines, *(_wrapped(note) for note in s.notes)])
+        return "\n".join([*lines, *(line for note in s.notes for line in wrapped(note, "- ", 2))])
 
     def markdown(self) -> str:
         """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""
@@ -202,9 +203,3 @@ def _line(quantity: Quantity, method: str, x: Score) -> str:
 
 def _cell(absolute: float, relative: float) -> str:
     return "-" if np.isnan(relative) else f"{absolute:.3g} ({relative:.3g})"
-
-
-def _wrapped(note: str) -> str:
-    import textwrap
-
-    return textwrap.fill(note, 80, initial_indent="- ", subsequent_indent="  ")

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -41,7 +42,7 @@ class Alignment:
         To be taken off the gyros, rad/s; zero if the vehicle never stood still.
     gyro_bias_sd : float or None
         How well it is known, rad/s; ``None`` if the vehicle never stood still.
-    notes : tuple of str
+    notices : tuple of Notice
         How it came about.
     """
 
@@ -50,7 +51,7 @@ class Alignment:
     sd: InitialSd
     gyro_bias: FloatArray
     gyro_bias_sd: float | None
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def align(
@@ -135,12 +136,21 @@ def align(
     )  # fmt: skip
     earth = C.T @ np.array([RATE * np.cos(lat), 0.0, -RATE * np.sin(lat)])
     known_sd = float(np.hypot(gyro_sd, RATE * np.hypot(yaw_sd, tilt_sd))) if still else None
-    notes = (
-        f"levelled by {(last - first) * imu.dt:.3g} s, {first * imu.dt:.6g} s after the start, "
-        + ("at rest; the gyros' mean there is taken off" if still else "in steady motion"),
-        f"{how}: {np.degrees(yaw) % 360.0:.2f} deg, 1 sigma {np.degrees(yaw_sd):.2g} deg",
-    )
-    return Alignment(epoch, state, sd, bias - earth if still else bias, known_sd, notes)
+    length, start = (last - first) * imu.dt, first * imu.dt
+    motion = "at rest; the gyros' mean there is subtracted" if still else "in steady motion"
+    notices = (
+        Notice(
+            "levelled", "note", "",
+            f"levelled by {length:.3g} s, {start:.6g} s after the start, {motion}",
+            {"length": length, "start": start, "at rest": still},
+        ),
+        Notice(
+            "heading", "note", "",
+            f"{how}: {np.degrees(yaw) % 360.0:.2f} deg, 1 sigma {np.degrees(yaw_sd):.2g} deg",
+            {"heading": yaw, "sd": yaw_sd},
+        ),
+    )  # fmt: skip
+    return Alignment(epoch, state, sd, bias - earth if still else bias, known_sd, notices)
 
 
 def _of_kind(aiding: Aiding, kind: str) -> Fixes | None:

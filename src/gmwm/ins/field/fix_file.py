@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -55,7 +56,7 @@ class FixLog:
     position_sd, velocity_sd : (E, 3) ndarray or None
         To the north, east and down; ``None`` where the file has none.
     source : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     time: FloatArray
@@ -64,7 +65,7 @@ class FixLog:
     position_sd: FloatArray | None
     velocity_sd: FloatArray | None
     source: str
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     def aiding(
         self,
@@ -145,11 +146,16 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     velocity = None
     if all(name in found for name in _VELOCITY):
         velocity = np.stack([found[name] for name in _VELOCITY], axis=1)
-    notes = [f"columns not used: {', '.join(unused)}"] if unused else []
+    notices = []
+    if unused:
+        text = f"columns not used: {', '.join(unused)}"
+        notices.append(Notice("columns-unused", "note", "", text, {"columns": ", ".join(unused)}))
     no_fix = (position[:, 0] == 0.0) & (position[:, 1] == 0.0)
     if np.any(no_fix):
         position[no_fix] = np.nan
-        notes.append(f"{np.count_nonzero(no_fix)} positions at 0, 0 are taken for missing")
+        count = int(np.count_nonzero(no_fix))
+        text = f"{count} positions at 0, 0 are taken for missing"
+        notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
     return FixLog(
         time=found[TIME] * (meaning(table.names[columns[TIME]]).seconds or 1.0),
         position=position,
@@ -159,7 +165,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         if velocity is None
         else _deviations(table, columns, found, "sd velocity ", velocity),
         source=table.source,
-        notes=tuple(notes),
+        notices=tuple(notices),
     )
 
 

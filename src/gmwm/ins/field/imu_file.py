@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
@@ -30,13 +31,13 @@ class ImuLog:
     start : float
         Time of the first epoch on that clock, s; 0 without time stamps.
     source : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     imu: Imu
     start: float
     source: str
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
 def read_imu(
@@ -102,17 +103,19 @@ def read_imu_log(
             "check the unit of the accelerometers, and that gravity is not taken off"
         )
     imu = Imu(recording.dt, samples[:, :3] * recording.dt, samples[:, 3:] * recording.dt)
-    start, notes = _clock(Path(path), recording, time)
+    start, notices = _clock(Path(path), recording, time)
     if np.mean(samples[:, 5]) > 0.0:
-        notes = (*notes, "accel_z is positive: its axis points up, and roll is near 180 deg")
-    return ImuLog(imu, start, recording.source, (*map(str, recording.notices), *notes))
+        text = "its mean is positive: the axis points up, and roll is near 180 deg"
+        notices = (*notices, Notice("axis-up", "warning", "accel_z", text))
+    return ImuLog(imu, start, recording.source, (*recording.notices, *notices))
 
 
 def _clock(
     path: Path, recording: Recording, time: str | int | bool | None
-) -> tuple[float, tuple[str, ...]]:
+) -> tuple[float, tuple[Notice, ...]]:
     """Time of the first epoch, s, and what is to be said of it."""
-    none = 0.0, ("the IMU has no time stamps: fixes are timed from its first sample",)
+    text = "the IMU has no time stamps: fixes are timed from its first sample"
+    none = 0.0, (Notice("no-time-stamps", "note", "", text),)
     if time is False or path.suffix.lower() in (".npy", ".npz"):
         return none
     table = open_log(path)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -31,6 +32,8 @@ from gmwm.ins.spec import (
     number,
     read_models,
 )
+
+_UNITS = {"position": "m", "velocity": "m/s"}
 
 
 class ImuSpec(ReadingSpec):
@@ -84,7 +87,7 @@ class Measured:
     heading_sd : float
         rad.
     title : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     imu: Imu
@@ -94,7 +97,7 @@ class Measured:
     heading: float | None = None
     heading_sd: float = tuning.HEADING_SD
     title: str = ""
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @classmethod
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
@@ -113,7 +116,7 @@ class Measured:
             If something is missing, unknown or cannot be used.
         """
         spec = MeasuredSpec.parse(content)
-        sensors, told = _with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
+        sensors, assumed = _with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
         log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding, cut = _within(
@@ -123,9 +126,13 @@ class Measured:
         for kind, own, usual in (("position", found.position_sd, spec.position_sd),
                                  ("velocity", found.velocity_sd, spec.velocity_sd)):  # fmt: skip
             if own is None and any(each.kind == kind for each in aiding.fixes):
-                sd = ", ".join(f"{each:g}" for each in usual)
-                told = (*told, f"{kind} fixes are taken to have standard deviations of {sd} "
-                        f"{'m' if kind == 'position' else 'm/s'} (north, east, down)")  # fmt: skip
+                sd, unit = ", ".join(f"{each:g}" for each in usual), _UNITS[kind]
+                text = (
+                    f"{kind} fixes are taken to have standard deviations of {sd} {unit} (north, "
+                    "east, down)"
+                )
+                values = dict(zip(("north", "east", "down"), usual, strict=True))
+                assumed = (*assumed, Notice("sd-assumed", "note", "", text, values))
         return cls(
             imu=log.imu,
             aiding=aiding,
@@ -134,29 +141,36 @@ class Measured:
             heading=spec.heading,
             heading_sd=spec.heading_sd,
             title=log.source,
-            notes=(*log.notes, *found.notes, *cut, *told),
+            notices=(*log.notices, *found.notices, *cut, *assumed),
         )
 
 
 def _with_bias(
     models: SensorModels, given: Mapping[str, float]
-) -> tuple[SensorModels, tuple[str, ...]]:
+) -> tuple[SensorModels, tuple[Notice, ...]]:
     """Models with a constant that is drawn when a sensor is switched on, and what was assumed."""
-    bias_sd, assumed = {}, []
+    bias_sd, assumed = {}, {}
     for axis in AXES:
         kind = axis.partition("_")[0]
         bias_sd[axis] = given.get(kind, models.bias_sd[axis] or tuning.TURN_ON_SD[kind])
-        if kind not in given and not models.bias_sd[axis] and kind not in assumed:
-            assumed.append(kind)
-    text = {"gyro": "gyros 0.1 deg/s", "accel": "accelerometers 0.1 m/s^2"}
-    told = "biases at switching on, which a static calibration does not know, are taken to be "
-    note = told + " and ".join(text[kind] for kind in assumed) + " (1 sigma)"
-    return replace(models, bias_sd=bias_sd), (note,) if assumed else ()
+        if kind not in given and not models.bias_sd[axis]:
+            assumed[kind] = bias_sd[axis]
+    shown = {
+        "gyro": lambda sd: f"gyros {np.degrees(sd):g} deg/s",
+        "accel": lambda sd: f"accelerometers {sd:g} m/s^2",
+    }
+    text = (
+        "biases at switching on, which a static calibration does not know, are taken to be "
+        + " and ".join(shown[kind](sd) for kind, sd in assumed.items())
+        + " (1 sigma)"
+    )
+    notices = (Notice("biases-assumed", "note", "", text, assumed),) if assumed else ()
+    return replace(models, bias_sd=bias_sd), notices
 
 
 def _within(
     aiding: Aiding, imu: Imu, record: str, source: str, start: float
-) -> tuple[Aiding, tuple[str, ...]]:
+) -> tuple[Aiding, tuple[Notice, ...]]:
     """The fixes of the time of the IMU's record."""
     end = imu.n * imu.dt
     kept, left_out, total = [], 0, 0
@@ -175,5 +189,6 @@ def _within(
             f"{source} has {spans}, none in the time of {record}, {start:.10g} s to "
             f"{start + end:.10g} s: bring both to one clock"
         )
-    note = f"{left_out} fixes before or after the IMU's record are left out"
-    return replace(aiding, fixes=tuple(kept)), (note,) if left_out else ()
+    text = f"{left_out} fixes before or after the IMU's record are left out"
+    notice = Notice("fixes-left-out", "note", "", text, {"count": left_out})
+    return replace(aiding, fixes=tuple(kept)), (notice,) if left_out else ()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier, do_runs
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
@@ -34,14 +35,14 @@ class MonteCarlo:
     example : dict
         Name -> `Solution` of the first run, once a second.
     truth : Trajectory
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     filters: dict[str, FilterErrors]
     outages: tuple[Outage, ...]
     example: dict[str, Solution]
     truth: Trajectory
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     def __getitem__(self, name: str) -> FilterErrors:
         if name not in self.filters:
@@ -99,12 +100,14 @@ def monte_carlo(
         raise InputError("there is no filter: give one at least")
     runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
     imu = emulate(scenario.trajectory)
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     if source.available is not None and source.available < runs:
-        notes = (
+        text = (
             f"{source.available} runs in place of {runs}: the recording has no more stretches "
-            "of this length that do not overlap",
+            "of this length that do not overlap"
         )
+        values = {"runs": source.available, "asked": runs}
+        notices = (Notice("fewer-runs", "warning", "", text, values),)
         runs = source.available
     task = _Task(scenario, source, dict(filters), imu, seed)
     found = do_runs(
@@ -121,7 +124,7 @@ def monte_carlo(
         outages=scenario.outages,
         example=task.example(),
         truth=scenario.trajectory,
-        notes=notes,
+        notices=notices,
     )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
 
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("position", "velocity", "attitude", "sensors")
-_WIDTH = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +93,18 @@ class Validation:
         return tuple(found)
 
     @property
-    def divergences(self) -> tuple[str, ...]:
-        """One sentence for each filter that diverged in some run."""
+    def notices(self) -> tuple[Notice, ...]:
+        """What to know of the runs: too few of them, filters that diverged."""
         found = {name: self.study[name] for name in self.names if self.study[name].diverged}
-        return tuple(
-            f"{name} diverged in {runs.diverged} of {runs.runs} runs: figures are of the others"
+        diverged = (
+            Notice(
+                "diverged", "bad", name,
+                f"diverged in {runs.diverged} of {runs.runs} runs; figures are of the others",
+                {"diverged": runs.diverged, "runs": runs.runs},
+            )
             for name, runs in found.items()
-        )
+        )  # fmt: skip
+        return (*self.study.notices, *diverged)
 
     def spreads(self, name: str) -> list[dict[str, Spread]]:
         """Errors of a filter before the first fix after each outage."""
@@ -162,9 +167,9 @@ class Validation:
             f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
             f"{word}, seed {self.experiment.seed}"
         )
-        lines = textwrap.wrap(first, _WIDTH, subsequent_indent="  ")
-        for note in (*self.study.notes, *self.divergences):
-            lines += textwrap.wrap(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
+        lines = wrapped(first, indent=2)
+        for notice in self.notices:
+            lines += wrapped(str(notice), "- ", 2)
         return lines
 
     def _error_rows(self, outage: int, width: int) -> list[str]:

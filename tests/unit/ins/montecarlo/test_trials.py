@@ -98,7 +98,7 @@ def test_the_example_is_the_first_run(reference):
     )
     assert found.truth is TRUTH
     assert found.outages == SCENARIO.outages
-    assert found.notes == ()
+    assert found.notices == ()
 
 
 # ---- Interruptions ----
@@ -188,9 +188,10 @@ def recorded(stretches, extra=0):
 def test_fewer_stretches_than_runs_are_noted():
     found = study(9, source=recorded(3, extra=TRUTH.n // 2))
     assert found["good"].runs == 3
-    assert len(found.notes) == 1
-    assert found.notes[0].startswith("3 runs in place of 9")
-    assert study(2, source=recorded(3)).notes == ()
+    (notice,) = found.notices
+    assert notice.code == "fewer-runs"
+    assert notice.text.startswith("3 runs in place of 9")
+    assert study(2, source=recorded(3)).notices == ()
     # True sensor errors are not known.
     assert np.all(np.isnan(found["good"].sensor_nees))
     assert np.all(np.isnan(found["good"].sensor_error))
