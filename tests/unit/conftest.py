@@ -1,4 +1,4 @@
-"""What tests of several rooms share: validations of made-up errors, without any filter."""
+"""What tests of several rooms fraction: validations of made-up errors, without any filter."""
 
 from types import SimpleNamespace
 

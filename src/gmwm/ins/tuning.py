@@ -15,14 +15,14 @@ STANDSTILL = 1e-3
 """m/s, below which the vehicle of a simulated trajectory stands."""
 
 POSITION_SD = (1.0, 1.0, 1.5)
-"""Of fixes that say none, to the north, east and down, m: those of a good receiver in the open."""
+"""Of fixes that state none, to the north, east and down, m: of a good receiver in the open."""
 
 VELOCITY_SD = (0.1, 0.1, 0.15)
 """The same of velocities, m/s."""
 
 TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
-"""Of what a static calibration takes off and a sensor changes when it is switched on, where nobody
-says better: rad/s, m/s^2."""
+"""Of a bias from one switching on to the next, which a static calibration cannot know, where nobody
+specifies better: rad/s, m/s^2."""
 
 SPECIFIC_FORCE = (0.5, 2.0)
 """Of standard gravity: mean specific force of a record, beyond which its unit is wrong."""

@@ -31,7 +31,7 @@ class Score:
     moment_ratio : float
         ``relative`` over the bound of estimators by wavelet variances.
     coverage : float
-        Share of the runs whose 95 % interval holds the truth.
+        Fraction of the runs whose 95 % interval holds the truth.
     missing : int
         Runs without an estimate.
     published : float

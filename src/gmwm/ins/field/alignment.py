@@ -39,7 +39,7 @@ class Alignment:
     state : NavState
     sd : InitialSd
     gyro_bias : (3,) ndarray
-        To be taken off the gyros, rad/s; zero if the vehicle never stood still.
+        Subtracted from the gyros, rad/s; zero if the vehicle never stood still.
     gyro_bias_sd : float or None
         How well it is known, rad/s; ``None`` if the vehicle never stood still.
     notices : tuple of Notice
@@ -369,7 +369,7 @@ def _stationary(models: SensorModels, axis: str, dt: float) -> float:
 
 
 def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding]:
-    """Increments and fixes after the initial state, with the gyros' bias taken off.
+    """Increments and fixes after the initial state, with the gyros' bias subtracted.
 
     Parameters
     ----------

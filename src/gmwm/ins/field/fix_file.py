@@ -154,7 +154,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     if np.any(no_fix):
         position[no_fix] = np.nan
         count = int(np.count_nonzero(no_fix))
-        text = f"{count} positions at 0, 0 are taken for missing"
+        text = f"{count} positions at 0, 0 are counted as missing"
         notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
     return FixLog(
         time=found[TIME] * (meaning(table.names[columns[TIME]]).seconds or 1.0),

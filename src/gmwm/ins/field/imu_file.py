@@ -100,7 +100,7 @@ def read_imu_log(
     if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
         raise InputError(
             f"{recording.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
-            "check the unit of the accelerometers, and that gravity is not taken off"
+            "check the unit of the accelerometers, and that gravity is not subtracted"
         )
     imu = Imu(recording.dt, samples[:, :3] * recording.dt, samples[:, 3:] * recording.dt)
     start, notices = _clock(Path(path), recording, time)
@@ -113,7 +113,7 @@ def read_imu_log(
 def _clock(
     path: Path, recording: Recording, time: str | int | bool | None
 ) -> tuple[float, tuple[Notice, ...]]:
-    """Time of the first epoch, s, and what is to be said of it."""
+    """Time of the first epoch, s, and its notices."""
     text = "the IMU has no time stamps: fixes are timed from its first sample"
     none = 0.0, (Notice("no-time-stamps", "note", "", text),)
     if time is False or path.suffix.lower() in (".npy", ".npz"):

@@ -269,9 +269,9 @@ class Navigated:
         lines = []
         if self.solution.time.size and self.solution.diverged_at is None:
             sd = self.solution.sd[-1]
-            doubt = "" if self.fits else " (if its model were right, which it is not)"
+            caveat = "" if self.fits else " (if its model were right, which it is not)"
             lines += [
-                f"Predicted accuracy at the end, 1 sigma{doubt}",
+                f"Predicted accuracy at the end, 1 sigma{caveat}",
                 f"horizontal {np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
                 f"{np.linalg.norm(sd[3:6]):.3g} m/s,",
                 f"tilt {np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "

@@ -257,7 +257,7 @@ def gnss(
     Raises
     ------
     InputError
-        If the interval is no multiple of the trajectory's, or a standard deviation not positive.
+        If the interval is not a multiple of the trajectory's, or a standard deviation not positive.
     """
     stride = checks.positive("interval", interval) / trajectory.dt
     if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:

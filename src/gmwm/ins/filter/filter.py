@@ -58,10 +58,10 @@ class InitialSd:
 class Filter:
     """An error-state Kalman filter with the states of given sensor models, ready to run.
 
-    Closed loop: after the measurements of an epoch, the estimated errors are taken off position,
-    velocity and attitude; the increments of the IMU are corrected for the estimated sensor errors
-    sample by sample. The covariance is carried in steps of ``stride`` samples, and at every epoch
-    that has a measurement or a result.
+    Closed loop: after the measurements of an epoch, the estimated errors are subtracted from
+    position, velocity and attitude; the increments of the IMU are corrected for the estimated
+    sensor errors sample by sample. The covariance is propagated in steps of ``stride`` samples, and
+    at every epoch that has a measurement or a result.
 
     Attributes
     ----------

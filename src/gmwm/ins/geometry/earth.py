@@ -74,7 +74,7 @@ def gravity_at(sin_lat: float, h: float) -> float:
     -------
     float
         Magnitude, m/s^2, taken to point down: Somigliana's formula (Groves 2013, eq. 2.134),
-        carried to the height by the second-order free-air formula (eq. 2.139).
+        continued to the height by the second-order free-air formula (eq. 2.139).
     """
     square = sin_lat * sin_lat
     at_ellipsoid = (

@@ -25,7 +25,7 @@ class Recorded:
     Attributes
     ----------
     stretches : tuple of (n, 6) ndarray
-        Errors in the order of `AXES`, rad/s and m/s^2, the mean of each recording taken off.
+        Errors in the order of `AXES`, rad/s and m/s^2, less the mean of each recording.
     dt : float
         Sampling interval, s.
     source : str

@@ -146,7 +146,7 @@ def angle_factor(table: CsvTable, column: int, quantity: str, common: str | None
         )
     if unit not in ("rad", "deg"):
         raise InputError(
-            f"{where}: {unit} is no unit of an angle: name it {quantity}_rad or {quantity}_deg"
+            f"{where}: {unit} is not a unit of angle: name it {quantity}_rad or {quantity}_deg"
         )
     return FACTORS[unit]
 
@@ -156,7 +156,7 @@ def length_factor(table: CsvTable, column: int, quantity: str) -> float:
     unit = unit_of(table.names[column]) or "m"
     if unit not in ("m", "ft"):
         raise InputError(
-            f"{table.source}, column {label(table.names, column)}: {unit} is no unit of a "
+            f"{table.source}, column {label(table.names, column)}: {unit} is not a unit of "
             f"{quantity}: name it {quantity}_m"
         )
     return FACTORS[unit]

@@ -52,15 +52,15 @@ class Coverage:
     Attributes
     ----------
     level : float
-    share : float
+    fraction : float
     lower, upper : float
-        Interval of 95 % of the share: binomial at one epoch (Clopper & Pearson 1934, *Biometrika*
-        26, 404-413), and over a time with as many draws as the scatter between the runs is worth
-        (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
+        Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
+        *Biometrika* 26, 404-413), and over a time with as many draws as the scatter between the
+        runs is worth (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
     """
 
     level: float
-    share: float
+    fraction: float
     lower: float
     upper: float
 
@@ -218,29 +218,32 @@ def covered(standard: FloatArray) -> tuple[Coverage, ...]:
     The components of a run are correlated, so that a run counts as one draw.
     """
     size = standard.shape[0]
-    shares = _shares(standard[:, None])
+    fractions = _fractions(standard[:, None])
     return tuple(
-        _coverage(level, share, size) for level, share in zip(LEVELS, _means(shares), strict=True)
+        _coverage(level, fraction, size)
+        for level, fraction in zip(LEVELS, _means(fractions), strict=True)
     )
 
 
-def _shares(standard: FloatArray) -> FloatArray:
-    """Share of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
+def _fractions(standard: FloatArray) -> FloatArray:
+    """Of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
     bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
     return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds], axis=1)
 
 
-def _means(shares: FloatArray) -> list[float]:
+def _means(fractions: FloatArray) -> list[float]:
     return (
-        [float(each) for each in np.mean(shares, axis=0)] if len(shares) else [np.nan] * len(LEVELS)
+        [float(each) for each in np.mean(fractions, axis=0)]
+        if len(fractions)
+        else [np.nan] * len(LEVELS)
     )
 
 
 def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
-    runs, shares = len(standard), _shares(standard)
+    runs, fractions = len(standard), _fractions(standard)
     result = []
-    for level, mean, each in zip(LEVELS, _means(shares), shares.T, strict=True):
+    for level, mean, each in zip(LEVELS, _means(fractions), fractions.T, strict=True):
         draws = float(runs)
         error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
         if error > 0.0:
@@ -250,14 +253,14 @@ def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
     return tuple(result)
 
 
-def _coverage(level: float, share: float, size: float) -> Coverage:
+def _coverage(level: float, fraction: float, size: float) -> Coverage:
     """With its binomial interval."""
     if not size > 0.0:
         return Coverage(level, float("nan"), float("nan"), float("nan"))
-    hits, tail = share * size, 0.5 * (1.0 - tuning.CONFIDENCE)
+    hits, tail = fraction * size, 0.5 * (1.0 - tuning.CONFIDENCE)
     lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
-    return Coverage(level, share, lower, upper)
+    return Coverage(level, fraction, lower, upper)
 
 
 def _ratio(total: float, dof: float) -> Ratio:

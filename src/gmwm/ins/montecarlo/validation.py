@@ -208,7 +208,9 @@ class Validation:
         for name in self.names:
             for label, found in self._judgements(name):
                 cells = [
-                    "- " if np.isnan(c.share) else f"{100.0 * c.share:.1f}" + " *"[not c.within]
+                    "- "
+                    if np.isnan(c.fraction)
+                    else f"{100.0 * c.fraction:.1f}" + " *"[not c.within]
                     for c in found.coverage["position"]
                 ]
                 rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))

@@ -29,7 +29,7 @@ def read_document(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not YAML ({_reason(error)}): mend it") from None
+        raise InputError(f"{path}: is not YAML ({_reason(error)}): correct it") from None
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
     if not isinstance(content, Mapping):

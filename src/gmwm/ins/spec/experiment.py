@@ -84,7 +84,7 @@ class ReducedSpec(Spec):
 
 
 class GnssSpec(Spec):
-    """Fixes; what is not said is as usual in `gmwm.ins.gnss`."""
+    """Fixes; what is left out is as usual in `gmwm.ins.gnss`."""
 
     interval: PositiveSeconds | None = None
     position_sd: Annotated[Three[PositiveMeters] | None, _NONE] = None

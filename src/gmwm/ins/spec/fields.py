@@ -100,7 +100,7 @@ def value(given: Any, si_unit: str) -> float:
     Raises
     ------
     InputError
-        If it is no finite number, or its unit is of another dimension.
+        If it is not a finite number, or its unit is of another dimension.
     """
     if checks.is_number(given):
         return float(given)
