@@ -18,6 +18,7 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
+from gmwm.calibration import tuning
 from gmwm.calibration.screening import SCREENING, screened, with_outcomes
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 AMBIGUITY = "ambiguity"
 """Code of the notice that several models describe a channel equally well."""
-
-_SAME_RATE = 1e-3
 
 
 @dataclass(frozen=True, repr=False)
@@ -291,7 +290,7 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             )
     first = recordings[0]
     for other in recordings[1:]:
-        if abs(other.rate / first.rate - 1.0) > _SAME_RATE:
+        if abs(other.rate / first.rate - 1.0) > tuning.SAME_RATE:
             raise InputError(
                 f"{other.source} has {other.rate:g} Hz and {first.source} {first.rate:g} Hz: "
                 "calibrate recordings of different rates one by one"

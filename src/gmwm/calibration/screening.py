@@ -9,6 +9,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
 from gmwm.diagnosis import Health, health
 from gmwm.errors import InputError
 from gmwm.process import Model, Process, Resonance, Sinusoid
@@ -18,9 +19,6 @@ SCREENING = ("events", "lines", "resonances", "outliers")
 """Samples of shocks and spikes are masked; lines and resonances are terms that a model may have;
 the wavelet variances of channels with outliers all over the record are robust."""
 
-_TORN = 32  # times the longest run that masks leave
-_MOST_TERMS = 2  # a channel; each doubles the number of candidate models
-_SAME_FREQUENCY = 0.02  # of a line in several recordings of one sensor
 _ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
 
 
@@ -94,7 +92,7 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
 
 def _is_torn(whole: Channel, masked: Channel) -> bool:
     """Whether masks leave no run that is long beside the longest there was."""
-    return _longest_run(masked.values) * _TORN < _longest_run(whole.values)
+    return _longest_run(masked.values) * tuning.TORN < _longest_run(whole.values)
 
 
 def _longest_run(values: FloatArray) -> int:
@@ -131,7 +129,7 @@ def _terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Proces
         ]
         # A resonance costs more of the fit than the weaker lines do.
         terms = broad[:1] + terms + broad[1:]
-    return tuple(terms[:_MOST_TERMS])
+    return tuple(terms[: tuning.MOST_TERMS])
 
 
 def with_outcomes(
@@ -173,4 +171,4 @@ def _holds(terms: Sequence[Process], notice: Notice) -> bool:
     kind = Sinusoid if notice.code == "line" else Resonance
     found = notice.values["frequency"]
     frequencies = [term.values["frequency"] for term in terms if isinstance(term, kind)]
-    return any(f is not None and abs(f / found - 1.0) < _SAME_FREQUENCY for f in frequencies)
+    return any(f is not None and abs(f / found - 1.0) < tuning.SAME_FREQUENCY for f in frequencies)

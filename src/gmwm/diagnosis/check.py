@@ -9,22 +9,21 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.typing import BoolArray, FloatArray, Progress
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import contamination, contamination_notice
 from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events
-from gmwm.diagnosis.innovations import FEWEST, Innovations, innovations
+from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
-from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM, background, bands, spectrum
+from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
 
-_LONG_ENOUGH = 3600.0  # s: slow errors of inertial sensors have correlation times of minutes
-_JITTER, _LARGE_JITTER = 0.1, 0.3  # of a sampling interval, rms
 _SEVERE = ("warning", "bad")
 
 
@@ -107,7 +106,7 @@ def _length(recording: Recording) -> Notice:
     length = recording.duration
     text = f"{recording.n:,} samples at {recording.rate:g} Hz, {length:.6g} s"
     numbers = {"duration": length, "rate": recording.rate}
-    if length < _LONG_ENOUGH:
+    if length < tuning.LONG_RECORD:
         return Notice(
             "length",
             "note",
@@ -122,9 +121,9 @@ def _length(recording: Recording) -> Notice:
 def _clock(recording: Recording) -> list[Notice]:
     """Time stamps that come unevenly; small jitter is told by the reader's note alone."""
     jitter = recording.jitter
-    if jitter is None or jitter < _JITTER:
+    if jitter is None or jitter < tuning.JITTER:
         return []
-    severity: Severity = "warning" if jitter > _LARGE_JITTER else "note"
+    severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
     text = f"the steps of the time stamps vary by {100.0 * jitter:.2g} % rms"
     action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
     return [Notice("clock", severity, "", text, {"jitter": jitter}, action)]
@@ -152,7 +151,7 @@ def _examined(channel: Channel) -> _Examined:
     step = step_size(present)
     errors = innovations(values, step)
     if errors is None:
-        text = f"fewer than {FEWEST} samples in a row: nothing more can be said"
+        text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row: nothing more can be said"
         return _Examined(
             [Notice("length", "warning", name, text, action="record longer")],
             ChannelHealth(lsb=step),
@@ -192,7 +191,10 @@ def _examined(channel: Channel) -> _Examined:
 
 def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
     """Lines, and resonances of what they leave."""
-    if values.size < FEWEST_OF_SPECTRUM or np.count_nonzero(~np.isnan(values)) < values.size / 2:
+    if (
+        values.size < tuning.FEWEST_OF_SPECTRUM
+        or np.count_nonzero(~np.isnan(values)) < values.size / 2
+    ):
         return (), ()
     power = spectrum(values, dt)
     if not np.any(power.density > 0.0):

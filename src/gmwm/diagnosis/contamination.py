@@ -12,12 +12,10 @@ import numpy as np
 from scipy.stats import binom, norm
 
 from gmwm._core.notices import Notice
-from gmwm.diagnosis.events import FALSE_ALARM
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 
-_FAR = 4.0  # robust standard deviations
-_NOISE = 2.0 * float(norm.sf(_FAR))  # share of Gaussian noise beyond
-_HARMFUL = 1e-3  # share of outliers; they add 16 times as much to the variance, or more
+_NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond
 
 
 def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> float:
@@ -39,11 +37,11 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
     for start, stop in events:
         outside[start:stop] = False
     # What rounding can add to an error is taken from it.
-    far = np.abs(errors.values) - errors.rounding > _FAR * errors.scale
+    far = np.abs(errors.values) - errors.rounding > tuning.FAR * errors.scale
     count = int(np.count_nonzero(far & outside)) + len(events)
     known = int(np.count_nonzero(errors.known))
-    is_chance = bool(binom.sf(count - 1, known, _NOISE) > FALSE_ALARM)
-    return 0.0 if is_chance or count <= _HARMFUL * known else count / known
+    is_chance = bool(binom.sf(count - 1, known, _NOISE) > tuning.FALSE_ALARM)
+    return 0.0 if is_chance or count <= tuning.HARMFUL_OUTLIERS * known else count / known
 
 
 def contamination_notice(name: str, share: float) -> Notice | None:

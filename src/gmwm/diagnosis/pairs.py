@@ -10,18 +10,9 @@ from scipy.stats import norm, t as t_distribution
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, inner
-from gmwm.diagnosis.drift import PARTS, part_means
-from gmwm.diagnosis.innovations import FEWEST
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.drift import part_means
 from gmwm.readers import Recording
-
-FALSE_ALARM = 1e-3
-"""Chance of a notice where no two channels depend on each other."""
-
-_WORTH_A_WORD = 0.05
-_STRONG = 0.3
-_CLIP = 4.0  # standard deviations
-_FEWEST_PARTS = 16
-_PART = 32  # samples
 
 
 def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
@@ -38,18 +29,20 @@ def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
     """
     pairs = list(combinations(errors, 2))
     # Zero counts for nothing in a sum of products.
-    clipped = {name: np.nan_to_num(np.clip(e, -_CLIP, _CLIP)) for name, e in errors.items()}
+    clipped = {
+        name: np.nan_to_num(np.clip(e, -tuning.CLIP, tuning.CLIP)) for name, e in errors.items()
+    }
     notices = []
     for one, other in pairs:
         a, b = clipped[one], clipped[other]
         n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
-        if n < FEWEST:
+        if n < tuning.FEWEST_KNOWN:
             continue
         r = inner(a, b) / np.sqrt(inner(a, a) * inner(b, b))
-        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * FALSE_ALARM / len(pairs)):
+        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * tuning.FALSE_ALARM / len(pairs)):
             continue
-        if abs(r) > _WORTH_A_WORD:
-            severity: Severity = "warning" if abs(r) > _STRONG else "note"
+        if abs(r) > tuning.CORRELATED:
+            severity: Severity = "warning" if abs(r) > tuning.STRONGLY_CORRELATED else "note"
             notices.append(
                 Notice(
                     "crosstalk",
@@ -70,7 +63,7 @@ def temperature_notices(recording: Recording) -> list[Notice]:
     the same direction does not count.
     """
     thermometers = [c for c in recording.values() if c.quantity == "temperature"]
-    if recording.n < PARTS * _PART or not thermometers:
+    if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:
         return []
     pairs = len(thermometers) * len(recording.inertial)
     # Thermometers are often slower than the other sensors.
@@ -101,10 +94,10 @@ def _correlation(
     """Student's t, correlation and slope, if there is a correlation."""
     known = ~np.isnan(warmer + step)
     n = int(np.count_nonzero(known))
-    if n < _FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
+    if n < tuning.FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
         return []
     r = float(np.corrcoef(warmer[known], step[known])[0, 1])
     size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-    if size <= t_distribution.isf(0.5 * FALSE_ALARM / pairs, n - 2):
+    if size <= t_distribution.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
         return []
     return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

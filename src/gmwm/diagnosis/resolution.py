@@ -7,13 +7,9 @@ import numpy as np
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, inner
+from gmwm.diagnosis import tuning
 
-_LOOKED_AT = 65_536  # samples; a lattice shows in fewer
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
-_CLOSE = 1.5  # steps up to this many times the smallest are counted as one step
-_DIVISORS = range(1, 7)  # the smallest difference seen may be a few steps
-_OFF_LATTICE = 0.1  # rms distance from the lattice, in steps; numbers at random have 0.29
-_FEWEST = 8  # levels that prove a lattice by their places alone
 
 
 def step_size(values: FloatArray) -> float:
@@ -32,7 +28,7 @@ def step_size(values: FloatArray) -> float:
     float
         In the unit of ``values``; 0 if there is none.
     """
-    stride = -(-values.size // _LOOKED_AT)
+    stride = -(-values.size // tuning.LEVELS_SAMPLED)
     part = values[::stride]
     levels = np.unique(part)
     if levels.size < 2:
@@ -40,13 +36,13 @@ def step_size(values: FloatArray) -> float:
     differences = np.diff(levels)
     differences = differences[differences > _SMALLEST * (levels[-1] - levels[0])]
     smallest = float(np.min(differences))
-    first = float(np.median(differences[differences <= _CLOSE * smallest]))
+    first = float(np.median(differences[differences <= tuning.ONE_STEP * smallest]))
     # Few levels that come again and again are steps whatever their places.
-    if levels.size < _FEWEST and levels.size > part.size / 2:
+    if levels.size < tuning.FEWEST_LEVELS and levels.size > part.size / 2:
         return 0.0
-    for divisor in _DIVISORS:
+    for divisor in tuning.DIVISORS:
         step, off = _lattice(levels, first / divisor)
-        if off <= _OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
+        if off <= tuning.OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
             return step
     return 0.0
 

@@ -11,17 +11,9 @@ from scipy.stats import binom
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import spoken
 from gmwm._core.typing import FloatArray, IntArray
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 from gmwm.readers import Channel
-
-FALSE_ALARM = 1e-3
-"""Chance of a stuck value or of saturation in a channel of Gaussian noise."""
-
-_MUCH_MISSING = 0.1
-_TOO_MUCH_MISSING = 0.5
-_DITHERED = 0.05  # share of differences of two steps and more at which noise tells samples apart
-_LONG = 32  # equal samples in a row that are not asked whether noise tells samples apart
-_FEWEST_AT_END = 8
 
 
 def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
@@ -55,9 +47,9 @@ def _gap_notice(channel: Channel, dt: float) -> Notice | None:
         f"{missing:,} of {channel.n:,} samples missing ({share:.2g} of all) in {lengths.size:,} "
         f"gap{plural}, the longest {values['longest']:.3g} s"
     )
-    if share > _TOO_MUCH_MISSING:
+    if share > tuning.TOO_MUCH_MISSING:
         return Notice("gap", "bad", channel.name, text, values, "too few are left: record again")
-    severity: Severity = "warning" if share > _MUCH_MISSING else "note"
+    severity: Severity = "warning" if share > tuning.MUCH_MISSING else "note"
     action = "the wavelet variance leaves out what gaps touch"
     return Notice("gap", severity, channel.name, text, values, action)
 
@@ -87,11 +79,11 @@ def is_dithered(values: FloatArray, step: float) -> bool:
         To which they are rounded, u; 0 if they are not.
     """
     lengths = run_lengths(values)
-    free = np.repeat(lengths < _LONG, lengths)
+    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     steps = np.abs(np.diff(values))[free[1:] & free[:-1]]
-    if steps.size < _LONG:
+    if steps.size < tuning.LONG_RUN:
         return False
-    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > _DITHERED
+    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > tuning.DITHERED
 
 
 def run_lengths(values: FloatArray) -> IntArray:
@@ -148,7 +140,7 @@ def stuck_notice(
         f"stuck {many} at {value} for {lengths[worst]:,} samples from "
         f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
     ).replace("  ", " ")
-    severity: Severity = "bad" if share > _MUCH_MISSING else "warning"
+    severity: Severity = "bad" if share > tuning.MUCH_MISSING else "warning"
     return Notice(
         "stuck", severity, name, text, numbers, "make such samples missing (NaN) before the fit"
     )
@@ -156,7 +148,7 @@ def stuck_notice(
 
 def _scale_between(errors: Innovations, present: IntArray, lengths: IntArray) -> float:
     """Usual standard deviation of prediction errors outside long runs."""
-    free = np.repeat(lengths < _LONG, lengths)
+    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     kept = present[free]
     kept = kept[errors.known[kept]]
     sizes = errors.values[kept]
@@ -173,7 +165,7 @@ def _longest_by_chance(n: int, step: float, scale: float) -> int:
     fewest = 3  # equal numbers of a file with few digits
     if same <= 0.0:
         return fewest
-    return max(int(np.ceil(np.log(FALSE_ALARM / n) / np.log(same))) + 1, fewest)
+    return max(int(np.ceil(np.log(tuning.FALSE_ALARM / n) / np.log(same))) + 1, fewest)
 
 
 def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> Notice | None:
@@ -210,7 +202,7 @@ def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> 
         ]
         fall = _slowest_fall(*next_two)
         chance = float(binom.sf(last - 1, last + next_two[0], fall / (1.0 + fall)))
-        if last >= _FEWEST_AT_END and chance < 0.5 * FALSE_ALARM:
+        if last >= tuning.FEWEST_AT_END and chance < 0.5 * tuning.FALSE_ALARM:
             ends[end] = last
     if not ends:
         return None
@@ -219,7 +211,7 @@ def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> 
     where = " and ".join(spoken(end, unit, digits=5) for end in ends)
     return Notice(
         "saturation",
-        "bad" if share > FALSE_ALARM else "warning",
+        "bad" if share > tuning.FALSE_ALARM else "warning",
         name,
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},

@@ -22,8 +22,9 @@ import numpy.typing as npt
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.names import AXES, CANONICAL, meaning
-from gmwm.readers.table import FEWEST, LARGEST, label, usable
+from gmwm.readers.table import LARGEST, label, usable
 
 _AnyArray = npt.NDArray[Any]
 _Column = tuple[str, _AnyArray]
@@ -229,7 +230,7 @@ def _columns_of_entries(source: str, entries: Mapping[str, _AnyArray]) -> list[_
 
 def _unnamed(source: str, array: _AnyArray) -> list[_Column]:
     rows, width = array.shape
-    if width > rows and width >= FEWEST:
+    if width > rows and width >= tuning.FEWEST_SAMPLES:
         raise InputError(
             f"{source} has shape {array.shape}: samples run along the rows here, save array.T"
         )

@@ -11,18 +11,17 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.jumps import Jumps, find_jumps
 
 _UNITS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
-_AGREEMENT = 0.01
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
-_SHORTEST_USUAL = 0.499  # of the median; rounded stamps come to one half, give or take a hair
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
 
 def agree(rate: float, other: float) -> bool:
     """Whether two rates are the same within 1 %."""
-    return abs(rate / other - 1.0) <= _AGREEMENT
+    return abs(rate / other - 1.0) <= tuning.RATES_AGREE
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ class Clock:
 
     def _check_not_short(self, steps: FloatArray) -> None:
         median = float(np.median(steps))
-        bad = np.flatnonzero(~(steps >= _SHORTEST_USUAL * median))
+        bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median))
         if bad.size:
             row = int(bad[0]) + 1
             raise InputError(

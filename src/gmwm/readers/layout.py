@@ -10,12 +10,12 @@ from statistics import mode
 
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, number, split_header, split_line
 from gmwm.readers.names import meaning
 from gmwm.readers.table import FORMATS
 
 _COMMENT_MARKS = ("#", "%")
-_SAMPLE = 100  # lines looked at
 _DELIMITERS = (";", "\t", ",", BLANKS)  # of two that explain the lines equally well, the first
 _UTF8_MARK = b"\xef\xbb\xbf"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -148,7 +148,7 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
             if not lines:
                 _check_utf8(source, i, raw)
             lines.append(_Line(i, found.start(), text))
-            if len(lines) == _SAMPLE:
+            if len(lines) == tuning.LINES_OF_LAYOUT:
                 break
         else:
             comments.append(_Line(i, found.start(), text))

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from gmwm._core.units import quantity_of
+from gmwm._core.units import auxiliary_unit, quantity_of
 from gmwm.errors import InputError
-from gmwm.readers.auxiliary import auxiliary_unit
 
 AXES = ("x", "y", "z")
 CANONICAL = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in AXES)

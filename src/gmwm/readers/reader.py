@@ -15,6 +15,7 @@ from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
@@ -22,7 +23,7 @@ from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import meaning
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
-from gmwm.readers.table import FEWEST, Table, label
+from gmwm.readers.table import Table, label
 
 
 def read(
@@ -167,11 +168,11 @@ def _auxiliary(column: AuxiliaryColumn, values: FloatArray, dt: float) -> Channe
 def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
-    if most < FEWEST:
+    if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
         raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least {FEWEST} are needed: "
-            "record longer"
+            f"{table.source} has {most} samples{of_any} where at least {tuning.FEWEST_SAMPLES} are "
+            "needed: record longer"
         )
 
 

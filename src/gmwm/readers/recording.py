@@ -10,11 +10,9 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import SI_UNIT, factor, quantity_of
+from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError
-from gmwm.readers.auxiliary import AUXILIARY, AuxiliaryUnit, auxiliary_unit
-
-_SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
+from gmwm.readers import tuning
 
 READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
@@ -143,8 +141,8 @@ class Recording(Mapping[str, Channel]):
             If the rate is not positive, a unit is missing or unknown, or the channels are not
             series of numbers of one length, none infinite.
         """
-        if not _SLOWEST <= rate <= _FASTEST:
-            limits = f"{_SLOWEST:g} to {_FASTEST:g}"
+        if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
+            limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
             raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
         channels = []
         for name, values in arrays.items():

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gmwm._core.notices import Notice
-from gmwm._core.units import SI_UNIT
+from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit
 from gmwm.errors import InputError
-from gmwm.readers.auxiliary import AUXILIARY, AuxiliaryUnit, auxiliary_unit
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import label
 

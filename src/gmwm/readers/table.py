@@ -13,8 +13,6 @@ from gmwm._core.typing import FloatArray
 FORMATS = "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ"
 """For messages about files of another kind."""
 
-FEWEST = 64
-"""Samples below which no variance is worth computing."""
 
 LARGEST = 1e150
 """Magnitudes from here on are refused like infinities: their squares overflow."""

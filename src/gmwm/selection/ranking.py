@@ -20,6 +20,7 @@ from gmwm.estimate.problem import (
     bias_of_detrending,
     chi_square,
     gls_slope,
+    slope_p_value,
     weight_root,
 )
 from gmwm.estimate.result import Fit
@@ -154,6 +155,8 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     ramped: list[Candidate] = []
     if without > tuning.RAMP_PLAUSIBLE:
         target, drift_free = _drift_free(wv, slope, choices)
+        if slope_p_value(wv, drift_free.mixture.psd) > tuning.RAMP_P:
+            return [candidate for candidate, _ in plain]
         if drift_free.discrepancy < allowed:
             # Both kinds must be compared under the same allowance.
             allowed = drift_free.discrepancy

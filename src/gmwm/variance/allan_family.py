@@ -20,13 +20,12 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import Channel
+from gmwm.variance import tuning
 from gmwm.variance.analysis import as_channel, checked_samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEAST_FOR_SLOPE = 100  # averages of which the kind of noise is told
-_LEAST_DOF = 0.5
 # Of the total variance, by the power law of the spectrum: degrees of freedom b T/tau - c, and bias
 # 1 - a tau/T (Greenhall, Howe & Percival 1999, IEEE Trans. UFFC 46, 1183-1191).
 _TOTAL = {0: (1.5, 0.0, 0.0), -1: (1.17, 0.22, 1.0 / (3.0 * np.log(2.0))), -2: (0.93, 0.36, 0.75)}
@@ -322,7 +321,7 @@ def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:
     slopes: list[int] = []
     for m in averaging.astype(int):
         count = values.size // m
-        if count >= _LEAST_FOR_SLOPE or not slopes:
+        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
             slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
         else:
             slopes.append(slopes[-1])
@@ -364,7 +363,7 @@ def _distribution(
             if size > n / 8:  # at shorter averaging times it is the Allan variance all but exactly
                 dof[i] = max(dof[i], b * n / size - c)
             bias[i] -= a * size / n
-    return np.maximum(dof, _LEAST_DOF), bias
+    return np.maximum(dof, tuning.LEAST_DOF_OF_FAMILY), bias
 
 
 def _greenhall(allantools: ModuleType, kind: _Kind, n: int, m: int, slope: int) -> float:

@@ -6,7 +6,7 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import Channel, RandomWalk, Recording, WhiteNoise
-from gmwm.diagnosis.drift import FALSE_ALARM
+from gmwm.diagnosis.tuning import FALSE_ALARM
 
 DT = 0.01
 

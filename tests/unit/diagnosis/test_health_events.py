@@ -6,8 +6,9 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, Resonance, WhiteNoise
-from gmwm.diagnosis.events import FALSE_ALARM, find_events
+from gmwm.diagnosis.events import find_events
 from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 
 DT = 0.01

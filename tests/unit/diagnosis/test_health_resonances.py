@@ -16,7 +16,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.diagnosis.resonances import FALSE_ALARM
+from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 
 DT = 0.01

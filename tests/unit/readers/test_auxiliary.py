@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import InputError, Recording, read
-from gmwm.readers.auxiliary import auxiliary_unit
+from gmwm._core.units import auxiliary_unit
 from gmwm.readers.names import meaning
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

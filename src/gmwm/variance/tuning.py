@@ -1,0 +1,65 @@
+"""Constants of the variances and their covariances, each with its source or its reason."""
+
+# -- the Allan family -----------------------------------------------------------------------------
+
+LEAST_FOR_SLOPE = 100
+"""Averages from which the kind of noise is identified; with fewer, that of the level before."""
+
+LEAST_DOF_OF_FAMILY = 0.5
+"""Degrees of freedom of an interval that says nothing."""
+
+# -- the spectrum that wavelet variances imply ----------------------------------------------------
+
+PILOT_ITERATIONS = 12
+"""Rounds of scaling; the last changes no level by as much as its error."""
+
+PILOT_STEP = 0.8
+"""Part of the way, in logarithms: neighbouring levels share frequencies, and whole steps
+oscillate."""
+
+PILOT_STEEPEST = 2.5
+"""Power of the frequency from level to level; the steepest process (a random walk) has 2."""
+
+HAAR_PEAK = 0.37
+"""The Haar gain of averaging time tau peaks at f = 0.37/tau."""
+
+# -- covariances by lags --------------------------------------------------------------------------
+
+EXACT_SAMPLES = 2048
+"""Longest record whose lags are single samples; longer ones are taken in blocks."""
+
+BLOCKS = 1024
+"""Blocks of a longer record; its coarse levels are computed from their means."""
+
+BLOCKS_PER_AVERAGE = 8
+"""Blocks of the shortest averaging time that is computed so; shorter ones have the spectral
+integral."""
+
+FOLDS = 2
+"""Aliases on either side of a block's spectrum; the block mean suppresses farther ones."""
+
+LEAST_LAGS = 2048
+"""Lags for other wavelets: memory may be longer than a short record."""
+
+BINS_PER_OCTAVE = 8
+"""Of the smoothed empirical covariance."""
+
+# -- covariances of the robust variances ----------------------------------------------------------
+
+ROBUST_REACH = 4
+"""Levels apart that are summed by lags: farther ones add 2^(-3d/2) or less."""
+
+ROBUST_LAGS = 2048
+"""Lags of a grid."""
+
+ROBUST_FIRST_LEVELS = 7
+"""Levels of 1 to 64 samples, on the samples themselves."""
+
+ROBUST_LEVELS_PER_GRID = 3
+"""Levels that share a coarser grid."""
+
+ROBUST_BLOCKS_PER_AVERAGE = 16
+"""Blocks of the finest level of a coarser grid."""
+
+NEGLIGIBLE_POWER = 1e-5
+"""Part of the excess below which powers of the correlation are left out."""
