@@ -648,7 +648,7 @@ def made_up(name, model, stderr, bounds=None, notices=()):
     return Fit(
         model=as_model(model), wv=wv, keys=tuple(stderr), upper_bounds=bounds or {},
         covariance=np.diag(np.square(list(stderr.values()))), objective=7.0, dof=8,
-        chi_square=7.344, discrepancy=0.0, method="gmwm", weights="model",
+        chi_square=7.344, chi_square_allowed=7.344, discrepancy=0.0, method="gmwm", weights="model",
         notices=tuple(notices),
     )  # fmt: skip
 

@@ -285,8 +285,8 @@ def _check_together(recordings: Sequence[Recording]) -> None:
     for each in recordings:
         if not isinstance(each, Recording):
             raise InputError(
-                f"{checks.shown(each)} is no recording: give what gmwm.read returns, or make one "
-                "with Recording.from_arrays"
+                f"{checks.shown(each)} is not a recording: give what gmwm.read returns, or "
+                "make one with Recording.from_arrays"
             )
     first = recordings[0]
     for other in recordings[1:]:

@@ -68,8 +68,8 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """
     if not isinstance(recording, Recording):
         raise InputError(
-            f"{checks.shown(recording)} is no recording: give what gmwm.read returns, or make one "
-            "with Recording.from_arrays"
+            f"{checks.shown(recording)} is not a recording: give what gmwm.read returns, or "
+            "make one with Recording.from_arrays"
         )
     # What is missing is counted anew, channel by channel.
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
@@ -119,7 +119,7 @@ def _length(recording: Recording) -> Notice:
 
 
 def _clock(recording: Recording) -> list[Notice]:
-    """Time stamps that come unevenly; small jitter is told by the reader's note alone."""
+    """Time stamps that come unevenly; for small jitter the notice of the reader is enough."""
     jitter = recording.jitter
     if jitter is None or jitter < tuning.JITTER:
         return []
@@ -151,7 +151,7 @@ def _examined(channel: Channel) -> _Examined:
     step = step_size(present)
     errors = innovations(values, step)
     if errors is None:
-        text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row: nothing more can be said"
+        text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
         return _Examined(
             [Notice("length", "warning", name, text, action="record longer")],
             ChannelHealth(lsb=step),
@@ -200,12 +200,12 @@ def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump,
     if not np.any(power.density > 0.0):
         return (), ()
     lines = find_lines(power, background(power, bands(power)))
-    taken = np.zeros(power.density.size, dtype=bool)
+    occupied = np.zeros(power.density.size, dtype=bool)
     for line in lines:
         margin = (line.stop - line.start) // 2
-        taken[max(line.start - margin, 0) : line.stop + margin] = True
-    rest = bands(power, taken)
-    return lines, find_resonances(power, rest, background(power, rest), taken)
+        occupied[max(line.start - margin, 0) : line.stop + margin] = True
+    rest = bands(power, occupied)
+    return lines, find_resonances(power, rest, background(power, rest), occupied)
 
 
 def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:

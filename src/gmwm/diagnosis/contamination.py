@@ -36,7 +36,7 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
     outside = errors.known.copy()
     for start, stop in events:
         outside[start:stop] = False
-    # What rounding can add to an error is taken from it.
+    # What rounding can add to an error is subtracted.
     far = np.abs(errors.values) - errors.rounding > tuning.FAR * errors.scale
     count = int(np.count_nonzero(far & outside)) + len(events)
     known = int(np.count_nonzero(errors.known))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import f as f_distribution, norm
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -74,13 +74,13 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
             "drift",
             "warning",
             name,
-            f"drifts by {spoken(change, unit, sign=True)} over the record, and wanders about "
-            f"that by {spoken(wander, unit)} rms",
+            f"drifts by {readable(change, unit, sign=True)} over the record, and wanders about "
+            f"that by {readable(wander, unit)} rms",
             numbers,
             "add a RateRamp to the model, or leave out the warm-up",
         )
     text = (
-        f"means of {size * dt:.3g} s wander by {spoken(wander, unit)} rms, {ratio:.2g} times "
+        f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {ratio:.2g} times "
         "what the fast noise leaves"
     )
     action = "estimated as random walk or slow Gauss-Markov process"

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import norm
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -92,7 +92,7 @@ def event_notice(
     length = (stop - start) * dt
     many = len(events) > 1
     which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
-    height = spoken(heights[largest], unit, sign=True)
+    height = readable(heights[largest], unit, sign=True)
     text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
     if 1 < len(events) <= _LISTED + 1:
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]

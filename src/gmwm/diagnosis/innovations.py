@@ -1,7 +1,7 @@
-"""What each sample brings that those before it do not foretell.
+"""What cannot be predicted of each sample from those before it.
 
-Spikes, stuck values and changes of the noise are told apart from the noise of a sensor where that
-noise is white. An autoregression of the first differences makes it so, whether it was white, a
+Spikes, stuck values and changes of the noise are distinguished from the noise of a sensor where
+that noise is white. An autoregression of the first differences makes it so, whether it was white, a
 random walk or a resonance; outliers are clipped before it is fitted.
 """
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.spectrum import POWER_INFLATION, Spectrum
@@ -89,7 +89,7 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
     families = _families(lines)
     notices = []
     for main, harmonics in families[: tuning.NAMED_LINES]:
-        amplitude = spoken(main.amplitude, unit)
+        amplitude = readable(main.amplitude, unit)
         text = (
             f"a periodic line at {main.frequency:.4g} Hz, amplitude {amplitude}, "
             f"{main.ratio:.3g} times its surroundings"
@@ -118,7 +118,7 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
         strongest = rest[0][0]
         text = (
             f"{len(rest)} weaker periodic line{'s' if len(rest) > 1 else ''}, the strongest at "
-            f"{strongest.frequency:.4g} Hz, amplitude {spoken(strongest.amplitude, unit)}"
+            f"{strongest.frequency:.4g} Hz, amplitude {readable(strongest.amplitude, unit)}"
         )
         numbers = {
             "count": float(len(rest)),

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import norm, t as t_distribution
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.drift import part_means
@@ -79,7 +79,7 @@ def temperature_notices(recording: Recording) -> list[Notice]:
         if found:
             _, r, slope, thermometer = max(found, key=lambda one: one[0])
             text = (
-                f"follows {thermometer.name} by {spoken(slope, channel.unit)} per "
+                f"follows {thermometer.name} by {readable(slope, channel.unit)} per "
                 f"{thermometer.unit or 'unit'} (correlation {r:.2g})"
             )
             values = {"correlation": r, "slope": slope}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 
@@ -72,14 +72,14 @@ def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice
     step : float
         u; 0 if there is none.
     scatter : float
-        Standard deviation of what cannot be foreseen from the samples before, rounding included,
+        Standard deviation of what cannot be predicted from the samples before, rounding included,
         u.
     """
     if step == 0.0:
         return None
     noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
-    text = f"samples come in steps of {spoken(step, unit)}"
+    text = f"samples come in steps of {readable(step, unit)}"
     if noise < step / 3.0:
         return Notice(
             "rounding",
@@ -90,7 +90,7 @@ def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice
             "nothing mends it: the noise below the step cannot be estimated; use a finer range",
         )
     ratio = step / noise
-    text = f"{text}, {ratio:.2g} times the white noise of {spoken(noise, unit)}"
+    text = f"{text}, {ratio:.2g} times the white noise of {readable(noise, unit)}"
     if ratio > 1.0:
         return Notice(
             "rounding",

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import binom
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import spoken
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -62,7 +62,7 @@ def dead_notice(channel: Channel) -> Notice | None:
         "dead",
         "bad",
         channel.name,
-        f"every sample is {spoken(channel.mean, channel.unit, digits=6)}: the channel is dead",
+        f"every sample is {readable(channel.mean, channel.unit, digits=6)}: the channel is dead",
         {"value": channel.mean},
         "check sensor and columns; it is skipped in the calibration",
     )
@@ -134,7 +134,7 @@ def stuck_notice(
         "value": float(series[starts[worst]]),
         "samples": float(total),
     }
-    value = spoken(numbers["value"], unit, digits=5)
+    value = readable(numbers["value"], unit, digits=5)
     many = f"{stuck.size:,} times, the longest" if stuck.size > 1 else ""
     text = (
         f"stuck {many} at {value} for {lengths[worst]:,} samples from "
@@ -208,7 +208,7 @@ def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> 
         return None
     count = sum(ends.values())
     share = count / values.size
-    where = " and ".join(spoken(end, unit, digits=5) for end in ends)
+    where = " and ".join(readable(end, unit, digits=5) for end in ends)
     return Notice(
         "saturation",
         "bad" if share > tuning.FALSE_ALARM else "warning",

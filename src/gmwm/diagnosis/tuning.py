@@ -17,7 +17,7 @@ MUCH_MISSING, TOO_MUCH_MISSING = 0.1, 0.5
 """Fraction of samples missing (or stuck) for a warning, and above which a channel is of no use."""
 
 DITHERED = 0.05
-"""Fraction of differences of two steps and more at which noise tells samples apart."""
+"""Fraction of differences of two steps and more at which noise distinguishes samples."""
 
 LONG_RUN = 32
 """Equal samples in a row that are left out of that fraction."""
@@ -114,7 +114,7 @@ FEWEST_LEVELS = 8
 # -- the spectrum ---------------------------------------------------------------------------------
 
 FEWEST_OF_SPECTRUM = 512
-"""Samples below which there is no spectrum worth a look."""
+"""Samples below which there is no useful spectrum."""
 
 FIRST_BIN = 20
 """First bin that is looked at: slower than a twentieth of the record is drift, not a line."""

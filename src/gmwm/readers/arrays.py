@@ -34,7 +34,7 @@ _ZIP_MAGIC = b"PK"
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
 
-# Stands for an entry of an NPZ file that is no plain array: it does no harm unless it is wanted.
+# Stands for an entry of an NPZ file that is not a plain array: it does no harm unless it is wanted.
 _OBJECTS = np.empty(0, dtype=object)
 _KINDS = {
     "O": "Python objects",
@@ -49,7 +49,7 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class ArrayTable:
-    """Columns taken from arrays."""
+    """Columns of arrays."""
 
     source: str
     names: tuple[str, ...]
@@ -65,7 +65,7 @@ class ArrayTable:
         Raises
         ------
         InputError
-            If it is damaged, or its arrays are no columns.
+            If it is damaged, or its arrays are not columns.
         """
         source, rate = path.name, None
         if path.suffix.lower() == ".npz":
@@ -166,7 +166,7 @@ def _load_npz(path: Path) -> dict[str, _AnyArray]:
     # Opened here: numpy leaves a damaged archive open.
     with _damage_named(path.name), path.open("rb") as stream:
         magic = stream.read(len(_ZIP_MAGIC))
-        # Without the magic number at the beginning, numpy would take it for pickled objects.
+        # Without the magic number at the beginning, numpy would read it as pickled objects.
         if magic == _ZIP_MAGIC and zipfile.is_zipfile(stream):
             stream.seek(0)
             with np.load(stream, allow_pickle=False) as archive:

@@ -113,11 +113,11 @@ class Clock:
         if expected is not None and not agree(rate, expected):
             raise InputError(
                 f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated: "
-                "leave out the rate to take that of the stamps, or give time=False to ignore them"
+                "leave out the rate to use that of the stamps, or give time=False to ignore them"
             )
         text = (
             f"time stamps (column {self.column}, {_UNITS[seconds]}"
-            f"{' as far as the steps tell' if guessed else ''}) give {rate:.6g} Hz; their steps "
+            f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)"
         )
         values = {"rate": rate, "unit": seconds, "jitter": jitter / step}
@@ -129,8 +129,8 @@ class Clock:
         if bad.size:
             others = f", and {bad.size - 1:,} more such" if bad.size > 1 else ""
             raise InputError(
-                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: take such lines "
-                f"out, or, {_WAY_OUT}",
+                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: remove such "
+                f"lines, or, {_WAY_OUT}",
                 "clock",
             )
 
@@ -141,7 +141,7 @@ class Clock:
             what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
             raise InputError(
                 f"{self.place}, {self.where(row)}: time stamp {self.stamps[row]:.15g} {what}: "
-                f"take such lines out, or, {_WAY_OUT}",
+                f"remove such lines, or, {_WAY_OUT}",
                 "clock",
             )
 

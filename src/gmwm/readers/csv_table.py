@@ -124,7 +124,7 @@ class _Infinite:
     count: int = 0
 
     def add(self, place: str, cell: str) -> None:
-        """Take note of one."""
+        """Count one."""
         self.count += 1
         self.first = self.first or f"{place}: {_excerpt(cell)}"
 
@@ -224,7 +224,7 @@ def _cells(table: CsvTable, place: str, text: str) -> list[str]:
     if len(cells) != width:
         raise InputError(
             f"{table.source}, {place}: {len(cells)} fields where {width} were expected: mend the "
-            "line or take it out"
+            "line or remove it"
         )
     return cells
 

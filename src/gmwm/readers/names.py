@@ -210,7 +210,7 @@ def _as_auxiliary(words: Sequence[str], bracket: str) -> Meaning | None:
 
 
 def _split_unit(words: Sequence[str]) -> tuple[list[str], str | None]:
-    """Take a unit of up to three words off the end: ``gyro x rad s``."""
+    """Split a unit of up to three words from the end: ``gyro x rad s``."""
     for size in (3, 2, 1):
         unit = _UNIT_WORDS.get("".join(words[-size:]))
         if unit and len(words) > size:

@@ -119,7 +119,7 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
     if table.rate is not None and not agree(rate, table.rate):
         raise InputError(
             f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
-            "the rate to take that of the file"
+            "the rate to use that of the file"
         )
     return rate
 

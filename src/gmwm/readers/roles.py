@@ -93,7 +93,7 @@ class Columns:
         """
         if isinstance(reference, bool) or not isinstance(reference, str | int):
             raise InputError(
-                f"{what} = {reference!r} is no column: give its name or its index counted from 0"
+                f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
             )
         if isinstance(reference, int):
             return self._checked(reference, what)
@@ -147,7 +147,7 @@ def assign_roles(
     tentative : bool
         Whether names that mean nothing may be overlooked.
     units : mapping of str to str
-        Those that the caller gave; they tell what one or three columns without names are.
+        Those that the caller gave; they decide what one or three columns without names are.
     channels, time
         As in `gmwm.read`.
 
@@ -165,15 +165,15 @@ def assign_roles(
         chosen = _named_channels(columns)
         stamps = _time_columns(columns)
         if not chosen:
-            taken = {given_time, *stamps}
-            rest = [i for i in range(len(columns.names)) if i not in taken]
+            known = {given_time, *stamps}
+            rest = [i for i in range(len(columns.names)) if i not in known]
             if not rest or (any(columns.names[i] for i in rest) and not tentative):
                 raise InputError(
                     f"{columns.source}: no column is known as a gyro's or an accelerometer's, "
                     f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}",
                     "channel-unknown",
                 )
-            chosen, stamp = _by_number(columns, rest, bool(taken - {None}), units)
+            chosen, stamp = _by_number(columns, rest, bool(known - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
     chosen_time = _choose_time(columns, given_time, stamps, time, notices)
     auxiliary = _given_auxiliary(columns, chosen, units)
@@ -280,7 +280,7 @@ def _by_number(
     sensors = [sensor for sensor in SI_UNIT if sensor in units]
     if len(sensors) != 1:
         raise InputError(
-            f"{columns.source}: column names do not tell whether this is a gyro or an "
+            f"{columns.source}: column names do not show whether this is a gyro or an "
             f'accelerometer: say it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
             "only one of them",
             "channel-unknown",

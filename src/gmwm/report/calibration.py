@@ -17,7 +17,7 @@ from gmwm.report.figure import deviation_figure, residual_figure
 from gmwm.report.health import ambiguity, health
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
-_DAYS, _YEARS = 5.0, 2.0  # from which on durations are told so
+_DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
 _AIM = 0.1  # relative standard error
 _MANY_YEARS = 100.0
 
@@ -119,13 +119,15 @@ def _fitness(fit: Fit) -> str:
     text = f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom"
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value:.2g}"
+        if fit.discrepancy > 0.0:
+            text += f" ({fit.p_value_allowed:.2g} with the discrepancy)"
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
 def needed(seconds: float | None, duration: float) -> str:
-    """Length of record that a parameter needs, in words; empty if nothing is to be said."""
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
     if seconds is None:
         return ""
     if seconds <= duration:

@@ -226,7 +226,7 @@ def candidate_of(fitted: Fit) -> Candidate:
     Candidates of such fits are less comparable than those of `rank`, whose weights are common.
     """
     p, dof = len(fitted.keys), fitted.dof
-    statistic = fitted.chi_square if dof > 0 else 0.0
+    statistic = fitted.chi_square_allowed if dof > 0 else 0.0
     criterion = statistic + _penalty(fitted.wv.n) * p
     return Candidate(fitted.model.opened(), criterion, fitted.objective, statistic, p, dof)
 

@@ -208,8 +208,8 @@ def select(
     on cube roots (see `gmwm.estimate.problem.whitening.chi_square`) with the penalty ``2 c p ln ln
     n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
     (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
-    without one pays the squared slope over its variance; it must win by a margin of 6, and its slope
-    must be no accident of a walk that the record does not resolve
+    without one pays the squared slope over its variance; it must win by a margin of 6, and its
+    slope must be no accident of a walk that the record does not resolve
     (`gmwm.estimate.problem.ramp.slope_p_value`). Terms that come out as zero
     make a model equal to a smaller one, and it is left out of the ranking. Models within 2 of the
     best are a tie, in which the smaller one wins. Of the best candidates the first one is chosen
@@ -293,7 +293,7 @@ def _simplest_by_own_fit(
 
 def _own_criterion(candidate: Candidate, fitted: Fit) -> float:
     """The criterion with the chi-square of the candidate's own fit."""
-    statistic = fitted.chi_square if fitted.dof > 0 else 0.0
+    statistic = fitted.chi_square_allowed if fitted.dof > 0 else 0.0
     return candidate.criterion - candidate.chi_square + statistic
 
 

@@ -1,9 +1,9 @@
 """Relatives of the Allan deviation, computed by allantools, with intervals of their own.
 
-They see the same noise through other filters: the modified deviation tells quantization from
-white noise, the Hadamard deviation does not see a drift, the total deviation reads long averaging
-times off a short record. Fits go by the wavelet variance, which is half the overlapping Allan
-variance; these serve those who compare with figures given in such terms.
+They see the same noise through other filters: the modified deviation distinguishes quantization
+from white noise, the Hadamard deviation does not see a drift, the total deviation reads long
+averaging times off a short record. Fits go by the wavelet variance, which is half the overlapping
+Allan variance; these serve those who compare with figures given in such terms.
 """
 
 from __future__ import annotations
@@ -208,7 +208,7 @@ def deviations(
     noise dominates and 21 % where a random walk does; its intervals allow for that.
 
     Every averaging time costs a pass over the data, for the total deviation over three times as
-    many: a million samples take some two seconds for all four kinds.
+    many: a million samples need some two seconds for all four kinds.
     """
     allantools = _allantools()
     channel, values = _checked(data, dt)
@@ -268,20 +268,20 @@ def _checked(data: Channel | FloatArray, dt: float | None) -> tuple[Channel, Flo
     if missing:
         raise InputError(
             f"{where} has {missing:,} missing samples: cut it to a part without any, or "
-            "take gmwm.wavelet_variance, whose Allan deviation copes with gaps"
+            "use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
         )
     return channel, checked_samples(channel)[0]
 
 
 def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
     if not isinstance(kinds, Iterable):
-        raise InputError(f"kinds = {kinds!r}: take some of {', '.join(_KINDS)}")
+        raise InputError(f"kinds = {kinds!r}: choose from {', '.join(_KINDS)}")
     names = [kinds] if isinstance(kinds, str) else list(kinds)
     for name in names:
         if not isinstance(name, str) or name not in _KINDS:
-            raise InputError(f"kind {name!r} is not known: take some of {', '.join(_KINDS)}")
+            raise InputError(f"kind {name!r} is not known: choose from {', '.join(_KINDS)}")
     if not names:
-        raise InputError(f"no kind of deviation is given: take some of {', '.join(_KINDS)}")
+        raise InputError(f"no kind of deviation is given: choose from {', '.join(_KINDS)}")
     return {name: _KINDS[name] for name in names}
 
 

@@ -252,14 +252,14 @@ class WaveletVariance:
 
     def _how(self) -> str:
         """What differs from the usual, for the head of a table."""
-        said = []
+        parts = []
         if self.present is not None:
-            said.append(f"{self.n - self.present.present:,} of them missing")
+            parts.append(f"{self.n - self.present.present:,} of them missing")
         if self.wavelet != "haar":
-            said.append(self.wavelet)
+            parts.append(self.wavelet)
         if self.efficiency < 1.0:
-            said.append(f"robust, efficiency {self.efficiency:g}")
-        return "".join(f", {part}" for part in said)
+            parts.append(f"robust, efficiency {self.efficiency:g}")
+        return "".join(f", {part}" for part in parts)
 
     def to_dict(self) -> dict[str, Any]:
         """All that is needed to make the object again, in JSON types; see `from_dict`."""

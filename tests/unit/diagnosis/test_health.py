@@ -67,6 +67,16 @@ def test_json_holds_everything(sick):
     assert content["worst"] == found.worst
 
 
+def test_a_file_comes_back_and_one_of_an_older_version_is_refused(sick, tmp_path):
+    found = gmwm.health(sick)
+    again = Health.load(found.save(tmp_path / "health.json"))
+    assert again.to_dict() == found.to_dict()
+    assert again.events("gyro_x") == found.events("gyro_x")
+    assert str(again) == str(found)
+    with pytest.raises(InputError, match="schema version 1 is not known here"):
+        Health.from_dict(found.to_dict() | {"schema_version": 1})
+
+
 def test_unknown_channel_lists_those_there_are(sick):
     found = gmwm.health(sick)
     for ask in (found.lines, found.events, found.resonances, found.lsb):

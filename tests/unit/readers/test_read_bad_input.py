@@ -299,7 +299,7 @@ def test_no_such_column(write, samples, option, reference):
 @pytest.mark.parametrize("reference", [True, None, 1.0, ["a"]])
 def test_no_column_at_all(write, samples, reference):
     message = problem(write(samples), channels={"gyro_x": reference})
-    assert f"gyro_x = {reference!r} is no column: give its name or its index" in message
+    assert f"gyro_x = {reference!r} is not a column: give its name or its index" in message
 
 
 def test_no_channels(write, samples):
@@ -307,7 +307,7 @@ def test_no_channels(write, samples):
 
 
 def test_time_true(write, samples):
-    assert "time = True is no column" in problem(write(samples), time=True)
+    assert "time = True is not a column" in problem(write(samples), time=True)
 
 
 def test_not_gzip(write, samples):

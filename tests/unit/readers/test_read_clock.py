@@ -54,7 +54,7 @@ def problem(path, **options):
 def test_unit(timed, name, step, rate, start):
     recording = read(timed((start + np.arange(80)) * step, name), units=UNITS)
     assert recording.rate == pytest.approx(rate, rel=1e-9)
-    assert ("as far as the steps tell" in texts(recording)[-1]) == (name == "t")
+    assert ("inferred from the steps" in texts(recording)[-1]) == (name == "t")
 
 
 @pytest.mark.parametrize(("step", "rate"), [(1.0, 1.0), (1.0, 1000.0), (0.8, 1.25), (4.0, 0.25)])

@@ -116,7 +116,7 @@ def test_a_missing_time_stamp_is_refused(write, samples):
     assert str(caught.value).startswith(
         "static.csv, column 't', line 22: no time stamp, and 1 more"
     )
-    assert "take such lines out" in str(caught.value)
+    assert "remove such lines" in str(caught.value)
     assert read(path, units=GYRO, time=False, rate=100)["gyro_x"].is_complete
 
 

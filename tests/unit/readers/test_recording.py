@@ -1,5 +1,7 @@
 """Recordings made from arrays: units, names, looks, and what is refused."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,19 @@ def test_size_and_time(recording):
     assert recording.duration == pytest.approx(4.0)
     assert recording["gyro_x"].n == 200
     assert recording.notices == (UNUSED,)
+
+
+def test_a_recording_is_a_mapping(recording):
+    assert isinstance(recording, Mapping)
+    assert list(recording) == list(recording.keys()) == ["gyro_x", "accel_z", "gyro_y"]
+    assert [name for name, channel in recording.items() if channel.name == name] == list(recording)
+    assert "gyro_x" in recording
+    assert "gyro_z" not in recording
+    assert recording.get("gyro_z") is None
+    for kind in (KeyError, InputError):
+        with pytest.raises(kind, match="no channel 'gyro_z': it has gyro_x, accel_z, gyro_y"):
+            recording["gyro_z"]
+    assert repr(recording) == "<Recording of bench.csv: gyro_x, accel_z, gyro_y; 50 Hz, 4 s>"
 
 
 def test_printed(recording):
