@@ -40,16 +40,28 @@ class Slope:
 
 
 def ols_slope(wv: WaveletVariance) -> Slope:
-    """Ordinary least-squares slope of the block means, its variance left at zero: a first value."""
+    """Least-squares slope of the block means, its variance left at zero: a first value.
+
+    Each run of blocks has a level of its own.
+    """
     index = _existing(wv)
-    t = index * (wv.block * wv.dt)
-    return Slope(float(np.polynomial.polynomial.polyfit(t, wv.blocks[index], 1)[1]), 0.0)
+    run = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
+    centred = [
+        values - (np.bincount(run, values) / np.bincount(run))[run]
+        for values in (index * (wv.block * wv.dt), wv.blocks[index])
+    ]
+    t, means = centred
+    return Slope(float(t @ means / (t @ t)), 0.0)
 
 
 def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
-    """Generalized least-squares slope for noise of spectrum ``psd``."""
+    """Generalized least-squares slope for noise of spectrum ``psd``.
+
+    Nothing is taken from a difference across a gap: the wavelet variances do not see it either.
+    """
     index = _existing(wv)
-    difference, apart = np.diff(wv.blocks[index]), np.diff(index).astype(float)
+    first = index[:-1][np.diff(index) == 1]
+    difference = wv.blocks[first + 1] - wv.blocks[first]
     size = fft.next_fast_len(4 * wv.blocks.size, real=True)
     size += size % 2
     frequency = np.arange(size // 2 + 1) / size
@@ -57,15 +69,19 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     density = block_density(psd, wv.dt, frequency, wv.block)
     density *= 4.0 * np.sin(np.pi * frequency) ** 2
     column = fft.irfft(density, size)[: wv.blocks.size - 1]
-    solved = _solve(column, index, np.column_stack([apart, difference]))
-    information = float(apart @ solved[:, 0])
+    one = np.ones(first.size)
+    solved = _solve(column, first, np.column_stack([one, difference]))
+    information = float(one @ solved[:, 0])
     step = wv.block * wv.dt
-    return Slope(float(apart @ solved[:, 1]) / information / step, 1.0 / information / step**2)
+    # Means of samples of which some were filled vary by as much more as the coarsest level does.
+    growth = 1.0 if wv.gaps is None else 1.0 + max(float(wv.gaps.change[-1]), 0.0)
+    return Slope(float(one @ solved[:, 1]) / information / step, growth / information / step**2)
 
 
 def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
-    """Places of the blocks that are not missing."""
-    index = np.flatnonzero(~np.isnan(wv.blocks))
+    """Places of the blocks that exist, each beside another one."""
+    there = np.concatenate([[False], ~np.isnan(wv.blocks), [False]])
+    index = np.flatnonzero(there[1:-1] & (there[:-2] | there[2:]))
     if index.size < tuning.FEWEST_BLOCKS:
         raise InputError(
             f"{wv.name or 'the series'} has samples missing all over, which leaves no drift to "
@@ -74,18 +90,14 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
     return index
 
 
-def _solve(column: FloatArray, index: NDArray[np.intp], right: FloatArray) -> FloatArray:
-    """Solve for the covariance of differences between blocks that exist.
+def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> FloatArray:
+    """Solve for the covariance of differences of neighbouring blocks, at these places of all.
 
-    ``column`` is the autocovariance of differences of neighbours; across a gap they add up.
+    ``column`` is the autocovariance of all differences.
     """
-    if index.size == column.size + 1:
+    if first.size == column.size:
         return np.asarray(solve_toeplitz(column, right))
-    first = index[0]
-    inner = toeplitz(column[: index[-1] - first])
-    sums = np.add.reduceat(np.add.reduceat(inner, index[:-1] - first, axis=0),
-                           index[:-1] - first, axis=1)  # fmt: skip
-    return np.asarray(solve(sums, right, assume_a="pos"))
+    return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:

@@ -1,0 +1,131 @@
+"""What missing samples do to wavelet variances, their covariance and fits.
+
+Run with ``python benchmarks/gaps.py`` (about ten minutes on two cores; ``--runs 20`` for a first
+look). Series of 100,000 samples at 100 Hz, the same with and without gaps:
+
+- bias: of the wavelet variances, in standard errors of the complete record, at the worst level
+  (beside it how well that is known);
+- variance: predicted over observed sampling variance against that of the complete record, the
+  lowest and highest level;
+- time: of the variance, of its covariance under a model and of a fit, against the complete record,
+  side by side, each at its second call.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+import gmwm
+from gmwm import (
+    GaussMarkov,
+    Model,
+    QuantizationNoise,
+    RandomWalk,
+    Resonance,
+    WhiteNoise,
+)
+
+SAMPLES, DT = 100_000, 0.01
+MODELS: dict[str, Model] = {
+    "N": Model((WhiteNoise(1e-4),)),
+    "N + K": WhiteNoise(1e-4) + RandomWalk(2e-5),
+    "K": Model((RandomWalk(1e-4),)),
+    "N + GM": WhiteNoise(1e-4) + GaussMarkov(2e-4, 2.0),
+    "resonance": WhiteNoise(1e-5) + Resonance(1e-3, 10.0, 0.05),
+    "Q + N": QuantizationNoise(1e-5) + WhiteNoise(1e-4),
+}
+
+
+def singles(share: float) -> Callable[[np.random.Generator, int], np.ndarray]:
+    """Single samples lost at random."""
+    return lambda rng, n: rng.random(n) < share
+
+
+def shocks(number: int) -> Callable[[np.random.Generator, int], np.ndarray]:
+    """Masked shocks of 17 to 20 samples."""
+
+    def lost(rng: np.random.Generator, n: int) -> np.ndarray:
+        mask = np.zeros(n, dtype=bool)
+        for start in rng.integers(100, n - 100, number):
+            mask[start : start + rng.integers(17, 21)] = True
+        return mask
+
+    return lost
+
+
+PATTERNS = {
+    "0.1 % single": singles(0.001),
+    "1 % single": singles(0.01),
+    "10 % single": singles(0.1),
+    "50 shocks": shocks(50),
+    "400 shocks": shocks(400),
+}
+
+
+def study(model: Model, lost: Callable, runs: int, seed: int) -> tuple[float, float, float, float]:
+    """Worst bias in standard errors, how well that is known, lowest and highest variance ratio."""
+    rng = np.random.default_rng(seed)
+    whole, part, grown = [], [], []
+    for _ in range(runs):
+        x = model.simulate(SAMPLES, DT, rng)
+        complete = gmwm.wavelet_variance(x, DT)
+        gappy = gmwm.wavelet_variance(np.where(lost(rng, x.size), np.nan, x), DT)
+        assert gappy.tau.size == complete.tau.size
+        whole.append(complete.variance)
+        part.append(gappy.variance)
+        grown.append(np.diag(gappy.gaps.inflation))
+    deviation = np.std(whole, axis=0, ddof=1)
+    added = np.array(part) - np.array(whole)
+    bias = np.mean(added, axis=0) / deviation
+    known = np.std(added, axis=0, ddof=1) / deviation / np.sqrt(runs)
+    worst = int(np.argmax(np.abs(bias)))
+    ratio = np.mean(grown, axis=0) * deviation**2 / np.var(part, axis=0, ddof=1)
+    return float(bias[worst]), float(known[worst]), float(ratio.min()), float(ratio.max())
+
+
+def second_call(task: Callable[[], object]) -> float:
+    """Seconds of the second call: nothing is compiled or set up."""
+    task()
+    start = perf_counter()
+    task()
+    return perf_counter() - start
+
+
+def times(model: Model, lost: Callable) -> tuple[float, float, float]:
+    """Of the variance, its covariance and a fit, against the complete record."""
+    rng = np.random.default_rng(1)
+    x = model.simulate(SAMPLES, DT, rng)
+    y = np.where(lost(rng, x.size), np.nan, x)
+    ratios = []
+    variances = [gmwm.wavelet_variance(series, DT) for series in (y, x)]
+    ratios.append([second_call(lambda s=s: gmwm.wavelet_variance(s, DT)) for s in (y, x)])
+    ratios.append([second_call(lambda v=v: v.covariance_under(model.psd)) for v in variances])
+    ratios.append([second_call(lambda v=v: gmwm.fit(model.opened(), v)) for v in variances])
+    variance, covariance, fit = (float(gappy / whole) for gappy, whole in ratios)
+    return variance, covariance, fit
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--runs", type=int, default=200)
+    runs = parser.parse_args().runs
+    print(f"{runs} runs of {SAMPLES:,} samples at {1.0 / DT:g} Hz")
+    print(f"{'':10} {'':13} {'bias':>15} {'variance':>13} {'time: variance':>16} cov.  fit")
+    for name, model in MODELS.items():
+        for pattern, lost in PATTERNS.items():
+            bias, known, low, high = study(model, lost, runs, 1)
+            variance, covariance, fit = times(model, lost)
+            print(
+                f"{name:10} {pattern:13} {bias:+7.2f} +- {known:.2f} {low:7.2f}-{high:.2f} "
+                f"{variance:15.1f} {covariance:5.1f} {fit:4.1f}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
