@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise, cli
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration.calibration import Calibration
 from gmwm.cli.calibrate import show
@@ -620,7 +621,7 @@ def test_demo_lists_what_would_be_selected(demo):
 # -- tables of results made by hand ---------------------------------------------------------------
 
 
-def made_up(name, model, stderr, bounds=None, valid=True, remarks=()):
+def made_up(name, model, stderr, bounds=None, notices=()):
     """A fit that says what we like."""
     quantity = name.split("_")[0]
     tau = 0.01 * 2.0 ** np.arange(10)
@@ -631,8 +632,8 @@ def made_up(name, model, stderr, bounds=None, valid=True, remarks=()):
     return Fit(
         model=as_model(model), wv=wv, keys=tuple(stderr), upper_bounds=bounds or {},
         covariance=np.diag(np.square(list(stderr.values()))), objective=7.0, dof=8,
-        discrepancy=0.0, p_value=0.5, method="gmwm", omega="model", valid=valid,
-        remarks=tuple(remarks),
+        chi_square=7.344, discrepancy=0.0, method="gmwm", weights="model",
+        notices=tuple(notices),
     )  # fmt: skip
 
 
@@ -641,14 +642,21 @@ def made_up_calibration(*fits, **options):
     return Calibration(fits={fit.wv.name: fit for fit in fits}, **options)
 
 
+MISFIT = Notice(
+    "misfit",
+    "bad",
+    "",
+    "the model differs from the data by more than their statistical errors",
+)
+
+
 def test_table_of_every_kind_of_parameter(capsys):
     gyro = made_up("gyro_x", WhiteNoise(4e-4) + RandomWalk(0.0), {"N": 4e-6}, {"K": 2e-4})
     accel = made_up(
         "accel_x",
         WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0),
         {"N": 2e-5, "sigma": 5e-4},
-        valid=False,
-        remarks=["the model differs from the data by more than their statistical errors"],
+        notices=[MISFIT],
     )
     show(
         made_up_calibration(
@@ -681,7 +689,9 @@ def test_no_number_or_name_is_cut_off(capsys):
     values = {"N": 6.9e-4, "sigma_1": 1.3e-3, "tau_1": 1.8131e-3, "sigma_2": 3e-4, "tau_2": 1234.0}
     errors = {"N": 1e-4, "sigma_1": 1e-4, "tau_1": 1e-3, "sigma_2": 1e-5, "tau_2": 200.0}
     names = [f"accel_{axis}" for axis in "xyz"]
-    fits = [made_up(name, DEMO_TRUTH.with_params(values), errors, valid=False) for name in names]
+    fits = [
+        made_up(name, DEMO_TRUTH.with_params(values), errors, notices=[MISFIT]) for name in names
+    ]
     show_truth(made_up_calibration(*fits), dict.fromkeys(names, DEMO_TRUTH))
     truth = capsys.readouterr().out
     show(made_up_calibration(*fits))
@@ -702,8 +712,8 @@ def test_a_long_channel_name_takes_nothing_from_the_numbers(run, tmp_path):
     )
     assert code == 0, told
     fit = gmwm.load(tmp_path / "out" / "calibration.json")[name]
-    (_, low, high, unit) = fit.rows()[0]["field"][0]
-    for text in (name, f"{low:.4g} .. {high:.4g}", unit):
+    usual = fit.estimates[0].usual
+    for text in (name, f"{usual.lower:.4g} .. {usual.upper:.4g}", usual.unit):
         assert text in printed
 
 

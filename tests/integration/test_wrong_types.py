@@ -21,6 +21,8 @@ from gmwm import (
     parameter,
 )
 from gmwm._core import checks
+from gmwm._core.notices import Notice
+from gmwm.estimate import METHODS
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 MODEL = TRUTH.opened()
@@ -123,8 +125,8 @@ def test_a_series_that_fills_the_memory_is_said_to(monkeypatch):
         ("mle", "start", "a"),
         ("gmwm", "discrepancy", "a"),
         ("gmwm", "discrepancy", 1.0),
-        ("gmwm", "omega", np.ones(3)),
-        ("gmwm", "omega", ["model"]),
+        ("gmwm", "weights", np.ones(3)),
+        ("gmwm", "weights", ["model"]),
         ("simulated", "replications", "a"),
         ("simulated", "replications", 0),
         ("simulated", "seed", "a"),
@@ -136,11 +138,10 @@ def test_a_series_that_fills_the_memory_is_said_to(monkeypatch):
 )
 def test_options_of_a_fit(method, option, value):
     said = "'a' is no error model" if option == "start" else option
-    channel = Channel("", X, 1.0)
-    refused(lambda: gmwm.fit(MODEL, channel, method=method, **{option: value}), said)
+    refused(lambda: METHODS[method](**{option: value}), said)
 
 
-@pytest.mark.parametrize("method", [np.ones(3), ["gmwm"], 3, "GMWM"])
+@pytest.mark.parametrize("method", [np.ones(3), ["gmwm"], 3, "GMWM", gmwm.GMWM])
 def test_no_method(method):
     refused(lambda: gmwm.fit(MODEL, WV, method=method), "known are gmwm,")
 
@@ -304,7 +305,9 @@ def test_a_process_of_ones_own_that_draws_zeros(monkeypatch):
 
 @pytest.mark.parametrize("content", [{}, None, [], "x", 3, {"parts": []}])
 def test_what_is_no_fit(content):
-    refused(lambda: Fit.from_dict(content), "give what to_dict of a fit made")
+    refused(
+        lambda: Fit.from_dict(content), "this is not a fit: give a file that was saved from one"
+    )
 
 
 @pytest.mark.parametrize("key", sorted(FIT.to_dict()))
@@ -322,7 +325,7 @@ def test_a_fit_with_nothing_in_place_of_its_content(key):
     if key == "objective":
         assert np.isnan(Fit.from_dict({**FIT.to_dict(), key: None}).objective)
         return
-    refused(lambda: Fit.from_dict({**FIT.to_dict(), key: None}), "give what to_dict of a fit made")
+    refused(lambda: Fit.from_dict({**FIT.to_dict(), key: None}), "make it again")
 
 
 @pytest.mark.parametrize("place", ["objective", "N"])
@@ -367,7 +370,12 @@ def test_a_fit_prints_within_80_columns(quantity, method):
     channel = Channel(f"{quantity}_x", 1.2345e-5 * X[:400], 0.01, quantity, "")
     fit = gmwm.fit(MODEL, channel, method=method)
     assert widest(fit) <= 80
-    assert widest(replace(fit, remarks=("one that goes on and on " * 9,) * 2)) <= 80
+    assert (
+        widest(
+            replace(fit, notices=(Notice("long", "bad", "N", "one that goes on and on " * 9),) * 2)
+        )
+        <= 80
+    )
 
 
 def test_long_names_and_many_terms_print_within_80_columns():

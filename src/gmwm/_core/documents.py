@@ -48,13 +48,16 @@ class Document:
 
     @classmethod
     def from_dict(cls, content: Any) -> Self:
-        """Inverse of `to_dict`.
+        """Inverse of `to_dict`; gives an object of a subclass where the content is of one.
 
         Raises
         ------
         InputError
             If the content is of another schema or version, or damaged.
         """
+        kind = cls._kind_of(content)
+        if kind is not None and kind is not cls and issubclass(kind, cls):
+            return kind.from_dict(content)
         what = cls.SCHEMA.rpartition(".")[2]
         if not isinstance(content, Mapping) or content.get("schema") != cls.SCHEMA:
             raise InputError(f"this is not a {what}: give a file that was saved from one")
@@ -70,6 +73,11 @@ class Document:
             raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"the {what} is damaged ({error!r}): make it again") from None
+
+    @staticmethod
+    def _kind_of(content: Any) -> type[Document] | None:
+        schema = content.get("schema") if isinstance(content, Mapping) else None
+        return Document._kinds.get(schema) if isinstance(schema, str) else None
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything as JSON; the file appears whole or not at all.
@@ -110,8 +118,7 @@ def load_document(path: str | os.PathLike[str]) -> Any:
         If the file is missing, is not JSON, or holds no result of a kind known here.
     """
     content = read_json(path)
-    schema = content.get("schema") if isinstance(content, Mapping) else None
-    kind = Document._kinds.get(schema) if isinstance(schema, str) else None
+    kind = Document._kind_of(content)
     if kind is None:
         known = ", ".join(sorted(Document._kinds))
         raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")

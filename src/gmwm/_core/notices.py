@@ -49,6 +49,12 @@ class Notice:
         place = "".join(f"{part}: " for part in (self.source, self.where) if part)
         return f"{place}{self.text}" + (f" ({self.action})" if self.action else "")
 
+    @property
+    def sentence(self) -> str:
+        """The place and the text as a sentence."""
+        text = str(self)
+        return f"{text if self.source or self.where else text[:1].upper() + text[1:]}."
+
     def to_dict(self) -> dict[str, Any]:
         """In JSON types; numbers that are not finite are ``None``."""
         return {

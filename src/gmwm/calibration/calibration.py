@@ -17,7 +17,7 @@ from gmwm._core.files import written
 from gmwm._core.typing import Progress
 from gmwm.calibration.screening import REMEDIES, remedied, told_of_terms
 from gmwm.diagnosis import Finding
-from gmwm.errors import InputError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Fit, estimate
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording
@@ -33,7 +33,7 @@ _TOLD_OTHERWISE = ("reader", "gap", "dead", "infinite", "length")
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(Mapping[str, Fit]):
     """Error models of the channels of a recording.
 
     Attributes
@@ -67,7 +67,7 @@ class Calibration:
     def __getitem__(self, name: str) -> Fit:
         if name not in self.fits:
             why = self.skipped.get(name, f"it has {', '.join(self.fits)}")
-            raise InputError(f"the calibration has no model of channel {name!r}: {why}")
+            raise MissingNameError(f"the calibration has no model of channel {name!r}: {why}")
         return self.fits[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from gmwm.estimate.bootstrap import Bootstrap, bootstrap, bootstrap_test
 from gmwm.estimate.cramer_rao import CramerRao, cramer_rao
-from gmwm.estimate.entrance import Data, are_several, estimate, fit
+from gmwm.estimate.entrance import METHODS, Data, Method, are_several, estimate, fit
 from gmwm.estimate.likelihood import EM, MLE, Whittle
 from gmwm.estimate.lines import AllanLines
 from gmwm.estimate.moments import GMWM, SimulatedMoments
@@ -11,6 +11,7 @@ from gmwm.estimate.result import Estimate, Fit, JointFit
 __all__ = [
     "EM",
     "GMWM",
+    "METHODS",
     "MLE",
     "AllanLines",
     "Bootstrap",
@@ -19,6 +20,7 @@ __all__ = [
     "Estimate",
     "Fit",
     "JointFit",
+    "Method",
     "SimulatedMoments",
     "Whittle",
     "are_several",

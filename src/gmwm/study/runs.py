@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.estimate import fit
 from gmwm.estimate.result import Fit
-from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
+from gmwm.study.scenario import SCENARIOS, Estimation, Quantity, Scenario
 from gmwm.variance import wavelet_variance
 
 Row = dict[str, Any]
@@ -29,7 +29,6 @@ Rows = Generator[list[Row], None, None]
 
 _SECONDS_PER_PART = 10.0
 _KEY = b"gmwm"
-_OF_VARIANCE = ("wavelet", "robust")
 
 
 def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> list[Row]:
@@ -69,15 +68,11 @@ def _row(scenario: Scenario, method: str, series: Any, run: int) -> Row:
     return row
 
 
-def _estimate(scenario: Scenario, series: FloatArray, options: Mapping[str, Any]) -> Fit:
+def _estimate(scenario: Scenario, series: FloatArray, way: Estimation) -> Fit:
     model = scenario.truth.opened()
-    of_variance = {name: options[name] for name in _OF_VARIANCE if name in options}
-    if not of_variance:
-        return fit(model, series, scenario.dt, **options)
-    if options.get("omega") == "data":
-        of_variance["data_covariance"] = "octave"
-    wv = wavelet_variance(series, scenario.dt, **of_variance)
-    return fit(model, wv, **{k: v for k, v in options.items() if k not in of_variance})
+    if not way.variance:
+        return fit(model, series, scenario.dt, method=way.method)
+    return fit(model, wavelet_variance(series, scenario.dt, **way.variance), method=way.method)
 
 
 def _values(quantity: Quantity, result: Fit | None) -> Row:

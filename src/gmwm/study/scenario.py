@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from gmwm.estimate import EM, GMWM, MLE, AllanLines, Method, Whittle
 from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
 
 
@@ -34,6 +35,22 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Estimation:
+    """How a series is estimated.
+
+    Attributes
+    ----------
+    method : str or object that holds the options of a method
+        As `gmwm.fit` takes it.
+    variance : mapping of str to object
+        Options of `gmwm.wavelet_variance`.
+    """
+
+    method: str | Method = "gmwm"
+    variance: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """A true model, the quantities to estimate, and the ways to do so.
 
@@ -48,8 +65,7 @@ class Scenario:
     runs : int
         Customary number of runs.
     quantities : tuple of Quantity
-    methods : mapping of str to mapping
-        Method -> options of `gmwm.fit` and `gmwm.wavelet_variance`.
+    methods : mapping of str to Estimation
     notes : tuple of str
         What a reader of the table has to know.
     """
@@ -61,7 +77,7 @@ class Scenario:
     dt: float
     runs: int
     quantities: tuple[Quantity, ...]
-    methods: Mapping[str, Mapping[str, Any]]
+    methods: Mapping[str, Estimation]
     notes: tuple[str, ...] = ()
 
     def true_value(self, quantity: Quantity) -> float:
@@ -85,12 +101,12 @@ TABLE_2 = Scenario(
                  {"EM": 8.4e-2, "EM*": 7.88e-2, "AV": 0.394, "GMWM": 0.176}),
     ),
     methods={
-        "EM": {"method": "em", "start": WhiteNoise(0.5) + RandomWalk(1e-4)},
-        "EM*": {"method": "em", "start": WhiteNoise(5.0) + RandomWalk(10.0),
-                "accelerate": False, "tolerance": 1e-3},
-        "AV": {"method": "allan", "regions": {"N": (1, 4), "K": (16, 32), "R": (128, 2048)}},
-        "MLE": {"method": "mle"},
-        "GMWM": {},
+        "EM": Estimation(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
+        "EM*": Estimation(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
+                            accelerate=False, tolerance=1e-3)),
+        "AV": Estimation(AllanLines({"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
+        "MLE": Estimation(MLE()),
+        "GMWM": Estimation(),
     },
     notes=(
         "EM from the paper's good start (0.25, 1e-8), run to convergence; EM* from its bad one "
@@ -116,10 +132,10 @@ TABLE_3 = Scenario(
         Quantity("omega", "R", 1, {"EM": 0.549, "EM*": 1.68, "GMWM": 0.181}),
     ),
     methods={
-        "EM": {"method": "em"},
-        "EM*": {"method": "em", "drift": "state", "tolerance": 1e-6},
-        "MLE": {"method": "mle"},
-        "GMWM": {},
+        "EM": Estimation(EM()),
+        "EM*": Estimation(EM(drift="state", tolerance=1e-6)),
+        "MLE": Estimation(MLE()),
+        "GMWM": Estimation(),
     },
     notes=(
         "EM has the ramp beside the Gauss-Markov state; EM* has it inside, as in Stebler et al. "
@@ -147,7 +163,7 @@ TABLE_4 = Scenario(
         Quantity("beta_3", "tau_1", -1, {"GMWM": 4.53e-3}),
         Quantity("sigma2_3", "sigma_1", 2, {"GMWM": 1.56e-3}),
     ),
-    methods={"GMWM": {}, "Whittle": {"method": "whittle"}},
+    methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
     notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
@@ -170,20 +186,20 @@ FIVE = Scenario(
         *(Quantity(f"sigma_{i}", f"sigma_{i}") for i in range(1, 6)),
         *(Quantity(f"tau_{i}", f"tau_{i}") for i in range(1, 6)),
     ),
-    methods={"GMWM": {}, "Whittle": {"method": "whittle"}},
+    methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
 )
 
 FIGURES = {"fig2": TABLE_2, "fig3": TABLE_3, "fig4": TABLE_4}
 
 
-_WEIGHTS: Mapping[str, Mapping[str, Any]] = {
-    "model": {},
-    "diagonal": {"omega": "diagonal"},
-    "identity": {"omega": "identity"},
-    "data": {"omega": "data"},
-    "db2": {"wavelet": "db2"},
-    "db2 data": {"wavelet": "db2", "omega": "data"},
-    "robust": {"robust": True},
+_WEIGHTS: Mapping[str, Estimation] = {
+    "model": Estimation(),
+    "diagonal": Estimation(GMWM(weights="diagonal")),
+    "identity": Estimation(GMWM(weights="identity")),
+    "data": Estimation(GMWM(weights="data")),
+    "db2": Estimation(variance={"wavelet": "db2"}),
+    "db2 data": Estimation(GMWM(weights="data"), {"wavelet": "db2", "data_covariance": "octave"}),
+    "robust": Estimation(variance={"robust": True}),
 }
 
 _WEIGHT_NOTES = (

@@ -17,6 +17,7 @@ from gmwm import (
     Recording,
     WhiteNoise,
 )
+from gmwm._core.notices import Notice
 from places import SHARED
 
 DT = 0.01
@@ -104,10 +105,11 @@ def test_unknown_channel_lists_those_there_are(calibration):
 def test_valid_only_if_every_fit_is(calibration):
     sound = replace(calibration, skipped={})
     assert sound.valid == all(fit.valid for fit in calibration.fits.values())
-    fits = {name: replace(fit, valid=True) for name, fit in calibration.fits.items()}
+    fits = {name: replace(fit, notices=()) for name, fit in calibration.fits.items()}
     assert replace(sound, fits=fits).valid
     assert not replace(calibration, fits=fits).valid  # one is skipped
-    assert not replace(sound, fits=fits | {"gyro_x": replace(fits["gyro_x"], valid=False)}).valid
+    bad = replace(fits["gyro_x"], notices=(Notice("misfit", "bad", "", "misses the data"),))
+    assert not replace(sound, fits=fits | {"gyro_x": bad}).valid
 
 
 def test_all_channels_dead():
@@ -231,11 +233,11 @@ def assert_same(one, other):
         assert a.interval() == b.interval()
         assert a.interval(0.5) == b.interval(0.5)
         assert a.upper_bounds == b.upper_bounds
-        assert a.remarks == b.remarks
+        assert a.notices == b.notices
         numbers = [(f.objective, f.dof, f.discrepancy, f.p_value) for f in (a, b)]
         np.testing.assert_array_equal(*numbers)
-        assert (a.method, a.omega, a.valid) == (b.method, b.omega, b.valid)
-        assert a.rows() == b.rows()
+        assert (a.method, a.weights, a.reasons) == (b.method, b.weights, b.reasons)
+        assert a.estimates == b.estimates
         for array in ("tau", "variance", "mean", "blocks", "lower", "upper", "covariance"):
             np.testing.assert_array_equal(getattr(a.wv, array), getattr(b.wv, array))
         scalars = ("block", "n", "dt", "confidence", "name", "quantity", "unit")
@@ -256,14 +258,14 @@ def test_round_trip_through_a_file(which, request, tmp_path):
 
 
 def test_an_upper_bound_is_in_the_round_trip(mapped):
-    # What `mapped` is for: a bound and a remark must exist to be lost.
+    # What `mapped` is for: a bound and a notice must exist to be lost.
     fit = mapped["accel_x"]
     assert fit.upper_bounds.keys() == {"K"}
-    assert any("K is not identifiable" in remark for remark in fit.remarks)
+    assert [(n.code, n.where) for n in fit.notices] == [("amplitude-bound", "K")]
 
 
 def test_a_missing_p_value_survives(calibration, tmp_path):
-    fits = {"gyro_x": replace(calibration["gyro_x"], p_value=float("nan"), dof=0)}
+    fits = {"gyro_x": replace(calibration["gyro_x"], chi_square=float("nan"), dof=0)}
     odd = replace(calibration, fits=fits)
     odd.save(tmp_path / "cal.json")
     assert_same(gmwm.load(tmp_path / "cal.json"), odd)
@@ -365,7 +367,7 @@ FIT = ("channels", "gyro_x")
         *[((key,), GONE) for key in ("channels", "skipped", "source", "rate_hz", "n", "notes")],
         *[
             ((*FIT, key), GONE)
-            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "remarks")
+            for key in ("model", "keys", "covariance", "upper_bounds", "objective", "notices")
         ],
         ((*FIT, "wavelet_variance", "variance"), GONE),
         ((*FIT, "wavelet_variance", "dt"), GONE),

@@ -53,7 +53,7 @@ def dense_covariance(processes, n, dt):
 
 def keys_of(bound, coordinates):
     by_term = {(i.term, i.parameter.name): i.key for i in bound.model.parameters}
-    return [by_term[coordinates.places[i], name] for i, name in coordinates.names]
+    return [by_term[coordinates.terms[i].place, name] for i, name in coordinates.names]
 
 
 @pytest.mark.parametrize("name", MODELS)

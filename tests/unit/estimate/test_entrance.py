@@ -110,7 +110,7 @@ class TestWhatIsOff:
             )
             if "K" in fit.upper_bounds:
                 assert not fit.valid
-                assert "K is not identifiable" in fit.message
+                assert "K: not identifiable" in fit.message
                 assert fit.interval()["K"] == (0.0, fit.upper_bounds["K"])
                 covered += 1
             else:
@@ -168,7 +168,7 @@ class TestWhatIsOff:
         fit = gmwm.fit(slow.opened(), x, dt=0.01)
         assert fit.discrepancy > 0.01
         assert fit.params["K"] == pytest.approx(1e-4, rel=0.5)
-        rigid = gmwm.fit(slow.opened(), x, dt=0.01, discrepancy=0.0)
+        rigid = gmwm.fit(slow.opened(), x, dt=0.01, method=gmwm.GMWM(discrepancy=0.0))
         assert rigid.discrepancy == 0.0
         error = abs(np.log(fit.params["K"] / 1e-4))
         assert "K" in rigid.upper_bounds or error < abs(np.log(rigid.params["K"] / 1e-4)) + 0.05
@@ -182,7 +182,7 @@ class TestWhatIsOff:
         ({"model": "white"}, "no error model"),
         ({"method": "magic"}, "known are gmwm"),
         ({"omega": "data!"}, "known are model"),
-        ({"discrepancy": 2.0}, "share of the variance"),
+        ({"weights": "data", "omega": "model"}, "are the same: give one"),
         ({"dt": None}, "sampling interval"),
         ({"model": gmwm.ARIMA(0, 2, 1)}, "one integration"),
         ({"model": gmwm.AR([0.5, None])}, "give all or none"),
@@ -237,3 +237,16 @@ def test_plot_shows_data_model_and_components():
     assert axes.get_xscale() == axes.get_yscale() == "log"
     assert axes.get_xlabel() == "averaging time [s]"
     plt.close(axes.figure)
+
+
+@pytest.mark.parametrize("weights", ["model", "diagonal", "identity"])
+def test_a_redundant_term_is_found_under_all_weights(weights):
+    truth = WhiteNoise(1.0) + GaussMarkov(0.5, 100.0)
+    sound = redundant = 0
+    for seed in range(6):
+        x = truth.simulate(20_000, 1.0, seed)
+        sound += gmwm.fit(truth.opened(), x, dt=1.0, weights=weights).reasons["terms_needed"]
+        rich = gmwm.fit(WhiteNoise() + 2 * GaussMarkov(), x, dt=1.0, weights=weights)
+        redundant += not rich.valid
+    assert sound >= 5
+    assert redundant >= 5

@@ -96,8 +96,8 @@ def test_a_well_separated_corner_gives_both_lines_and_no_plateau():
 def test_where_a_ramp_hides_the_random_walk_none_is_invented(drifting):
     assert all({"N", "R"} <= set(fit.keys) for fit in drifting)
     assert sum(len(fit.keys) > 2 for fit in drifting) <= RARE
-    remark = "K: the Allan plot has no region of slope +1/2, so it is not estimated"
-    assert sum(remark in fit.remarks for fit in drifting) >= len(drifting) - RARE
+    text = "K: the Allan plot has no region of slope +1/2, so it is not estimated"
+    assert sum(text in map(str, fit.notices) for fit in drifting) >= len(drifting) - RARE
     assert not any(fit.valid for fit in drifting)
 
 
@@ -162,7 +162,7 @@ def test_nothing_is_read_from_too_short_a_record():
     ids=["Q", "N", "B", "K", "R"],
 )
 def test_a_line_is_least_squares_of_its_slope_over_its_region(corner, model, key, slope, factor):
-    fit = gmwm.fit(model, corner, method="allan", regions={key: (4, 32)})
+    fit = gmwm.fit(model, corner, method=gmwm.AllanLines(regions={key: (4, 32)}))
     tau, deviation = corner.tau[2:6], corner.allan_deviation[2:6]
     expected = np.exp(np.mean(np.log(deviation) - slope * np.log(tau)))
     (region,) = fit.regions
@@ -174,7 +174,7 @@ def test_a_line_is_least_squares_of_its_slope_over_its_region(corner, model, key
 def test_standard_errors_follow_from_the_covariance_by_differences(corner):
     model = WhiteNoise() + RandomWalk()
     regions = {"N": (1, 8), "K": (512, 2048)}
-    fit = gmwm.fit(model, corner, method="allan", regions=regions)
+    fit = gmwm.fit(model, corner, method=gmwm.AllanLines(regions=regions))
 
     def read(variance):
         n = np.exp(np.mean(np.log(np.sqrt(2.0 * variance[:4] * corner.tau[:4]))))
@@ -195,13 +195,15 @@ def test_standard_errors_follow_from_the_covariance_by_differences(corner):
 
 
 def test_one_level_is_enough_where_the_user_says_so(corner):
-    fit = gmwm.fit(WhiteNoise(), corner, method="allan", regions={"N": (2, 2)})
+    fit = gmwm.fit(WhiteNoise(), corner, method=gmwm.AllanLines(regions={"N": (2, 2)}))
     assert fit.params["N"] == pytest.approx(corner.allan_deviation[1] * np.sqrt(2.0))
 
 
 def test_regions_take_times_as_people_write_them():
     x = as_model(WhiteNoise(0.2)).simulate(5000, 0.1, 1)
-    fit = gmwm.fit(WhiteNoise(), x, 0.1, method="allan", regions={"N": np.array([0.4, 3.2])})
+    fit = gmwm.fit(
+        WhiteNoise(), x, 0.1, method=gmwm.AllanLines(regions={"N": np.array([0.4, 3.2])})
+    )
     assert fit.regions[0].tau_min == pytest.approx(0.4)
     assert fit.regions[0].tau_max == pytest.approx(3.2)
 
@@ -209,20 +211,20 @@ def test_regions_take_times_as_people_write_them():
 def test_given_regions_leave_the_others_to_be_found_beside_them(corner):
     model = WhiteNoise() + RandomWalk()
     free = gmwm.fit(model, corner, method="allan")
-    fit = gmwm.fit(model, corner, method="allan", regions={"K": (1024, 4096)})
+    fit = gmwm.fit(model, corner, method=gmwm.AllanLines(regions={"K": (1024, 4096)}))
     assert fit.params["N"] == free.params["N"]
     assert fit.regions[1].tau_min == 1024.0
-    early = gmwm.fit(model, corner, method="allan", regions={"K": (8, 16)})
+    early = gmwm.fit(model, corner, method=gmwm.AllanLines(regions={"K": (8, 16)}))
     assert early.regions[0].tau_max == 8.0
-    taken = gmwm.fit(model, corner, method="allan", regions={"K": (1, 16)})
+    taken = gmwm.fit(model, corner, method=gmwm.AllanLines(regions={"K": (1, 16)}))
     assert taken.keys == ("K",)
 
 
-def test_given_values_stay_and_are_said_to_be_given(corner):
+def test_fixed_values_stay_and_are_named_as_fixed(corner):
     fit = gmwm.fit(WhiteNoise(N=0.25) + RandomWalk(), corner, method="allan")
     assert fit.params["N"] == 0.25
     assert fit.keys == ("K",)
-    assert [row["kind"] for row in fit.rows()] == ["given", "estimated"]
+    assert [estimate.kind for estimate in fit.estimates] == ["fixed", "estimated"]
     assert not fit.valid
     assert "misses the Allan deviation by" in fit.message
 
@@ -259,19 +261,20 @@ def test_other_processes_are_refused(corner):
 def test_bad_regions_are_refused(corner, regions, words):
     model = WhiteNoise() + QuantizationNoise(Q=0.1)
     with pytest.raises(InputError, match=words) as caught:
-        gmwm.fit(model, corner, method="allan", regions=regions)
+        gmwm.fit(model, corner, method=gmwm.AllanLines(regions=regions))
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("option", [{"omega": "model"}, {"start": WhiteNoise(1.0)}])
-def test_options_of_other_methods_are_refused(corner, option):
-    with pytest.raises(InputError, match="no option of method 'allan'"):
-        gmwm.fit(WhiteNoise(), corner, method="allan", **option)
+@pytest.mark.parametrize("option", ["omega", "weights"])
+def test_weights_of_a_method_that_has_none_are_refused(corner, option):
+    for method in ("allan", gmwm.AllanLines(), "em", gmwm.MLE()):
+        with pytest.raises(InputError, match="has no weights: take gmwm or simulated"):
+            gmwm.fit(WhiteNoise(), corner, method=method, **{option: "model"})
 
 
 def test_a_level_without_variance_is_left_out():
     x = np.tile([1.0, -1.0], 500)  # no Allan variance from two samples on
-    fit = gmwm.fit(WhiteNoise(), x, 1.0, method="allan", regions={"N": (1, 8)})
+    fit = gmwm.fit(WhiteNoise(), x, 1.0, method=gmwm.AllanLines(regions={"N": (1, 8)}))
     assert np.isfinite(fit.params["N"])
     with pytest.raises(InputError, match="no region"):
         gmwm.fit(WhiteNoise(), x, 1.0, method="allan")
@@ -339,7 +342,7 @@ def test_robust_variances_are_read_too():
 )
 def test_a_given_region_of_another_slope_is_not_valid(model, region):
     wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(6000, 1.0, seed=1), 1.0)
-    fit = gmwm.fit(WhiteNoise(1.0) + model, wv, method="allan", regions=region)
+    fit = gmwm.fit(WhiteNoise(1.0) + model, wv, method=gmwm.AllanLines(regions=region))
     assert not fit.valid
     assert "has the slope -0.5" in fit.message
 
@@ -350,6 +353,6 @@ def test_a_given_region_of_the_right_slope_is_seldom_blamed():
     for seed in range(100):
         wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(600, 1.0, seed=seed), 1.0)
         for region in blamed:
-            fit = gmwm.fit(WhiteNoise(), wv, method="allan", regions={"N": region})
+            fit = gmwm.fit(WhiteNoise(), wv, method=gmwm.AllanLines(regions={"N": region}))
             blamed[region] += "has the slope" in fit.message
     assert max(blamed.values()) <= RARE

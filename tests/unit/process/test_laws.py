@@ -180,7 +180,7 @@ def test_flicker_state_space_follows_one_over_f():
     np.testing.assert_allclose(bank, process.haar_variance(tau, 1.0), rtol=0.1)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, deadline=None)
 @given(st.floats(-3.0, 12.0), st.floats(0.0, 12.0))
 def test_gauss_markov_is_exact_for_any_correlation_and_averaging_time(log_tau, log_m):
     m = float(np.rint(10.0**log_m))
@@ -194,7 +194,7 @@ def test_gauss_markov_is_exact_for_any_correlation_and_averaging_time(log_tau, l
     assert found == pytest.approx(float(expected), rel=1e-12)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(st.floats(-5.0, -0.4), st.floats(0.001, 0.95), st.integers(0, 6))
 def test_resonance_is_exact_at_any_frequency_and_damping(log_frequency, damping, level):
     frequency = 10.0**log_frequency

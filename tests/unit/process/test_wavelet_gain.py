@@ -78,7 +78,7 @@ def test_stationary_processes_give_the_filter_against_their_autocovariance(proce
         assert value == pytest.approx(expected, rel=1e-8, abs=rounding)
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None)
 @given(st.sampled_from(SOME), st.floats(-3.0, -0.35), st.floats(-2.0, -0.05))
 def test_resonances_of_any_frequency_down_to_damping_of_one_per_cent(name, log_f, log_damping):
     process = gmwm.Resonance(1.0, 10.0**log_f, 10.0**log_damping)

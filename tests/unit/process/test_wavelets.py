@@ -103,7 +103,7 @@ def test_gain_of_coiflets_near_zero_is_what_their_first_moment_makes_it(name):
     assert filters.gain(1, np.array([f]))[0] == pytest.approx(expected, rel=1e-6)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None)
 @given(st.sampled_from(NAMES), st.integers(1, 5000))
 def test_levels_are_those_whose_filter_fits(name, n):
     filters = wavelet(name)

@@ -158,7 +158,7 @@ def test_one_jump(recorded):
     assert "gyro_x: 250 of 700 samples missing, in one gap." in notes
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, database=None)
+@settings(max_examples=150, deadline=None, database=None)
 @given(
     seed=st.integers(0, 10**6),
     loss=st.sampled_from([0.0, 0.01, 0.1, 0.3]),

@@ -21,6 +21,7 @@ from gmwm import (
     WhiteNoise,
     parameter,
 )
+from gmwm._core.notices import Notice
 from gmwm.diagnosis import Finding
 from gmwm.report import write_report
 from gmwm.report.budget import navigation
@@ -195,16 +196,17 @@ def test_notes_and_skipped_channels(parsed):
     assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
 
 
-def test_remarks_are_sentences(parsed, calibration):
-    remarks = [remark for fit in calibration.fits.values() for remark in fit.remarks]
-    assert remarks, "the fixture must have some"
-    for remark in remarks:
-        assert f"{remark[0].upper()}{remark[1:]}." in parsed.text
+def test_notices_are_sentences(parsed, calibration):
+    notices = [notice for fit in calibration.fits.values() for notice in fit.notices]
+    assert notices, "the fixture must have some"
+    for notice in notices:
+        assert notice.sentence in parsed.text
 
 
 def test_valid_and_not_valid(calibration):
     for valid in (True, False):
-        fits = {name: replace(fit, valid=valid) for name, fit in calibration.fits.items()}
+        notices = () if valid else (Notice("misfit", "bad", "", "misses the data"),)
+        fits = {name: replace(fit, notices=notices) for name, fit in calibration.fits.items()}
         shown = Page(page(replace(calibration, fits=fits)))
         verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 5}
         assert verdicts == dict.fromkeys(fits, "valid" if valid else "not valid")
@@ -482,7 +484,7 @@ def test_names_are_text_not_markup(calibration):
     hostile = replace(
         calibration,
         source=HOSTILE,
-        fits={HOSTILE: replace(gyro, remarks=(f"a {HOSTILE}",))},
+        fits={HOSTILE: replace(gyro, notices=(Notice("a", "bad", "", f"a {HOSTILE}"),))},
         skipped={f"skip {HOSTILE}": f"why {HOSTILE}"},
         notes=(f"note {HOSTILE}",),
         findings=(

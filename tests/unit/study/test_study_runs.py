@@ -7,7 +7,7 @@ import pytest
 from gmwm import InputError, RandomWalk, WhiteNoise
 from gmwm.study import runs as engine
 from gmwm.study.runs import one_run, run_scenario
-from gmwm.study.scenario import SCENARIOS, Quantity, Scenario
+from gmwm.study.scenario import SCENARIOS, Estimation, Quantity, Scenario
 
 SMALL = Scenario(
     name="small",
@@ -17,7 +17,7 @@ SMALL = Scenario(
     dt=1.0,
     runs=4,
     quantities=(Quantity("sigma2_WN", "N", 2, {"GMWM": 0.1}), Quantity("rate", "K", -1)),
-    methods={"GMWM": {}, "AV": {"method": "allan"}},
+    methods={"GMWM": Estimation(), "AV": Estimation("allan")},
 )
 
 

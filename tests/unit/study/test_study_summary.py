@@ -6,7 +6,7 @@ import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
 from gmwm.study.figures import boxplots
-from gmwm.study.scenario import FIGURES, SCENARIOS, Quantity, Scenario
+from gmwm.study.scenario import FIGURES, SCENARIOS, Estimation, Quantity, Scenario
 from gmwm.study.summary import summarise
 
 WHITE = Scenario(
@@ -17,7 +17,7 @@ WHITE = Scenario(
     dt=1.0,
     runs=4,
     quantities=(Quantity("sigma2_WN", "N", 2, {"B": 0.05}),),
-    methods={"A": {}, "B": {}},
+    methods={"A": Estimation(), "B": Estimation()},
     notes=("A note that is long enough to be wrapped at the eightieth column of the terminal.",),
 )
 

@@ -19,7 +19,7 @@ def by_definition(x, name, level):
     return np.fft.ifft(transfer * np.fft.fft(x)).real
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None)
 @given(st.sampled_from(NAMES), st.integers(1, 700), st.integers(0, 2**32 - 1))
 def test_reconstruction_is_exact_at_any_length(name, n, seed):
     x = np.random.default_rng(seed).standard_normal(n) + 5.0
@@ -63,7 +63,7 @@ def test_energy_is_kept(name):
     assert np.mean(transform.smooth) == pytest.approx(np.mean(x), rel=1e-9)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(st.sampled_from(NAMES), st.integers(1, 10_000))
 def test_coefficients_free_of_end_effects_are_those_that_do_not_wrap(name, n):
     x = np.random.default_rng(n).standard_normal(n)

@@ -109,7 +109,7 @@ def test_it_solves_its_equation():
         assert np.mean(chi(w / np.sqrt(found), c)) == pytest.approx(consistency(c), rel=1e-11)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None)
 @given(
     st.integers(1, 400),
     st.integers(0, 2**31),
@@ -128,7 +128,7 @@ def test_scale_equivariance_even_order_free(size, seed, log_scale, share, effici
     assert other == pytest.approx(scale**2 * base, rel=1e-6)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**31), st.floats(0.01, 0.2), st.sampled_from([2.0, 5.0, 10.0, 1e3, 1e5]))
 def test_the_root_next_to_the_mad_under_contamination(seed, share, size):
     rng = np.random.default_rng(seed)
@@ -215,7 +215,7 @@ def test_coefficients_are_left_as_they_are():
     np.testing.assert_array_equal(w, before)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=60),
     st.integers(1, 50),
@@ -355,7 +355,7 @@ def test_independent_coefficients_have_the_classical_variance_over_the_efficienc
     assert np.all(np.diag(ratio) >= 1.0)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None)
 @given(
     st.integers(8, 3_000_000),
     st.sampled_from(

@@ -40,7 +40,8 @@ def redundant_notices(
 
     The amplitude alone does not tell: among all shapes one always fits some accident of the data.
     The objective without the term does, at one per cent shared among the levels where a term of
-    this kind might have been found.
+    this kind might have been found. ``point.objective`` is under ``covariance``, whatever the
+    weights of the estimate were.
     """
     root = weight_root(covariance)
     redundant: list[tuple[float, int]] = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gmwm._core.typing import FloatArray
@@ -67,7 +69,9 @@ def conclude_moments(
     comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1])
     notices = [
         *limit_notices(design, point.shapes, point.x),
-        *redundant_notices(design, point, target, covariance),
+        *redundant_notices(
+            design, replace(point, objective=comparison.objective), target, covariance
+        ),
         *level_notices(target.size, design.n_free),
     ]
     if discrepancy > 0.0:

@@ -61,7 +61,8 @@ class Term:
     def free_names(self) -> list[str]:
         """Names of the free parameters, the amplitude first."""
         shapes = zip(self.process.shape_parameters, self.free_shape, strict=True)
-        return [self.linear.name] * self.free_scale + [p.name for p, free in shapes if free]
+        scale = [self.linear.name] if self.free_scale else []
+        return scale + [p.name for p, free in shapes if free]
 
     def moved(self, shape: Shape, free: FloatArray) -> Shape:
         """A shape with its free part at other coordinates, fixed parameters exactly as they are."""

@@ -109,6 +109,7 @@ class Fit(Document):
     regions: tuple[Region, ...] = ()
 
     def __post_init__(self) -> None:
+        checks.choice("method", self.method, tuple(METHOD_NAMES))
         freeze(self, "covariance", "upper_bounds", "error_growth")
 
     # -- can it be trusted ------------------------------------------------------------------------

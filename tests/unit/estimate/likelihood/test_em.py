@@ -28,7 +28,7 @@ from gmwm.process import as_model
 
 
 def em(model, x, dt=1.0, **options):
-    return gmwm.fit(model, x, dt=dt, method="em", **options)
+    return gmwm.fit(model, x, dt=dt, method=gmwm.EM(**options))
 
 
 def falls(trace):
@@ -64,7 +64,7 @@ def climbs(draw):
 
 
 @given(climbs())
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None)
 def test_the_likelihood_never_falls(case):
     model, start, x = case
     fit = em(model.opened(), x, start=start, accelerate=False, max_iterations=10)
@@ -175,7 +175,7 @@ def test_iterations_that_run_out_are_no_valid_fit(accelerate):
         fit = em(truth.opened(), x, start=start, max_iterations=most, accelerate=accelerate)
         assert not fit.valid
         assert "EM did not converge" in fit.message
-        assert "max_iterations" in fit.message
+        assert not fit.reasons["converged"]
         assert len(fit.trace) == most
 
 
@@ -250,7 +250,7 @@ def test_a_drift_of_a_gauss_markov_state_is_forgotten(order):
     x = (WhiteNoise(0.5) + GaussMarkov(0.5, tau)).simulate(n, 1.0, seed=8) + rise
     terms = [WhiteNoise(), GaussMarkov()][::order]
     fit = em(terms[0] + terms[1] + RateRamp(), x, drift="state", max_iterations=200)
-    assert "no ramp of the signal" in fit.message
+    assert "not a ramp of the signal" in fit.message
     # The first state has the covariance of one step, which its M step does not know of.
     assert falls(fit.trace) < 0.02
 
@@ -405,5 +405,7 @@ def test_processes_without_a_closed_form_are_refused_with_the_way_out(process):
     ],
 )
 def test_options_out_of_range_are_refused(option, value):
-    with pytest.raises(InputError, match=f"{option} = .*positive"):
+    with pytest.raises(
+        InputError, match=f"{option} = .*give a (small positive number|whole number, 1 or more)"
+    ):
         em(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), **{option: value})

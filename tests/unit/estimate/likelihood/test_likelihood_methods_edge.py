@@ -15,6 +15,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
+from gmwm.estimate import METHODS
 from gmwm.process import as_model
 
 OF_SAMPLES = ("mle", "whittle", "em")
@@ -69,7 +70,7 @@ def test_models_without_white_noise_are_found_again(truth):
 def test_too_rich_a_model_of_white_noise_is_not_valid(method, model):
     x = WhiteNoise(1.0).simulate(1000, 1.0, seed=3)
     options = {"max_iterations": 200} if method == "em" else {}
-    fit = gmwm.fit(model, x, dt=1.0, method=method, **options)
+    fit = gmwm.fit(model, x, dt=1.0, method=METHODS[method](**options))
     assert not fit.valid
     assert fit.message
     assert np.all(np.isfinite(list(fit.params.values())))

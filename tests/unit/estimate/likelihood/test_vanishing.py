@@ -7,7 +7,7 @@ from scipy.optimize import minimize_scalar
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.vanishing import idle_term
+from gmwm.estimate.likelihood.vanishing import redundant_term
 from gmwm.estimate.problem.parameters import Coordinates
 
 
@@ -40,14 +40,14 @@ def test_a_bound_has_the_unit_of_its_parameter():
     assert scaled.upper_bounds["K"] == pytest.approx(1e-4 * plain.upper_bounds["K"], rel=1e-2)
 
 
-def test_a_term_is_idle_where_the_likelihood_does_not_miss_it():
+def test_a_term_is_redundant_where_the_likelihood_does_not_miss_it():
     truth = WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)
     x = truth.simulate(2000, 1.0, seed=1)
     likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
     coordinates = Coordinates(truth.opened() + RandomWalk() + RateRamp())
     present = (*truth.terms, RandomWalk(1e-9))
-    assert idle_term(coordinates, present, likelihood) == 2
-    assert idle_term(coordinates.without([2]), truth.terms, likelihood) is None
+    assert redundant_term(coordinates, present, likelihood) == 2
+    assert redundant_term(coordinates.without([2]), truth.terms, likelihood) is None
     # A given amplitude is not for the likelihood to drop.
     given = Coordinates(truth.opened() + RandomWalk(1e-9))
-    assert idle_term(given, present, likelihood) is None
+    assert redundant_term(given, present, likelihood) is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, WhiteNoise, parameter
+from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, SimulatedMoments, WhiteNoise, parameter
 from gmwm.estimate.problem.simulation import Simulation
 
 
@@ -42,7 +42,7 @@ def series():
 
 def test_a_known_process_by_simulation_agrees_with_its_closed_form(series):
     closed = gmwm.fit(TRUTH.opened(), series, dt=1.0)
-    simulated = gmwm.fit(TRUTH.opened(), series, dt=1.0, method="simulated", replications=16)
+    simulated = gmwm.fit(TRUTH.opened(), series, dt=1.0, method=SimulatedMoments(replications=16))
     assert simulated.valid, simulated.message
     for key, error in closed.stderr.items():
         # The simulated series are so many more: their own error is a quarter of the data's.
@@ -55,16 +55,18 @@ def test_the_covariance_grows_by_the_share_of_the_simulation():
     closed = gmwm.fit(WhiteNoise(), series, dt=1.0)
     for replications in (1, 4):
         found = gmwm.fit(
-            WhiteNoise(), series, dt=1.0, method="simulated", replications=replications,
-            discrepancy=0.0,
-        )  # fmt: skip
+            WhiteNoise(),
+            series,
+            dt=1.0,
+            method=SimulatedMoments(replications=replications, discrepancy=0.0),
+        )
         ratio = found.covariance[0, 0] / closed.covariance[0, 0]
         assert ratio == pytest.approx(1.0 + 1.0 / replications, rel=0.1)
 
 
 def test_the_same_seed_gives_the_same_estimates(series):
     fits = [
-        gmwm.fit(TRUTH.opened(), series, dt=1.0, method="simulated", replications=2, seed=seed)
+        gmwm.fit(TRUTH.opened(), series, dt=1.0, method=SimulatedMoments(replications=2, seed=seed))
         for seed in (5, 5, 6)
     ]
     assert fits[0].params == fits[1].params
@@ -76,7 +78,7 @@ def test_noise_rounded_as_coarsely_as_it_is_large():
     errors, naive = [], []
     for seed in range(8):
         x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, seed)
-        fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method="simulated", replications=4)
+        fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method=SimulatedMoments(replications=4))
         assert fit.valid, fit.message
         errors.append((fit.params["sigma"] - 0.7) / fit.stderr["sigma"])
         white = gmwm.fit(WhiteNoise(), x, dt=1.0)
@@ -88,8 +90,8 @@ def test_noise_rounded_as_coarsely_as_it_is_large():
 def test_a_bias_held_in_blocks():
     truth = WhiteNoise(1.0) + BlockBias(level=0.5, hold=64.0)
     fits = [
-        gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0, replications=4,
-                 method="simulated")
+        gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0,
+method=SimulatedMoments(replications=4))
         for seed in (1, 2, 3)
     ]  # fmt: skip
     for fit in fits:
@@ -133,15 +135,15 @@ def test_rounding_to_nothing_has_no_variance():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"replications": 0}, "positive whole number"),
-        ({"replications": 1.5}, "positive whole number"),
-        ({"seed": -1}, "zero or more"),
-        ({"start": WhiteNoise(1.0)}, "no option of method 'simulated'"),
+        ({"replications": 0}, "whole number, 1 or more"),
+        ({"replications": 1.5}, "whole number, 1 or more"),
+        ({"seed": -1}, "whole number, 0 or more"),
+        ({"discrepancy": 2.0}, "fraction of the variance"),
     ],
 )
-def test_bad_options_are_refused(series, options, words):
+def test_bad_options_are_refused(options, words):
     with pytest.raises(gmwm.InputError, match=words):
-        gmwm.fit(WhiteNoise(), series, dt=1.0, method="simulated", **options)
+        SimulatedMoments(**options)
 
 
 def test_likelihoods_refuse_what_has_no_spectrum(series):
@@ -155,6 +157,6 @@ def test_likelihoods_refuse_what_has_no_spectrum(series):
 def test_two_parameters_of_one_number_are_said_not_to_be_told_apart(series):
     """Rounded white noise is white: its variance alone gives no step."""
     x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 1)
-    fit = gmwm.fit(RoundedNoise(), x, dt=1.0, method="simulated", replications=4)
+    fit = gmwm.fit(RoundedNoise(), x, dt=1.0, method=SimulatedMoments(replications=4))
     assert not fit.valid
-    assert "sigma and lsb cannot be told apart" in fit.message
+    assert "lsb: cannot be told apart from sigma" in fit.message

@@ -44,7 +44,12 @@ class TestResiduals:
         residuals = []
         for seed in range(runs):
             # The true values in place of the estimated ones, which would take some of the spread.
-            fit = gmwm.fit(WhiteNoise(), truth.simulate(1000, 1.0, seed), dt=1.0, discrepancy=0.0)
+            fit = gmwm.fit(
+                WhiteNoise(),
+                truth.simulate(1000, 1.0, seed),
+                dt=1.0,
+                method=gmwm.GMWM(discrepancy=0.0),
+            )
             residuals.append(replace(fit, model=truth).goodness.residual)
         table = np.array(residuals)
         assert np.all(np.abs(table.mean(axis=0)) < 4.5 / runs**0.5)
@@ -76,24 +81,24 @@ class TestResiduals:
         at = fit.goodness
         k = int(np.flatnonzero(at.tau == tau)[0])
         assert at.residual[k] > 10.0
-        # What was granted brings the residuals down to their usual size.
-        assert abs(at.granted[k]) < 0.5 * abs(at.residual[k])
-        assert np.sqrt(np.mean(at.granted**2)) < 2.0
+        # What was allowed for brings the residuals down to their usual size.
+        assert abs(at.allowed[k]) < 0.5 * abs(at.residual[k])
+        assert np.sqrt(np.mean(at.allowed**2)) < 2.0
 
     def test_a_model_that_misses_a_level_by_far_is_excluded(self):
         truth = WhiteNoise(1.0) + GaussMarkov(0.3, 300.0)
         x = truth.simulate(50_000, 1.0, 1)
-        rigid = gmwm.fit(WhiteNoise(), x, dt=1.0, discrepancy=0.0)
+        rigid = gmwm.fit(WhiteNoise(), x, dt=1.0, method=gmwm.GMWM(discrepancy=0.0))
         assert rigid.goodness.is_excluded
         # A large misfit alone is no proof: at few degrees of freedom it is chance.
         chance = [gmwm.fit(truth.opened(), truth.simulate(3000, 1.0, s), dt=1.0) for s in range(20)]
         assert any(np.max(np.abs(fit.goodness.misfit)) > 0.3 for fit in chance)
         assert not any(fit.goodness.is_excluded for fit in chance)
 
-    def test_nothing_granted_changes_nothing(self):
+    def test_nothing_allowed_for_changes_nothing(self):
         fit = fitted()
         assert fit.discrepancy == 0.0
-        np.testing.assert_array_equal(fit.goodness.residual, fit.goodness.granted)
+        np.testing.assert_array_equal(fit.goodness.residual, fit.goodness.allowed)
 
 
 class TestEveryMethod:
@@ -179,7 +184,9 @@ def test_extremes_fit_the_table():
     at = fitted().goodness
     odd = replace(at, misfit=at.misfit * 1e7, residual=at.residual * 1e3, name="x" * 20)
     assert max(map(len, str(odd).splitlines())) <= 80
-    assert "granted" in str(replace(odd, misfit=np.full(at.tau.size, np.nan)))
+    none = replace(odd, misfit=np.full(at.tau.size, np.nan), dof=np.full(at.tau.size, np.nan))
+    assert none.worst is None
+    assert "largest misfit" not in str(none)
 
 
 def test_the_fit_tells_the_largest_misfit():

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from gmwm.ins.geometry.earth import (
     earth_rate,
@@ -65,7 +65,6 @@ def test_radii_and_gravity_agree_with_pyins() -> None:
         np.testing.assert_allclose(earth_rate(math.radians(lat)), rate[[0, 2]], atol=1e-18)
 
 
-@settings(deadline=None, derandomize=True)
 @given(LATITUDES, st.floats(-4, 4), st.floats(0, 2 * math.pi), st.floats(1, 3000))
 def test_differences_are_distances_in_space(
     lat: float, lon: float, bearing: float, distance: float

@@ -3,7 +3,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
@@ -21,14 +21,12 @@ ANGLES = st.floats(-4 * math.pi, 4 * math.pi)
 PITCHES = st.floats(-math.pi / 2, math.pi / 2)
 
 
-@settings(deadline=None, derandomize=True)
 @given(ANGLES, PITCHES, ANGLES)
 def test_matrices_are_those_of_scipy(roll: float, pitch: float, yaw: float) -> None:
     expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
     np.testing.assert_allclose(matrix_from_rpy(np.array([roll, pitch, yaw])), expected, atol=1e-14)
 
 
-@settings(deadline=None, derandomize=True)
 @given(ANGLES, st.sampled_from([-1.0, 1.0]), st.floats(0, 1e-3) | st.just(0.0), ANGLES)
 def test_angles_give_the_matrix_back_even_straight_up(
     roll: float, sign: float, off: float, yaw: float
@@ -39,7 +37,6 @@ def test_angles_give_the_matrix_back_even_straight_up(
     np.testing.assert_allclose(matrix_from_rpy(rpy), C, atol=1e-11)
 
 
-@settings(deadline=None, derandomize=True)
 @given(ANGLES, st.floats(-1.5, 1.5), ANGLES)
 def test_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
     rpy = np.array([roll, pitch, yaw])

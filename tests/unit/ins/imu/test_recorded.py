@@ -33,7 +33,7 @@ def test_stretches_cover_what_they_can_and_never_overlap(lengths, duration):
         values = np.arange(length)[:, None] ** 1.5 + 1e6 * i + np.arange(6)
         recordings.append(recording(values, source=f"{i}.csv"))
         whole.append(values - values.mean(axis=0))
-    n = round(duration * 10.0)
+    n = round(duration / recordings[0].dt)
     counts = [length // n for length in lengths]
     if not any(counts):
         with pytest.raises(InputError, match="shorten it or record longer"):

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from gmwm.ins.trajectory.manoeuvres import Pulse
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.floats(-500, 500).filter(lambda x: abs(x) > 1e-3), st.floats(0.01, 10), st.floats(0.1, 5))
 def test_rates_stay_within_the_limit_and_come_to_the_change(
     change: float, limit: float, ramp: float

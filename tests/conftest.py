@@ -1,0 +1,9 @@
+"""What every test runs under."""
+
+from hypothesis import settings
+
+# A suite that fails one day in fifty teaches people to run it again; the bounds of statistical
+# properties hold with a probability. `pytest --hypothesis-profile explore` draws examples anew.
+settings.register_profile("fixed", derandomize=True, deadline=None)
+settings.register_profile("explore", deadline=None, max_examples=500)
+settings.load_profile("fixed")
