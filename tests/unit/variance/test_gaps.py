@@ -16,6 +16,7 @@ from gmwm import (
     Resonance,
     WhiteNoise,
 )
+from gmwm.estimate import estimate
 from gmwm.variance.filling import Filling
 from gmwm.variance.gap_kernels import pairs_at_lag
 from gmwm.variance.gaps import Gaps, common_share, pair_factor, window_centres
@@ -347,7 +348,7 @@ def test_fits_of_gappy_series_are_as_good_as_their_intervals(truth):
     for _ in range(runs):
         starts = rng.choice(n - 100, 16, replace=False)
         x = with_gaps(truth.simulate(n, 1.0, rng), [(a, a + 100) for a in starts])
-        fit = gmwm.estimate(truth.opened(), x, dt=1.0)
+        fit = estimate(truth.opened(), x, dt=1.0)
         invalid += not fit.valid
         errors = [(fit.params[k] - truth.params[k]) / s for k, s in fit.stderr.items()]
         squares.append(np.square(errors))
