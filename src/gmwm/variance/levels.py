@@ -27,8 +27,8 @@ from gmwm.variance.pilot import pilot_psd
 from gmwm.variance.runs import Runs
 
 _MAX_BLOCKS, _MAX_BLOCKS_WITH_GAPS = 2048, 512
-_LARGEST_CHANGE = 1.0  # of an expected variance by filling
-_SEEN = 4.0  # windows that do not overlap, from which a level tells the pilot spectrum
+_LARGEST_CHANGE = 1.5  # of an expected variance by filling
+_SEEN = 8.0  # windows that do not overlap, from which a level tells the pilot spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +81,11 @@ class Levels:
         none = np.zeros(m.size)
         whole = replace(plain, averaging=m, change=none, filled=none == 0.0)
         variance = plain._pilot_variance(0)
-        first = whole._filled_under(variance, gaps, dt)
+        fine = [not np.any(gaps.filled(each)) for each in plain.averaging]
+        scarcity = float(np.min((plain.averaging / plain.counts)[fine]))
+        first = whole._filled_under(variance, scarcity, gaps, dt)
         variance = np.append(variance, first._pilot_variance(variance.size))
-        return whole._filled_under(variance, gaps, dt)
+        return whole._filled_under(variance, scarcity, gaps, dt)
 
     def _pilot_variance(self, start: int) -> FloatArray:
         """Variances without the drift of the levels from ``start`` on that are well known.
@@ -100,14 +102,22 @@ class Levels:
         )
         return np.maximum(part.driftless(part.moments()), np.finfo(float).tiny)
 
-    def _filled_under(self, variance: FloatArray, gaps: Gaps, dt: float) -> Levels:
-        """With the gaps filled under the spectrum that these variances of fine levels imply."""
+    def _filled_under(self, variance: FloatArray, scarcity: float, gaps: Gaps, dt: float) -> Levels:
+        """With the gaps filled under the spectrum that these variances of fine levels imply.
+
+        The averaging time over the number of windows goes with the relative sampling variance.
+        Where that of the fine levels, ``scarcity``, makes the change known worse than the level
+        itself, as where hardly two samples follow each other, the level is not filled.
+        """
         psd = pilot_psd(variance, self.averaging[: variance.size], dt)
         filling = Filling.under(psd, dt, gaps)
+        found = replace(self, filling=filling)
         change = filling.change(self.averaging)
+        own = self.averaging / np.maximum(found.counts, 1.0)
         filled = np.abs(change) <= _LARGEST_CHANGE
+        filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
         change = np.where(filled, change, 0.0)
-        found = replace(self, filling=filling, change=change, filled=filled)
+        found = replace(found, change=change, filled=filled)
         exist = int(np.sum(np.cumprod(found.counts > 0.0)))
         return replace(
             found,
