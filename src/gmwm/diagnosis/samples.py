@@ -60,7 +60,7 @@ def _gap_finding(channel: Channel, dt: float) -> Finding | None:
     if share > _TOO_MUCH_MISSING:
         return Finding(channel.name, "gap", "bad", text, "too few are left: record again", values)
     severity: Severity = "warning" if share > _MUCH_MISSING else "note"
-    action = "the wavelet variance leaves out what gaps touch"
+    action = "the wavelet variance bridges short gaps and leaves out what others touch"
     return Finding(channel.name, "gap", severity, text, action, values)
 
 
