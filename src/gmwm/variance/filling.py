@@ -187,8 +187,11 @@ class Filling:
         edges, block, boxes = gaps.edges[chosen], gaps.block[chosen], gaps.boxes[chosen]
         fill(values, integral, edges, block, boxes, weights, slope)
 
-    def change(self, averaging: FloatArray) -> FloatArray:
-        """Relative change of the expected wavelet variances, (J,)."""
+    def change(self, averaging: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Relative change of the expected wavelet variances, and that by the error alone, (J,).
+
+        The latter is the wavelet variance of the error, without its covariance with the series.
+        """
         f, quadrature_weight = _nodes()
         gaps = self.gaps
         kinds, kind = gaps.kinds
@@ -197,7 +200,7 @@ class Filling:
             filled = gaps.filled(m)
             covered[j] = np.bincount(kind[filled], gaps.covered(int(m)), kinds.shape[0])
             covered[j] /= max(window_count(gaps.joined(m), 2.0 * m), 1.0)
-        total = np.zeros(averaging.size)
+        crossed, squared = np.zeros(averaging.size), np.zeros(averaging.size)
         for block in np.unique(kinds[:, 0]):
             rows = np.flatnonzero((kinds[:, 0] == block) & np.any(covered > 0.0, axis=0))
             levels = np.flatnonzero(np.any(covered[:, rows] > 0.0, axis=1))
@@ -206,15 +209,16 @@ class Filling:
             power = quadrature_weight * block_density(self.psd, self.dt, f, int(block))
             m = averaging[levels] / block
             gains = np.array([_gain(each) for each in m])
-            crossed, squares, tents = np.array([self._kernels(row)[:3] for row in rows]).swapaxes(
-                0, 1
-            )
-            added = 2.0 * (gains * power) @ crossed.T
-            added += np.outer(0.5 / m, squares @ power) - np.outer(0.75 / m**2, tents @ power)
-            total[levels] += block * np.sum(covered[np.ix_(levels, rows)] * added, axis=1)
+            kernels = np.array([self._kernels(row)[:3] for row in rows])
+            products, squares, tents = kernels.swapaxes(0, 1)
+            share = block * covered[np.ix_(levels, rows)]
+            crossed[levels] += np.sum(share * (2.0 * (gains * power) @ products.T), axis=1)
+            added = np.outer(0.5 / m, squares @ power) - np.outer(0.75 / m**2, tents @ power)
+            squared[levels] += np.sum(share * added, axis=1)
         power = quadrature_weight * block_density(self.psd, self.dt, f, 1)
-        total += self._of_pairs(averaging, covered, power)
-        return total / np.array([_gain(m) @ power for m in averaging])
+        squared += self._of_pairs(averaging, covered, power)
+        variance = np.array([_gain(m) @ power for m in averaging])
+        return (crossed + squared) / variance, squared / variance
 
     def _of_pairs(
         self, averaging: FloatArray, covered: FloatArray, power: FloatArray

@@ -28,6 +28,7 @@ from gmwm.variance.runs import Runs
 
 _MAX_BLOCKS, _MAX_BLOCKS_WITH_GAPS = 2048, 512
 _LARGEST_CHANGE = 1.5  # of an expected variance by filling
+_DECIDED = 32.0  # such windows, from which a level tells whether it can be filled
 _SEEN = 8.0  # windows that do not overlap, from which a level tells the pilot spectrum
 
 
@@ -48,6 +49,8 @@ class Levels:
         How short gaps are filled; ``None`` where none are.
     change : (J,) ndarray
         Of the expected variances by filling, relative.
+    error : (J,) ndarray
+        Wavelet variances of the error of the filling, relative.
     filled : (J,) ndarray of bool
         Levels for which gaps are filled.
     slope : float
@@ -60,6 +63,7 @@ class Levels:
     wavelet: str
     filling: Filling | None
     change: FloatArray
+    error: FloatArray
     filled: NDArray[np.bool_]
     slope: float
 
@@ -71,7 +75,7 @@ class Levels:
             kind = known_wavelet(wavelet)
             m = m[[kind.width(j + 1) <= runs.longest for j in range(m.size)]]
         none = np.zeros(m.size)
-        plain = cls(values, runs, m, wavelet, None, none, none > 0.0, _slope(values))
+        plain = cls(values, runs, m, wavelet, None, none, none, none > 0.0, _slope(values))
         if runs.is_complete or wavelet != "haar":
             return plain
         gaps = Gaps.of(runs)
@@ -79,7 +83,7 @@ class Levels:
         if not np.any(gaps.filled(m[-1])):
             return plain
         none = np.zeros(m.size)
-        whole = replace(plain, averaging=m, change=none, filled=none == 0.0)
+        whole = replace(plain, averaging=m, change=none, error=none, filled=none == 0.0)
         variance = plain._pilot_variance(0)
         fine = [not np.any(gaps.filled(each)) for each in plain.averaging]
         scarcity = float(np.min((plain.averaging / plain.counts)[fine]))
@@ -98,6 +102,7 @@ class Levels:
             self,
             averaging=self.averaging[start:known],
             change=self.change[start:known],
+            error=self.error[start:known],
             filled=self.filled[start:known],
         )
         return np.maximum(part.driftless(part.moments()), np.finfo(float).tiny)
@@ -112,17 +117,22 @@ class Levels:
         psd = pilot_psd(variance, self.averaging[: variance.size], dt)
         filling = Filling.under(psd, dt, gaps)
         found = replace(self, filling=filling)
-        change = filling.change(self.averaging)
+        change, error = filling.change(self.averaging)
         own = self.averaging / np.maximum(found.counts, 1.0)
         filled = np.abs(change) <= _LARGEST_CHANGE
         filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
-        change = np.where(filled, change, 0.0)
-        found = replace(found, change=change, filled=filled)
+        # Of the coarsest levels the pilot knows too little to decide anew.
+        decided = max(int(np.sum(found.counts >= _DECIDED * 2.0 * self.averaging)), 1)
+        filled[decided:] = filled[decided - 1]
+        change = np.minimum(change, _LARGEST_CHANGE)
+        change, error = np.where(filled, (change, error), 0.0)
+        found = replace(found, change=change, error=error, filled=filled)
         exist = int(np.sum(np.cumprod(found.counts > 0.0)))
         return replace(
             found,
             averaging=self.averaging[:exist],
             change=change[:exist],
+            error=error[:exist],
             filled=filled[:exist],
         )
 
@@ -161,7 +171,7 @@ class Levels:
             growth = np.array([pair_factor(own, m, n) for own, m in pairs])
         else:
             growth = (n - widths + 1.0) / self.counts
-        deviation = np.sqrt(growth) * (1.0 + np.abs(self.change))
+        deviation = np.sqrt(growth) * (1.0 + self.error)
         inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
         return GapEffects(n - self.runs.present, self.counts, self.change, inflation)
 

@@ -166,7 +166,7 @@ def test_change_is_that_of_the_quadratic_form(process, pattern):
         for levels, values, _ in filling.series(unit, averaging, 0.0):
             operators[levels, :, i] = np.nan_to_num(values)
     covariance = covariance_of(process, n)
-    change = filling.change(averaging)
+    change, error = filling.change(averaging)
     for j, m in enumerate(averaging):
         rows = haar_rows(gaps.joined(m), int(m), n)
         if not rows.size:
@@ -175,6 +175,9 @@ def test_change_is_that_of_the_quadratic_form(process, pattern):
         expected = np.vdot(found @ covariance, found) / np.vdot(rows @ covariance, rows) - 1.0
         # Neighbours and the ends of the record are approximate; most where much is missing.
         assert change[j] == pytest.approx(expected, rel=0.04, abs=5e-4), m
+        found -= rows
+        expected = np.vdot(found @ covariance, found) / np.vdot(rows @ covariance, rows)
+        assert error[j] == pytest.approx(expected, rel=0.06, abs=5e-4), m
 
 
 def test_a_drift_goes_on_through_a_gap():
