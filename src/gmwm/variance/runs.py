@@ -34,11 +34,6 @@ class Runs:
         edges = np.flatnonzero(present[1:] != present[:-1])
         return cls(tuple(edges[::2].tolist()), tuple(edges[1::2].tolist()), int(values.size))
 
-    @classmethod
-    def complete(cls, n: int) -> Runs:
-        """One run of n samples."""
-        return cls((0,), (n,), n)
-
     @property
     def is_complete(self) -> bool:
         """Whether no sample is missing."""
@@ -58,9 +53,3 @@ class Runs:
     def longest(self) -> int:
         """Length of the longest run."""
         return int(np.max(self.edges[:, 1] - self.edges[:, 0], initial=0))
-
-    def counts(self, width: FloatArray) -> FloatArray:
-        """Number of windows of ``width`` samples that lie within a run, same shape."""
-        length = (self.edges[:, 1] - self.edges[:, 0]).astype(float)
-        width = np.asarray(width, dtype=float)
-        return np.sum(np.maximum(length - width[..., None] + 1.0, 0.0), axis=-1)

@@ -19,7 +19,13 @@ from gmwm import (
 from gmwm.estimate import estimate
 from gmwm.variance.filling import Filling
 from gmwm.variance.gap_kernels import pairs_at_lag
-from gmwm.variance.gaps import Gaps, common_share, pair_factor, window_centres
+from gmwm.variance.gaps import (
+    Gaps,
+    common_share,
+    pair_factor,
+    window_centres,
+    window_count,
+)
 from gmwm.variance.runs import Runs
 
 
@@ -64,7 +70,7 @@ def test_runs_count_what_a_loop_counts(present, width):
     values = np.where(present, 0.0, np.nan)
     runs = Runs.of(values)
     windows = [all(present[t : t + width]) for t in range(len(present) - width + 1)]
-    assert runs.counts(np.array([width]))[0] == sum(windows)
+    assert window_count(runs.edges, width) == sum(windows)
     assert runs.present == sum(present)
     assert runs.is_complete == all(present)
 
