@@ -50,7 +50,7 @@ def _gap_notice(channel: Channel, dt: float) -> Notice | None:
     if share > tuning.TOO_MUCH_MISSING:
         return Notice("gap", "bad", channel.name, text, values, "too few are left: record again")
     severity: Severity = "warning" if share > tuning.MUCH_MISSING else "note"
-    action = "the wavelet variance leaves out what gaps touch"
+    action = "the wavelet variance bridges short gaps and leaves out what others touch"
     return Notice("gap", severity, channel.name, text, values, action)
 
 

@@ -197,6 +197,7 @@ class AllanLines:
                 *_absence_notices(absent),
                 *_slope_notices(wv, [(lines[key], run) for key, run in given.items()]),
                 *_misfit_notices(fitted, wv),
+                *wv.notices,
             ),
             regions=tuple(
                 Region(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,13 +12,10 @@ from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
-from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
+from gmwm.variance.levels import Levels
 from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
 
-_MAX_BLOCKS, _MAX_BLOCKS_WITH_GAPS = 2048, 512
-_LEAST_PRESENT = 0.9  # of a block whose mean counts
 _SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
 MIN_SAMPLES = 8
 """Fewest samples of which a wavelet variance is made."""
@@ -37,7 +34,10 @@ def wavelet_variance(
     """MODWT wavelet variance of a channel or an array.
 
     All levels with at least one coefficient free of end effects are given; the mean of the series
-    does not matter. Coefficients that a missing sample (NaN) takes part in are left out.
+    does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
+    averaging time are filled from what is around them, and what that changes in the expected
+    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing samples
+    take part in are left out.
 
     Parameters
     ----------
@@ -76,31 +76,28 @@ def wavelet_variance(
     values, runs = checked_samples(channel)
     confidence = checks.share("confidence", confidence, 0.95)
     efficiency = checks.share("efficiency", efficiency, 0.6)
-    robust = checks.truth("robust", robust)
+    efficiency = efficiency if checks.truth("robust", robust) else 1.0
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    averaging = _averaging(channel, runs, wavelet)
-    mean = float(np.nanmean(values))
-    integral = cumulative(values, mean)
-    if wavelet == "haar" and not robust:
-        moments = np.array([haar_moments(integral, runs.edges, int(m)) for m in averaging])
-    else:
-        parts = _coefficients(values - mean, integral, runs, wavelet, averaging)
-        moments = _moments(parts, efficiency if robust else 1.0)
+    _check_width(channel, runs, wavelet)
+    values = values - float(np.nanmean(values))
+    levels = Levels.of(values, runs, wavelet, channel.dt)
+    moments = levels.moments()
     driftless = None
     if robust:
-        level = _without_line(values)
-        parts = _coefficients(level, cumulative(level, 0.0), runs, wavelet, averaging)
-        driftless = _moments(parts, efficiency)[:, 1]
-    blocks, block = _block_means(values, integral, runs)
+        moments = _robust_moments(levels.coefficients(), efficiency)
+        driftless = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
+        driftless = driftless / (1.0 + levels.change)
+    blocks, block = levels.block_means()
     found = None
     if data_covariance is not None:
-        parts = _coefficients(values - mean, integral, runs, wavelet, averaging)
-        found = covariance_of_data(parts, data_covariance)
+        factor = 1.0 / (1.0 + levels.change)
+        found = covariance_of_data(levels.coefficients(), data_covariance)
+        found = found * np.outer(factor, factor)
     return WaveletVariance(
-        tau=averaging * channel.dt,
-        variance=moments[:, 1],
+        tau=levels.averaging * channel.dt,
+        variance=levels.unfilled(moments),
         mean=moments[:, 0],
         blocks=blocks,
         block=block,
@@ -111,9 +108,9 @@ def wavelet_variance(
         quantity=channel.quantity,
         unit=channel.unit or "u",
         wavelet=wavelet,
-        efficiency=efficiency if robust else 1.0,
+        efficiency=efficiency,
         driftless=driftless,
-        present=None if runs.is_complete else runs,
+        gaps=levels.effects(),
         data_covariance=found,
     )
 
@@ -160,64 +157,20 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
     return values, runs
 
 
-def _averaging(channel: Channel, runs: Runs, wavelet: str) -> FloatArray:
-    """Averaging times, in samples, of the levels with a coefficient."""
-    if wavelet == "haar":
-        return dyadic_levels(runs.longest)
-    kind = known_wavelet(wavelet)
-    if kind.width(1) > runs.longest:
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
         raise InputError(
-            f"{_where(channel)} has no {kind.width(1)} samples in a row, which {wavelet} needs: "
+            f"{_where(channel)} has no {width} samples in a row, which {wavelet} needs: "
             "take a shorter wavelet, e.g. haar"
         )
-    m = dyadic_levels(runs.longest)
-    return m[[kind.width(j + 1) <= runs.longest for j in range(m.size)]]
 
 
-def _moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
-    """Mean, and mean square or its robust stand-in, of each level's coefficients, (J, 2)."""
-    if efficiency == 1.0:
-        return np.array([(np.mean(w), np.mean(w * w)) for w in parts])
+def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
+    """Mean, and the robust stand-in for the mean square, of each level's coefficients, (J, 2)."""
     from gmwm.variance.robust import robust_variance
 
     return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
-
-
-def _coefficients(
-    values: FloatArray, integral: FloatArray, runs: Runs, wavelet: str, averaging: FloatArray
-) -> Iterator[FloatArray]:
-    """For each level, the coefficients that exist, over all runs."""
-    if wavelet == "haar":
-        for m in averaging:
-            parts = [haar_coefficients(integral, a, b, int(m)) for a, b in runs.edges]
-            yield np.concatenate(parts)
-        return
-    from gmwm.variance.modwt import coefficients
-
-    series = [coefficients(values[a:b], wavelet, averaging.size) for a, b in runs.edges]
-    for _ in averaging:
-        yield np.concatenate([next(part, np.zeros(0)) for part in series])
-
-
-def _without_line(values: FloatArray) -> FloatArray:
-    """The series less its least-squares line."""
-    k = np.arange(values.size) - 0.5 * (values.size - 1)
-    there = ~np.isnan(values)
-    line = np.polynomial.polynomial.polyfit(k[there], values[there], 1)
-    return np.asarray(values - np.polynomial.polynomial.polyval(k, line))
-
-
-def _block_means(values: FloatArray, integral: FloatArray, runs: Runs) -> tuple[FloatArray, int]:
-    """Means of blocks, NaN where too much is missing, and the samples per block."""
-    most = _MAX_BLOCKS if runs.is_complete else _MAX_BLOCKS_WITH_GAPS
-    block = -(-runs.n // most)
-    whole = (runs.n // block) * block
-    sums = np.diff(integral[: whole + 1 : block])
-    if runs.is_complete:
-        return sums / block, block
-    present = np.sum(~np.isnan(values[:whole]).reshape(-1, block), axis=1)
-    enough = present >= _LEAST_PRESENT * block
-    return np.where(enough, sums / np.maximum(present, 1), np.nan), block
 
 
 def as_wavelet_variance(

@@ -69,6 +69,7 @@ class PooledVariance(WaveletVariance):
             wavelet=longest.wavelet,
             efficiency=longest.efficiency,
             driftless=driftless,
+            gaps=longest.gaps,
             data_covariance=covariance,
             parts=tuple(parts),
         )

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from gmwm._core.typing import FloatArray
 
@@ -35,11 +34,6 @@ class Runs:
         edges = np.flatnonzero(present[1:] != present[:-1])
         return cls(tuple(edges[::2].tolist()), tuple(edges[1::2].tolist()), int(values.size))
 
-    @classmethod
-    def complete(cls, n: int) -> Runs:
-        """One run of n samples."""
-        return cls((0,), (n,), n)
-
     @property
     def is_complete(self) -> bool:
         """Whether no sample is missing."""
@@ -59,28 +53,3 @@ class Runs:
     def longest(self) -> int:
         """Length of the longest run."""
         return int(np.max(self.edges[:, 1] - self.edges[:, 0], initial=0))
-
-    def counts(self, width: FloatArray) -> FloatArray:
-        """Number of windows of ``width`` samples that lie within a run, same shape."""
-        length = (self.edges[:, 1] - self.edges[:, 0]).astype(float)
-        width = np.asarray(width, dtype=float)
-        return np.sum(np.maximum(length - width[..., None] + 1.0, 0.0), axis=-1)
-
-    def occupancy(self, width: int, block: int) -> FloatArray:
-        """Share of the windows of ``width`` samples ending in each block that exist."""
-        size = -(-self.n // block)
-        inside = np.zeros(size * block + 1)
-        for start, stop in self.edges:
-            if stop - start >= width:
-                inside[start + width - 1] += 1.0
-                inside[stop] -= 1.0
-        return np.asarray(np.cumsum(inside[:-1]).reshape(size, block).mean(axis=1))
-
-
-def pair_counts(first: FloatArray, second: FloatArray, lags: NDArray[np.int64]) -> FloatArray:
-    """Number of pairs ``first[s] second[t]`` with s - t equal to each lag, in blocks."""
-    size = fft.next_fast_len(first.size + second.size, real=True)
-    product = fft.rfft(first, size) * np.conj(fft.rfft(second, size))
-    correlation = fft.irfft(product, size)
-    inside = np.abs(lags) < max(first.size, second.size)
-    return np.where(inside, np.maximum(correlation[lags % size], 0.0), 0.0)

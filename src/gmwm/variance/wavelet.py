@@ -12,18 +12,27 @@ import numpy as np
 from scipy.stats import chi2
 
 from gmwm._core.frames import frame
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD
-from gmwm.variance.covariance.gaps import gappy_covariance, gappy_mean_covariance
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
+from gmwm.variance.gaps import GapEffects
 from gmwm.variance.pilot import pilot_psd
-from gmwm.variance.runs import Runs
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
 _LEAST_DOF, _LEAST_QUANTILE = 0.01, 1e-9  # keep intervals that say nothing in numbers
+
+
+def _complete_levels(n: int, wavelet: str) -> int:
+    """Number of levels of a series without gaps."""
+    if wavelet == "haar":
+        return n.bit_length() - 1
+    from gmwm.process import wavelet as known_wavelet
+
+    return known_wavelet(wavelet).levels(n)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,8 +68,8 @@ class WaveletVariance:
     driftless : (J,) ndarray or None
         For robust estimates, those of the series less its least-squares line, u^2: they are no
         quadratic function of a drift.
-    present : Runs or None
-        The samples that exist; ``None`` if all do.
+    gaps : GapEffects or None
+        What missing samples do to the levels; ``None`` if there are none.
     data_covariance : (J, J) ndarray or None
         Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
         asked for.
@@ -80,13 +89,8 @@ class WaveletVariance:
     wavelet: str = "haar"
     efficiency: float = 1.0
     driftless: FloatArray | None = None
-    present: Runs | None = None
+    gaps: GapEffects | None = None
     data_covariance: FloatArray | None = None
-
-    @property
-    def runs(self) -> Runs:
-        """The samples that exist, between gaps."""
-        return self.present or Runs.complete(self.n)
 
     @property
     def n_all(self) -> int:
@@ -101,7 +105,7 @@ class WaveletVariance:
     @property
     def counts(self) -> FloatArray:
         """Number of coefficients of each level, (J,)."""
-        return self.runs.counts(self.width)
+        return self.n - self.width + 1.0 if self.gaps is None else self.gaps.counts
 
     @property
     def width(self) -> FloatArray:
@@ -132,6 +136,21 @@ class WaveletVariance:
     def allan_deviation(self) -> FloatArray:
         """Overlapping Allan deviation, u, (J,)."""
         return np.sqrt(self.allan_variance)
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What missing samples took from it."""
+        whole = _complete_levels(self.n, self.wavelet)
+        lost = whole - self.tau.size
+        if self.gaps is None or lost <= 0:
+            return ()
+        ends, complete = float(self.tau[-1]), self.dt * 2.0 ** (whole - 1)
+        text = (
+            f"missing samples shorten the curve: it ends at tau = {ends:.3g} s, that of a complete "
+            f"record at {complete:.3g} s"
+        )
+        values = {"levels": lost, "tau": ends, "complete": complete}
+        return (Notice("curve-shortened", "warning", self.name, text, values),)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -170,29 +189,27 @@ class WaveletVariance:
         return covariance
 
     def _of_haar(self, psd: PSD) -> FloatArray:
-        if self.present is None:
-            return haar_covariance(psd, self.n, self.dt)
-        return gappy_covariance(psd, self.present, self.dt, self.averaging)
+        return self._with_gaps(haar_covariance(psd, self.n, self.dt))
 
     def _of_other_wavelet(self, psd: PSD, lines: Sequence[tuple[float, float]]) -> FloatArray:
         from gmwm.variance.covariance.daubechies import wavelet_covariance
 
-        covariance = wavelet_covariance(
-            psd, self.n, self.dt, self.wavelet, self.tau.size, tuple(lines)
-        )
-        if self.present is None:
-            return covariance
-        complete = Runs.complete(self.n).counts(self.width)
-        more = np.maximum.outer(complete, complete) / np.maximum.outer(self.counts, self.counts)
-        return covariance * more
+        levels = self.tau.size
+        covariance = wavelet_covariance(psd, self.n, self.dt, self.wavelet, levels, tuple(lines))
+        return self._with_gaps(covariance)
 
     def mean_covariance_under(self, psd: PSD) -> FloatArray:
         """Covariance of ``mean`` at the coarse levels, zero at the others, u^2, (J, J)."""
         if not np.any(self.drift_response):
             return np.zeros((self.tau.size, self.tau.size))  # a drift adds nothing to scale
-        if self.present is None:
-            return mean_covariance(psd, self.n, self.dt)
-        return gappy_mean_covariance(psd, self.present, self.dt, self.averaging)
+        return self._with_gaps(mean_covariance(psd, self.n, self.dt))
+
+    def _with_gaps(self, complete: FloatArray) -> FloatArray:
+        """A covariance of all levels of a complete record, for those that the series has."""
+        if self.gaps is None:
+            return complete
+        levels = slice(0, self.tau.size)
+        return complete[levels, levels] * self.gaps.inflation
 
     @property
     def _positive(self) -> FloatArray:
@@ -253,8 +270,8 @@ class WaveletVariance:
     def _how(self) -> str:
         """What differs from the usual, for the head of a table."""
         parts = []
-        if self.present is not None:
-            parts.append(f"{self.n - self.present.present:,} of them missing")
+        if self.gaps is not None:
+            parts.append(f"{self.gaps.missing:,} of them missing")
         if self.wavelet != "haar":
             parts.append(self.wavelet)
         if self.efficiency < 1.0:
@@ -278,7 +295,7 @@ class WaveletVariance:
             "wavelet": self.wavelet,
             "efficiency": self.efficiency,
             "driftless": None if self.driftless is None else self.driftless.tolist(),
-            "present": None if self.present is None else self.present.edges.tolist(),
+            "gaps": None if self.gaps is None else self.gaps.to_dict(),
             "data_covariance": (
                 None if self.data_covariance is None else self.data_covariance.tolist()
             ),
@@ -292,9 +309,8 @@ class WaveletVariance:
         }
         numbers = {"n": int(content["n"]), "dt": float(content["dt"])}
         found: dict[str, Any] = {**content, **arrays, **numbers}
-        if content.get("present") is not None:
-            starts, stops = zip(*content["present"], strict=True)
-            found["present"] = Runs(starts, stops, found["n"])
+        if content.get("gaps") is not None:
+            found["gaps"] = GapEffects.from_dict(content["gaps"])
         for name in ("data_covariance", "driftless"):
             if content.get(name) is not None:
                 found[name] = np.array(content[name], dtype=float)

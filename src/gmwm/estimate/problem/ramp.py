@@ -44,21 +44,35 @@ class Slope:
 
 
 def ols_slope(wv: WaveletVariance) -> Slope:
-    """Ordinary least-squares slope of the block means, its variance left at zero: a first value."""
+    """Least-squares slope of the block means, its variance left at zero: a first value.
+
+    Each run of blocks has a level of its own.
+    """
     index = _existing(wv)
-    t = index * (wv.block * wv.dt)
-    return Slope(float(np.polynomial.polynomial.polyfit(t, wv.blocks[index], 1)[1]), 0.0)
+    run = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
+    centred = [
+        values - (np.bincount(run, values) / np.bincount(run))[run]
+        for values in (index * (wv.block * wv.dt), wv.blocks[index])
+    ]
+    t, means = centred
+    return Slope(float(t @ means / (t @ t)), 0.0)
 
 
 def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
-    """Generalized least-squares slope for noise of spectrum ``psd``."""
+    """Generalized least-squares slope for noise of spectrum ``psd``.
+
+    Nothing is taken from a difference across a gap: the wavelet variances do not see it either.
+    """
     index = _existing(wv)
-    difference, apart = np.diff(wv.blocks[index]), np.diff(index).astype(float)
+    first = _beside(index)
+    difference = wv.blocks[first + 1] - wv.blocks[first]
     column = _difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
-    solved = _solve(column, index, np.column_stack([apart, difference]))
-    information = float(apart @ solved[:, 0])
+    one = np.ones(first.size)
+    solved = _solve(column, first, np.column_stack([one, difference]))
+    information = float(one @ solved[:, 0])
     step = wv.block * wv.dt
-    return Slope(float(apart @ solved[:, 1]) / information / step, 1.0 / information / step**2)
+    variance = _growth(wv) / information / step**2
+    return Slope(float(one @ solved[:, 1]) / information / step, variance)
 
 
 def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
@@ -82,15 +96,14 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
         1 where too few blocks exist to tell.
     """
     blocks, block = _coarser(wv)
-    index = np.flatnonzero(~np.isnan(blocks))
-    if index.size < tuning.FEWEST_BLOCKS:
+    first = _beside(np.flatnonzero(~np.isnan(blocks)))
+    if first.size + 1 < tuning.FEWEST_BLOCKS:
         return 1.0
-    step = block * wv.dt
     noise, walk = (
-        _between(_difference_covariance(each, wv.dt, block, blocks.size), index)
+        toeplitz(_difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
         for each in (psd, RandomWalk(1.0).psd)
     )
-    apart, difference = step * np.diff(index), np.diff(blocks[index])
+    apart, difference = np.full(first.size, block * wv.dt), blocks[first + 1] - blocks[first]
     alone = _restricted(noise, apart, difference)
     unit = alone[1] * float(np.sum(apart))  # K^2 of a walk whose slope is as uncertain
     found = np.array(
@@ -100,7 +113,7 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
         ]
     )
     weight = np.exp(found[:, 2] - np.max(found[:, 2]))
-    chance = 2.0 * norm.sf(np.abs(found[:, 0]) / np.sqrt(found[:, 1]))
+    chance = 2.0 * norm.sf(np.abs(found[:, 0]) / np.sqrt(_growth(wv) * found[:, 1]))
     return float(weight @ chance / np.sum(weight))
 
 
@@ -136,9 +149,20 @@ def _difference_covariance(psd: PSD, dt: float, block: int, count: int) -> Float
     return np.asarray(fft.irfft(density, size)[: count - 1])
 
 
+def _beside(index: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Blocks whose next one exists too."""
+    return index[:-1][np.diff(index) == 1]
+
+
+def _growth(wv: WaveletVariance) -> float:
+    """By how much filled samples raise the variance of block means: as that of the last level."""
+    return 1.0 if wv.gaps is None else 1.0 + max(float(wv.gaps.change[-1]), 0.0)
+
+
 def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
-    """Places of the blocks that are not missing."""
-    index = np.flatnonzero(~np.isnan(wv.blocks))
+    """Places of the blocks that exist, each beside another one."""
+    there = np.concatenate([[False], ~np.isnan(wv.blocks), [False]])
+    index = np.flatnonzero(there[1:-1] & (there[:-2] | there[2:]))
     if index.size < tuning.FEWEST_BLOCKS:
         raise InputError(
             f"{wv.name or 'the series'} has samples missing all over, which leaves no drift to "
@@ -147,22 +171,14 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
     return index
 
 
-def _solve(column: FloatArray, index: NDArray[np.intp], right: FloatArray) -> FloatArray:
-    """Solve for the covariance of differences between blocks that exist.
+def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> FloatArray:
+    """Solve for the covariance of differences of neighbouring blocks, at these places of all.
 
-    ``column`` is the autocovariance of differences of neighbours.
+    ``column`` is the autocovariance of all differences.
     """
-    if index.size == column.size + 1:
+    if first.size == column.size:
         return np.asarray(solve_toeplitz(column, right))
-    return np.asarray(solve(_between(column, index), right, assume_a="pos"))
-
-
-def _between(column: FloatArray, index: NDArray[np.intp]) -> FloatArray:
-    """Covariance of differences between blocks that exist; across a gap they add up."""
-    first = index[0]
-    inner = toeplitz(column[: index[-1] - first])
-    rows = np.add.reduceat(inner, index[:-1] - first, axis=0)
-    return np.asarray(np.add.reduceat(rows, index[:-1] - first, axis=1))
+    return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:

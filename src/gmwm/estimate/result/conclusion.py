@@ -166,6 +166,7 @@ def conclude(
             *indistinct_notices(model, ordered, matrix),
             *confounded_notices(model, ordered, matrix),
             *notices,
+            *wv.notices,
         ),
         log_likelihood=log_likelihood,
         trace=tuple(trace),

@@ -1,0 +1,106 @@
+"""Hot loops of series with gaps."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gmwm._core.typing import FloatArray
+
+
+@numba.njit(cache=True, nogil=True)
+def fill(
+    values: FloatArray,
+    integral: FloatArray,
+    edges: NDArray[np.int64],
+    block: NDArray[np.int64],
+    boxes: NDArray[np.int64],
+    weights: FloatArray,
+    slope: float,
+) -> None:
+    """Put into gaps a weighted mean of what lies on either side, and a line of no mean.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Changed in place.
+    integral : (n + 1,) ndarray
+        Their cumulative sum before, starting with 0.
+    edges : (G, 2) ndarray
+        First sample of each gap, and the one after its last.
+    block : (G,) ndarray
+        Samples of the nearest box on either side.
+    boxes : (G,) ndarray
+        Number of boxes: they end at 1, 2, 4, 8, ... blocks from the gap.
+    weights : (G, most boxes) ndarray
+        Of the mean of each pair of boxes.
+    slope : float
+        Per sample.
+    """
+    for g in range(edges.shape[0]):
+        start, stop = edges[g, 0], edges[g, 1]
+        mean = 0.0
+        near = 0
+        far = block[g]
+        for i in range(boxes[g]):
+            left = integral[start - near] - integral[start - far]
+            right = integral[stop + far] - integral[stop + near]
+            mean += weights[g, i] * (left + right) / (2.0 * (far - near))
+            near = far
+            far = 2 * far
+        centre = 0.5 * (start + stop - 1)
+        for k in range(start, stop):
+            values[k] = mean + slope * (k - centre)
+
+
+@numba.njit(cache=True, nogil=True)
+def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) -> int:
+    """Number of places t within the first intervals such that t + lag is within the second.
+
+    Parameters
+    ----------
+    first, second : (P, 2), (Q, 2) ndarray
+        Ascending intervals, their ends excluded.
+    lag : int
+        Zero or more.
+    """
+    total = 0
+    j = 0
+    for i in range(first.shape[0]):
+        low, high = first[i, 0] + lag, first[i, 1] + lag
+        while j > 0 and second[j - 1, 1] > low:
+            j -= 1
+        while j < second.shape[0] and second[j, 0] < high:
+            total += max(min(high, second[j, 1]) - max(low, second[j, 0]), 0)
+            j += 1
+        j = min(j, second.shape[0] - 1)
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def neighbours(
+    centre: NDArray[np.int64], kind: NDArray[np.int64], kinds: int, reach: int
+) -> NDArray[np.int64]:
+    """How many pairs of gaps of two kinds are so far apart, (kinds, kinds, reach).
+
+    Parameters
+    ----------
+    centre : (G,) ndarray
+        Ascending, in half samples.
+    kind : (G,) ndarray
+        From 0; negative ones are left out.
+    kinds : int
+    reach : int
+        Half samples.
+    """
+    number = np.zeros((kinds, kinds, reach), dtype=np.int64)
+    for g in range(centre.size):
+        if kind[g] < 0:
+            continue
+        other = g + 1
+        while other < centre.size and centre[other] - centre[g] < reach:
+            if kind[other] >= 0:
+                number[kind[g], kind[other], centre[other] - centre[g]] += 1
+            other += 1
+    return number

@@ -1,0 +1,262 @@
+"""The series as each level sees it: which samples exist or are filled, and the coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmwm._core.typing import FloatArray
+from gmwm.process import wavelet as known_wavelet
+from gmwm.variance.covariance.haar import dyadic_levels
+from gmwm.variance.filling import Filling
+from gmwm.variance.gaps import (
+    GapEffects,
+    Gaps,
+    IntArray,
+    common_share,
+    pair_factor,
+    window_centres,
+    window_count,
+)
+from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
+from gmwm.variance.pilot import pilot_psd
+from gmwm.variance.runs import Runs
+
+_MAX_BLOCKS, _MAX_BLOCKS_WITH_GAPS = 2048, 512
+_LARGEST_CHANGE = 1.5  # of an expected variance by filling
+_DECIDED = 32.0  # such windows, from which a level tells whether it can be filled
+_SEEN = 8.0  # windows that do not overlap, from which a level tells the pilot spectrum
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """The levels of a series, gaps included.
+
+    Attributes
+    ----------
+    values : (n,) ndarray
+        About their mean; NaN where samples are missing.
+    runs : Runs
+        The samples that exist.
+    averaging : (J,) ndarray
+        Averaging times, in samples, of the levels with a coefficient.
+    wavelet : str
+    filling : Filling or None
+        How short gaps are filled; ``None`` where none are.
+    change : (J,) ndarray
+        Of the expected variances by filling, relative.
+    error : (J,) ndarray
+        Wavelet variances of the error of the filling, relative.
+    filled : (J,) ndarray of bool
+        Levels for which gaps are filled.
+    slope : float
+        Of the least-squares line, per sample.
+    """
+
+    values: FloatArray
+    runs: Runs
+    averaging: FloatArray
+    wavelet: str
+    filling: Filling | None
+    change: FloatArray
+    error: FloatArray
+    filled: NDArray[np.bool_]
+    slope: float
+
+    @classmethod
+    def of(cls, values: FloatArray, runs: Runs, wavelet: str, dt: float) -> Levels:
+        """Those with a coefficient; of a Haar wavelet, with short gaps filled."""
+        m = dyadic_levels(runs.longest)
+        if wavelet != "haar":
+            kind = known_wavelet(wavelet)
+            m = m[[kind.width(j + 1) <= runs.longest for j in range(m.size)]]
+        none = np.zeros(m.size)
+        plain = cls(values, runs, m, wavelet, None, none, none, none > 0.0, _slope(values))
+        if runs.is_complete or wavelet != "haar":
+            return plain
+        gaps = Gaps.of(runs)
+        m = dyadic_levels(gaps.span)
+        if not np.any(gaps.filled(m[-1])):
+            return plain
+        none = np.zeros(m.size)
+        whole = replace(plain, averaging=m, change=none, error=none, filled=none == 0.0)
+        variance = plain._pilot_variance(0)
+        fine = [not np.any(gaps.filled(each)) for each in plain.averaging]
+        scarcity = float(np.min((plain.averaging / plain.counts)[fine]))
+        first = whole._filled_under(variance, scarcity, gaps, dt)
+        variance = np.append(variance, first._pilot_variance(variance.size))
+        return whole._filled_under(variance, scarcity, gaps, dt)
+
+    def _pilot_variance(self, start: int) -> FloatArray:
+        """Variances without the drift of the levels from ``start`` on that are well known.
+
+        One at least of the finest.
+        """
+        windows = self.counts / (2.0 * self.averaging)
+        known = max(int(np.sum(np.cumprod(windows >= _SEEN))), 1)
+        part = replace(
+            self,
+            averaging=self.averaging[start:known],
+            change=self.change[start:known],
+            error=self.error[start:known],
+            filled=self.filled[start:known],
+        )
+        return np.maximum(part.driftless(part.moments()), np.finfo(float).tiny)
+
+    def _filled_under(self, variance: FloatArray, scarcity: float, gaps: Gaps, dt: float) -> Levels:
+        """With the gaps filled under the spectrum that these variances of fine levels imply.
+
+        The averaging time over the number of windows goes with the relative sampling variance.
+        Where that of the fine levels, ``scarcity``, makes the change known worse than the level
+        itself, as where hardly two samples follow each other, the level is not filled.
+        """
+        psd = pilot_psd(variance, self.averaging[: variance.size], dt)
+        filling = Filling.under(psd, dt, gaps)
+        found = replace(self, filling=filling)
+        change, error = filling.change(self.averaging)
+        own = self.averaging / np.maximum(found.counts, 1.0)
+        filled = np.abs(change) <= _LARGEST_CHANGE
+        filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
+        # Of the coarsest levels the pilot knows too little to decide anew.
+        decided = max(int(np.sum(found.counts >= _DECIDED * 2.0 * self.averaging)), 1)
+        filled[decided:] = filled[decided - 1]
+        change = np.minimum(change, _LARGEST_CHANGE)
+        change, error = np.where(filled, (change, error), 0.0)
+        found = replace(found, change=change, error=error, filled=filled)
+        exist = int(np.sum(np.cumprod(found.counts > 0.0)))
+        return replace(
+            found,
+            averaging=self.averaging[:exist],
+            change=change[:exist],
+            error=error[:exist],
+            filled=filled[:exist],
+        )
+
+    # -- what exists -------------------------------------------------------------------------------
+
+    def edges(self, level: int) -> IntArray:
+        """Runs of samples that exist or are filled for a level, (P, 2)."""
+        if self.filling is None or not self.filled[level]:
+            return self.runs.edges
+        return self.filling.gaps.joined(self.averaging[level])
+
+    @property
+    def width(self) -> FloatArray:
+        """Number of samples that a coefficient is made of, (J,)."""
+        if self.wavelet == "haar":
+            return 2.0 * self.averaging
+        kind = known_wavelet(self.wavelet)
+        return np.array([kind.width(j + 1) for j in range(self.averaging.size)], dtype=float)
+
+    @cached_property
+    def counts(self) -> FloatArray:
+        """Number of coefficients, (J,)."""
+        pairs = enumerate(self.width)
+        return np.array([window_count(self.edges(j), width) for j, width in pairs])
+
+    def effects(self) -> GapEffects | None:
+        """What the gaps do to the variances; ``None`` of a complete series."""
+        n = self.runs.n
+        if self.runs.is_complete:
+            return None
+        widths = self.width
+        centres = [window_centres(self.edges(j), int(width)) for j, width in enumerate(widths)]
+        if self.wavelet == "haar":
+            averaging = self.averaging.astype(int).tolist()
+            pairs = zip(centres, averaging, strict=True)
+            growth = np.array([pair_factor(own, m, n) for own, m in pairs])
+        else:
+            growth = (n - widths + 1.0) / self.counts
+        deviation = np.sqrt(growth) * (1.0 + self.error)
+        inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
+        return GapEffects(n - self.runs.present, self.counts, self.change, inflation)
+
+    # -- coefficients ------------------------------------------------------------------------------
+
+    def _series(self) -> Iterator[tuple[NDArray[np.intp], FloatArray, FloatArray]]:
+        """Levels, the series that they are made of, and its cumulative sum."""
+        if self.filling is not None:
+            yield from self.filling.series(self.values, self.averaging, self.slope)
+            return
+        yield np.arange(self.averaging.size), self.values, cumulative(self.values, 0.0)
+
+    def moments(self) -> FloatArray:
+        """Mean and mean square of each level's coefficients, (J, 2)."""
+        if self.wavelet != "haar":
+            return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()])
+        found = []
+        plain = None
+        for levels, _, integral in self._series():
+            plain = integral if plain is None else plain
+            for j in levels:
+                own = integral if self.filled[j] else plain
+                found.append(haar_moments(own, self.edges(j), int(self.averaging[j])))
+        return np.array(found).reshape(-1, 2)
+
+    def coefficients(self, *, level: bool = False) -> Iterator[FloatArray]:
+        """The coefficients of each level, over all runs; without the series' line if ``level``."""
+        line = self.slope * (np.arange(self.runs.n) - 0.5 * (self.runs.n - 1)) if level else 0.0
+        if self.wavelet != "haar":
+            yield from self._other_coefficients(self.values - line)
+            return
+        plain = None
+        for levels, values, integral in self._series():
+            there = cumulative(values - line, 0.0) if level else integral
+            plain = there if plain is None else plain
+            for j in levels:
+                m = int(self.averaging[j])
+                own = there if self.filled[j] else plain
+                yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges(j)])
+
+    def _other_coefficients(self, values: FloatArray) -> Iterator[FloatArray]:
+        from gmwm.variance.modwt import coefficients
+
+        number = self.averaging.size
+        series = [coefficients(values[a:b], self.wavelet, number) for a, b in self.runs.edges]
+        for _ in range(number):
+            yield np.concatenate([next(part, np.zeros(0)) for part in series])
+
+    # -- what is made of them ----------------------------------------------------------------------
+
+    def driftless(self, moments: FloatArray) -> FloatArray:
+        """Expected variances without the filling and without the least-squares line, (J,)."""
+        step = 0.5 * self.slope * self.averaging
+        return np.asarray(
+            (moments[:, 1] - 2.0 * step * moments[:, 0] + step**2) / (1.0 + self.change)
+        )
+
+    def unfilled(self, moments: FloatArray) -> FloatArray:
+        """Variances without what filling added; it took nothing from a drift, (J,)."""
+        return moments[:, 1] - self.change * self.driftless(moments)
+
+    def block_means(self) -> tuple[FloatArray, int]:
+        """Means of blocks, NaN where a gap is not filled for the coarsest level, and their size."""
+        values, integral = self._coarsest()
+        n = self.runs.n
+        most = _MAX_BLOCKS if not np.any(np.isnan(values)) else _MAX_BLOCKS_WITH_GAPS
+        block = -(-n // most)
+        whole = (n // block) * block
+        means = np.diff(integral[: whole + 1 : block]) / block
+        means[np.any(np.isnan(values[:whole]).reshape(-1, block), axis=1)] = np.nan
+        return means, block
+
+    def _coarsest(self) -> tuple[FloatArray, FloatArray]:
+        """The series that the coarsest level is made of, and its cumulative sum."""
+        if self.filling is None or not self.filled[-1]:
+            return self.values, cumulative(self.values, 0.0)
+        *_, (_, values, integral) = self.filling.series(
+            self.values, self.averaging[-1:], self.slope
+        )
+        return values, integral
+
+
+def _slope(values: FloatArray) -> float:
+    """Of the least-squares line through the samples that exist, per sample."""
+    k = np.flatnonzero(~np.isnan(values)).astype(float)
+    there = values[~np.isnan(values)]
+    k -= np.mean(k)
+    return float(k @ there / (k @ k))
