@@ -16,7 +16,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import numpy as np
-from real_data_pictures import allan_picture, knock_picture, residual_picture, spectrum_picture
+from real_data_pictures import allan_picture, residual_picture, shock_picture, spectrum_picture
 from real_data_recording import (
     ACCELEROMETERS,
     BUMPS,
@@ -36,7 +36,7 @@ from gmwm._core.units import field_units
 from gmwm.calibration.summary import floor, white_density
 from gmwm.selection.select import describe
 
-KNOCKED = 4  # the recording with the knock
+SHAKEN = 4  # the recording with the shock
 FEWEST_DOF = 30.0  # of a level whose misfit counts
 SLOW = 1.0  # s
 DPI = 80
@@ -70,7 +70,7 @@ def main() -> None:
         "allan": allan_picture(together),
         "residuals": residual_picture(together),
         "spectra": spectrum_picture(recorded),
-        "knock": knock_picture(recorded[NUMBERS.index(KNOCKED)]),
+        "shock": shock_picture(recorded[NUMBERS.index(SHAKEN)]),
     }
     for name, figure in pictures.items():
         path = given.output / f"real-{name}.png"
@@ -85,11 +85,11 @@ def kept(path: Path, make: Callable[[], Calibration]) -> Calibration:
 
 
 def found_table(recorded: Sequence[Recorded]) -> str:
-    """The line, the steps, the broad peak and the largest knock, as ``gmwm health`` has them."""
+    """The line, the steps, the broad peak and the largest shock, as ``gmwm health`` has them."""
     lines = [
         "What gmwm health finds",
         f"{'':4}{'line on accel_x, y, z [Hz]':>24} {'amplitude [mg]':>15} {'step [mg]':>10} "
-        f"{'step / noise':>15} {'peak on gyro_z [Hz]':>20} {'damping':>8}  largest knock",
+        f"{'step / noise':>15} {'peak on gyro_z [Hz]':>20} {'damping':>8}  largest shock",
     ]
     for r in recorded:
         mg = shown_unit("accel_x")[1]
@@ -101,12 +101,12 @@ def found_table(recorded: Sequence[Recorded]) -> str:
         frequency, damping = r.health.resonances("gyro_z")[0]
         lines.append(
             f"{r.number:<4}{frequencies:>24} {amplitudes:>15} {rounding[0]['lsb'] / mg:>10.2f} "
-            f"{ratios:>15} {frequency:>20.1f} {damping:>8.3f}  {largest_knocks(r)}"
+            f"{ratios:>15} {frequency:>20.1f} {damping:>8.3f}  {largest_shocks(r)}"
         )
     return "\n".join([*lines, ""])
 
 
-def largest_knocks(r: Recorded) -> str:
+def largest_shocks(r: Recorded) -> str:
     """Height and time of the largest event of each sensor."""
     said = []
     for event in (r.largest_event("gyro"), r.largest_event("accel")):

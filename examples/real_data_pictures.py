@@ -24,7 +24,7 @@ from real_data_recording import (
 from gmwm import Calibration, Fit
 from gmwm.plotting.deviation import COMPONENT_COLOURS, SUM_COLOUR, deviation_range
 
-SECONDS_SHOWN = 4.0  # around the knock
+SECONDS_SHOWN = 4.0  # around the shock
 MARKERS = ("o", "^", "s", "D")
 _LINE_SEGMENT = 1 << 15  # samples: 0.003 Hz resolve the line
 _LONGEST_BAR = 5.0  # of the value; the last level has no upper end to speak of
@@ -143,8 +143,8 @@ def _draw_spectrum(
     ax.set_ylabel(f"density [{unit}/sqrt(Hz)]")
 
 
-def knock_picture(r: Recorded) -> Figure:
-    """The largest knock: rates and specific forces less their means, and what is left out."""
+def shock_picture(r: Recorded) -> Figure:
+    """The largest shock: rates and specific forces less their means, and what is left out."""
     event = r.largest_event("gyro")
     centre = 0.0 if event is None else event.values["time"]
     figure, axes = plt.subplots(2, 1, figsize=(7.0, 4.6), layout="constrained", sharex=True)
@@ -163,6 +163,6 @@ def knock_picture(r: Recorded) -> Figure:
         ax.set_ylabel(f"less the mean [{unit}]")
         ax.legend(fontsize="small", loc="lower left")
         _dress(ax, "")
-    axes[0].set_title(f"the knock in recording {r.number}", fontsize="medium")
+    axes[0].set_title(f"the shock in recording {r.number}", fontsize="medium")
     axes[1].set_xlabel("time [s]")
     return figure

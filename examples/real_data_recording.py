@@ -23,7 +23,7 @@ _WELCH = 4096  # samples of a segment: 0.024 Hz resolve the peaks
 
 @dataclass(frozen=True)
 class Recorded:
-    """A recording, what was found in it, and it without the samples of knocks."""
+    """A recording, what was found in it, and it without the samples of shocks."""
 
     number: int
     raw: Recording
@@ -39,8 +39,8 @@ class Recorded:
         return cls(number, raw, found, found.masked(raw))
 
     def largest_event(self, channels: str) -> Finding | None:
-        """The highest knock of the channels whose names begin so."""
-        events = [e for e in self.health.of(kind="event") if e.channel.startswith(channels)]
+        """The highest shock of the channels whose names begin so."""
+        events = [e for e in self.health.of(code="event") if e.where.startswith(channels)]
         return max(events, key=lambda event: abs(event.values["height"]), default=None)
 
 

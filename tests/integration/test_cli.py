@@ -188,7 +188,7 @@ def test_calibrate(calibrated):
         assert f"wrote out/{name}\n" in printed.replace("\\", "/")
     calibration = gmwm.load(folder / "calibration.json")
     assert list(calibration) == ["gyro_x", "accel_z"]
-    assert calibration.skipped == {"gyro_y": "constant at 0 rad/s"}
+    assert [str(why) for why in calibration.skipped.values()] == ["gyro_y: constant at 0 rad/s"]
     assert calibration.source == "static.csv"
     for name, truth in (("gyro_x", GYRO), ("accel_z", ACCEL)):
         for key, value in as_model(truth).params.items():
@@ -272,7 +272,7 @@ def test_gaps_are_told_and_do_no_harm(run, tmp_path):
     code, printed, told = run("calibrate", "f.csv", *SI, "-o", "out")
     assert code == 0, told
     said = " ".join(printed.split())
-    assert "The clock jumps by 2.5 s, 12 s after the start: 250 samples missing." in said
+    assert "the clock jumps by 2.5 s, 12 s after the start: 250 samples missing" in said
     assert "gyro_x, accel_x: each 251 of 3,000 samples missing, in 2 gaps, the longest 250" in said
     assert "accel_y skipped: all samples missing" in said
     assert "3,000 samples a channel" in said
@@ -507,7 +507,7 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
 # -- health ---------------------------------------------------------------------------------------
 
 
-def knocked_csv(path):
+def shaken_csv(path):
     rng = np.random.default_rng(3)
     n = 6000
     gyro = 0.3 * rng.normal(size=n)
@@ -517,13 +517,13 @@ def knocked_csv(path):
 
 
 def test_health_says_what_is_wrong(run, tmp_path):
-    knocked_csv(tmp_path / "static.csv")
+    shaken_csv(tmp_path / "static.csv")
     units = ("--gyro-unit", "deg/s", "--accel-unit", "g")
     code, printed, told = run("health", "static.csv", *RATE, *units, "--json", "health.json")
     assert (code, told) == (0, "")
     assert max(map(len, printed.splitlines())) <= WIDTH
     words = " ".join(printed.split())
-    assert re.search(r"warning a spike or knock \+1\d(\.\d)? deg/s at (39|40)\.\d+ s", words)
+    assert re.search(r"warning a spike or shock \+1\d(\.\d)? deg/s at (39|40)\.\d+ s", words)
     assert "a periodic line at 3.3 Hz, amplitude" in words
     assert "samples come in steps of 3.33 mg" in words
     content = json.loads((tmp_path / "health.json").read_text())
@@ -536,15 +536,31 @@ def test_health_says_what_is_wrong(run, tmp_path):
     assert words.endswith("wrote health.json")
 
 
+def test_health_finds_a_channel_that_follows_the_temperature(run, tmp_path):
+    rng = np.random.default_rng(7)
+    n = 20_000
+    warm = 25.0 + 0.02 * rng.normal(size=n).cumsum()
+    gyro = 0.3 * rng.normal(size=n) + 0.2 * warm
+    slow = np.where(np.arange(n) % 50 == 0, warm, np.nan)  # sampled at 2 Hz
+    columns = {"gyro_x": gyro, "gyro_y": 0.3 * rng.normal(size=n), "temp [degC]": slow}
+    write_csv(tmp_path / "static.csv", columns)
+    code, printed, told = run("health", "static.csv", *RATE, "--gyro-unit", "deg/s")
+    assert (code, told) == (0, "")
+    words = " ".join(printed.split())
+    assert re.search(r"warning follows temp by 0\.(19|2)\d* deg/s per degC", words)
+    assert words.count("follows temp") == 1
+    assert "note auxiliary channels: 'temp' (temperature)" in words
+
+
 def test_health_writes_nothing_unless_asked(run, tmp_path):
-    knocked_csv(tmp_path / "static.csv")
+    shaken_csv(tmp_path / "static.csv")
     code, _, _ = run("health", "static.csv", *RATE, *SI)
     assert code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["static.csv"]
 
 
 def test_health_refuses_what_it_cannot_use(run, tmp_path):
-    knocked_csv(tmp_path / "static.csv")
+    shaken_csv(tmp_path / "static.csv")
     (tmp_path / "taken").mkdir()
     for arguments, words in (
         (("absent.csv", *RATE, *SI), "absent.csv does not exist"),
@@ -632,7 +648,7 @@ def made_up(name, model, stderr, bounds=None, notices=()):
     return Fit(
         model=as_model(model), wv=wv, keys=tuple(stderr), upper_bounds=bounds or {},
         covariance=np.diag(np.square(list(stderr.values()))), objective=7.0, dof=8,
-        chi_square=7.344, discrepancy=0.0, method="gmwm", weights="model",
+        chi_square=7.344, chi_square_allowed=7.344, discrepancy=0.0, method="gmwm", weights="model",
         notices=tuple(notices),
     )  # fmt: skip
 
@@ -662,8 +678,8 @@ def test_table_of_every_kind_of_parameter(capsys):
         made_up_calibration(
             gyro,
             accel,
-            skipped={"gyro_y": "constant at 0 rad/s"},
-            notes=("Column 'temp' was not used.",),
+            skipped={"gyro_y": Notice("constant", "bad", "gyro_y", "constant at 0 rad/s")},
+            notices=(Notice("columns-not-used", "note", "", "column not used: 'temp'"),),
         )
     )
     assert stripped(capsys.readouterr().out) == golden("cli_table.txt")

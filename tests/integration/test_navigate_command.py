@@ -180,7 +180,7 @@ BAD = {
     "filter: number": ({"filters": {"a": 5}}, "filter a: 5: give a calibration.json"),
     "filter: missing file": ({"filters": {"a": "no.json"}}, "no.json: cannot be read"),
     "filter: folder": ({"filters": {"a": "."}}, "cannot be read"),
-    "filter: no JSON": ({"filters": {"a": "study.yaml"}}, "is no JSON"),
+    "filter: no JSON": ({"filters": {"a": "study.yaml"}}, "is not JSON"),
     "filter: blank name": ({"filters": {" ": "truth"}}, "is no name"),
     "filter: control": ({"filters": {"a\tb": "truth"}}, "is no name"),
     "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "is no name"),

@@ -64,16 +64,16 @@ def test_every_channel(number):
             assert found.lines(name) == ()
             assert found.lsb(name) == pytest.approx(np.radians(0.05), rel=1e-3)
     assert found.resonances("gyro_z")[0][0] == pytest.approx(20.0, abs=0.6)
-    large = [e for e in found.of(kind="event") if abs(e.values["height"]) > np.radians(10.0)]
-    knocked = {e.channel for e in large if e.channel.startswith("gyro")}
-    assert knocked == ({"gyro_x"} if number == 4 else set())
+    large = [e for e in found.of(code="event") if abs(e.values["height"]) > np.radians(10.0)]
+    shaken = {e.where for e in large if e.where.startswith("gyro")}
+    assert shaken == ({"gyro_x"} if number == 4 else set())
 
 
-def test_knock_is_left_out_and_no_more():
+def test_shock_is_left_out_and_no_more():
     raw = recording(4, "gyro_x")
     found = gmwm.health(raw)
-    knock = max(found.of("gyro_x", "event"), key=lambda event: abs(event.values["height"]))
-    assert abs(knock.values["height"]) == pytest.approx(np.radians(17.0), rel=0.05)
+    shock = max(found.of("gyro_x", "event"), key=lambda event: abs(event.values["height"]))
+    assert abs(shock.values["height"]) == pytest.approx(np.radians(17.0), rel=0.05)
     clean = found.masked(raw)["gyro_x"]
     assert 30 < clean.missing < 500
     # 17 deg/s is 48 times the noise; what is left has no sample beyond seven times.

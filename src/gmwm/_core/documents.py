@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -79,6 +80,19 @@ class Document:
         schema = content.get("schema") if isinstance(content, Mapping) else None
         return Document._kinds.get(schema) if isinstance(schema, str) else None
 
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Inverse of `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is not JSON, or holds something else or a damaged result.
+        """
+        content = read_json(path)
+        with _named(path):
+            return cls.from_dict(content)
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything as JSON; the file appears whole or not at all.
 
@@ -122,7 +136,14 @@ def load_document(path: str | os.PathLike[str]) -> Any:
     if kind is None:
         known = ", ".join(sorted(Document._kinds))
         raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")
-    try:
+    with _named(path):
         return kind.from_dict(content)
+
+
+@contextmanager
+def _named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the file's name before messages."""
+    try:
+        yield
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}", error.code) from None

@@ -12,7 +12,7 @@ _UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}
 _LARGE = 1000.0
 
 
-def spoken(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
+def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
     """A number in deg/s, mg or g; in its own unit where that is another.
 
     Parameters

@@ -1,7 +1,7 @@
-"""The main job: every channel of a recording, what is done about findings, a summary."""
+"""The main job: every channel of a recording, screening, a summary."""
 
-from gmwm.calibration.calibration import Calibration, calibrate, load
-from gmwm.calibration.screening import REMEDIES
+from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
+from gmwm.calibration.screening import SCREENING
 from gmwm.calibration.summary import (
     Level,
     floor,
@@ -12,7 +12,8 @@ from gmwm.calibration.summary import (
 )
 
 __all__ = [
-    "REMEDIES",
+    "AMBIGUITY",
+    "SCREENING",
     "Calibration",
     "Level",
     "calibrate",

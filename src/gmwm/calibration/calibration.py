@@ -2,73 +2,80 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from joblib import Parallel, delayed
 
 from gmwm._core import checks
-from gmwm._core.files import written
+from gmwm._core.documents import Document, load_document
+from gmwm._core.frames import frame
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
-from gmwm.calibration.screening import REMEDIES, remedied, told_of_terms
-from gmwm.diagnosis import Finding
+from gmwm.calibration import tuning
+from gmwm.calibration.screening import SCREENING, screened, with_outcomes
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate import Fit, estimate
+from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording
 from gmwm.selection import Selection, select, wider_ranges
 from gmwm.variance import MIN_SAMPLES, wavelet_variance
 
-SCHEMA = "gmwm.calibration"
-SCHEMA_VERSION = 1
+if TYPE_CHECKING:
+    import pandas
 
-_SAME_RATE = 1e-3
-_TOLD = ("warning", "bad")
-_TOLD_OTHERWISE = ("reader", "gap", "dead", "infinite", "length")
+AMBIGUITY = "ambiguity"
+"""Code of the notice that several models describe a channel equally well."""
 
 
-@dataclass(frozen=True)
-class Calibration(Mapping[str, Fit]):
-    """Error models of the channels of a recording.
+@dataclass(frozen=True, repr=False)
+class Calibration(Mapping[str, Fit], Document):
+    """Error models of the channels of a recording: a mapping of their names to `Fit`.
 
     Attributes
     ----------
     fits : dict
         Channel name -> `Fit`.
     skipped : dict
-        Channel name -> why it has none, one sentence.
+        Channel name -> `Notice` of why it has none.
     source : str
         What was calibrated.
     rate : float
         Sampling rate, Hz.
     n : int
         Samples per channel, of all recordings.
-    notes : tuple of str
-        What the reader noticed, and how many samples were left out.
-    findings : tuple of Finding
-        What was found in the recording, worst first in each channel, with what was done about it;
-        of kind "choice", which models describe a channel equally well. Empty if it was not
-        examined.
+    notices : tuple of Notice
+        Those of the reader; what was found in the recording, worst first in each channel, with
+        what was done about it, if it was examined; with the code "ambiguity", which models
+        describe a channel equally well.
     """
 
-    fits: dict[str, Fit]
-    skipped: dict[str, str]
+    SCHEMA: ClassVar[str] = "gmwm.calibration"
+    SCHEMA_VERSION: ClassVar[int] = 2
+
+    fits: Mapping[str, Fit]
+    skipped: Mapping[str, Notice]
     source: str
     rate: float
     n: int
-    notes: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "fits", "skipped")
 
     def __getitem__(self, name: str) -> Fit:
-        if name not in self.fits:
-            why = self.skipped.get(name, f"it has {', '.join(self.fits)}")
-            raise MissingNameError(f"the calibration has no model of channel {name!r}: {why}")
-        return self.fits[name]
+        if name in self.fits:
+            return self.fits[name]
+        why = f"it has {', '.join(self.fits)}"
+        if name in self.skipped:
+            why = self.skipped[name].text
+        raise MissingNameError(f"the calibration has no model of channel {name!r}: {why}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.fits)
@@ -87,81 +94,56 @@ class Calibration(Mapping[str, Fit]):
         return not self.skipped and all(fit.valid for fit in self.fits.values())
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Findings that spoil the estimates or may, and that neither notes nor skips tell."""
-        return tuple(
-            str(found if found.channel else replace(found, channel="recording"))
-            for found in self.findings
-            if found.severity in _TOLD and found.kind not in _TOLD_OTHERWISE
-        )
+    def is_examined(self) -> bool:
+        """Whether the recording was examined before the fits."""
+        return any(notice.code == "length" for notice in self.notices)
+
+    def __repr__(self) -> str:
+        channels = [name if fit.valid else f"{name} (not valid)" for name, fit in self.items()]
+        channels += [f"{name} (skipped)" for name in self.skipped]
+        return f"<Calibration of {self.source or 'a recording'}: {', '.join(channels)}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         blocks = [str(fit) for fit in self.fits.values()]
-        blocks += [f"{name}: skipped, {why}" for name, why in self.skipped.items()]
+        blocks += [f"{name}: skipped, {notice.text}" for name, notice in self.skipped.items()]
         return "\n\n".join(blocks)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the parameters of all channels, one a row, in SI units; needs pandas."""
+        rows = [
+            {"channel": name, **estimate.to_dict(), "valid": fit.valid}
+            for name, fit in self.fits.items()
+            for estimate in fit.estimates
+        ]
+        return frame(rows, ("channel", *Estimate.COLUMNS, "valid"))
 
     # -- files ------------------------------------------------------------------------------------
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything, in JSON types; see `from_dict`."""
+    def content(self) -> dict[str, Any]:
         return {
-            "schema": SCHEMA,
-            "schema_version": SCHEMA_VERSION,
             "source": self.source,
             "rate_hz": self.rate,
             "n": self.n,
-            "notes": list(self.notes),
-            "findings": [finding.to_dict() for finding in self.findings],
-            "skipped": self.skipped,
+            "notices": [notice.to_dict() for notice in self.notices],
+            "skipped": {name: notice.to_dict() for name, notice in self.skipped.items()},
             "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
         }
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Calibration:
-        """Inverse of `to_dict`.
-
-        Raises
-        ------
-        InputError
-            If the content is no calibration of a schema version known here.
-        """
-        if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-            raise InputError("this is no calibration: expected a file made by gmwm calibrate")
-        version = content.get("schema_version")
-        if version != SCHEMA_VERSION:
-            raise InputError(
-                f"schema version {version!r} is not known here (known is {SCHEMA_VERSION}): "
-                "calibrate again or update gmwm"
-            )
-        try:
-            return cls(
-                fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
-                skipped=dict(content["skipped"]),
-                source=content["source"],
-                rate=float(content["rate_hz"]),
-                n=int(content["n"]),
-                notes=tuple(content["notes"]),
-                findings=tuple(map(Finding.from_dict, content.get("findings", ()))),
-            )
-        except InputError as error:
-            raise InputError(
-                f"the calibration cannot be rebuilt ({error}): calibrate again"
-            ) from None
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"the calibration is damaged ({error!r}): calibrate again") from None
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything as JSON; the file appears whole or not at all.
-
-        Raises
-        ------
-        InputError
-            If it cannot be written.
-        """
-        with written(path) as stream:
-            json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
-            stream.write("\n")
-        return Path(path)
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        return cls(
+            fits={str(name): Fit.from_dict(item) for name, item in content["channels"].items()},
+            skipped={
+                str(name): Notice.from_dict(item) for name, item in content["skipped"].items()
+            },
+            source=str(content["source"]),
+            rate=float(content["rate_hz"]),
+            n=int(content["n"]),
+            notices=tuple(map(Notice.from_dict, content["notices"])),
+        )
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the self-contained HTML report; see `gmwm.report`."""
@@ -170,40 +152,34 @@ class Calibration(Mapping[str, Fit]):
         return written
 
 
-def load(path: str | os.PathLike[str]) -> Calibration:
-    """Read a calibration written by `Calibration.save`.
+def load(path: str | os.PathLike[str]) -> Any:
+    """A result from its file: `Calibration`, `Fit`, `Selection`, `Health`, whatever was saved.
+
+    ``Calibration.load`` and its like take files of their own kind only.
 
     Raises
     ------
     InputError
-        If the file is missing, no JSON, or no calibration.
+        If the file is missing, is not JSON, or holds no result of a kind known here.
     """
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no JSON ({error}): give a calibration.json") from None
-    try:
-        return Calibration.from_dict(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return load_document(path)
 
 
 def calibrate(
     recording: Recording | Sequence[Recording],
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
-    remedies: Collection[str] = REMEDIES,
+    screening: Collection[str] = SCREENING,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
     """Error model of every channel of a static recording, or of several of one sensor.
 
-    The recording is examined first: samples of knocks and spikes are left out, periodic lines and
+    The recording is examined first: samples of shocks and spikes are left out, periodic lines and
     resonances are terms that a selected model may have, and the wavelet variances of a channel
-    with outliers all over the record are robust; the findings tell what was found and done. A
-    channel that is constant, or of which more than half of the samples are missing, is skipped.
+    with outliers all over the record are robust; notices say what was found and done. A
+    channel that is constant, or of which more than half of the samples are missing, is skipped;
+    auxiliary channels (temperature, voltage, clock) have no model.
 
     Parameters
     ----------
@@ -212,7 +188,7 @@ def calibrate(
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
-    remedies : collection of str, optional
+    screening : collection of str, optional
         Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
         unexamined.
     jobs : int, optional
@@ -232,7 +208,7 @@ def calibrate(
     """
     given = [recording] if isinstance(recording, Recording) else list(recording)
     _check_together(given)
-    treated = [remedied(each, remedies) for each in given]
+    treated = [screened(each, screening) for each in given]
     recordings = [each.recording for each in treated]
     alive, dead = _usable(recordings)
     if isinstance(model, Mapping):
@@ -251,20 +227,20 @@ def calibrate(
 
     finished: list[str] = []
 
-    def tell(name: str) -> None:
+    def report(name: str) -> None:
         if progress is not None:
             progress(len(finished), len(alive), name)
 
-    def one(name: str) -> tuple[Fit, tuple[Finding, ...]] | InputError:
-        tell(name)
+    def one(name: str) -> tuple[Fit, tuple[Notice, ...]] | InputError:
+        report(name)
         try:
             parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
             if given_model is not None:
-                return estimate(given_model, data), ()
+                return estimated(given_model, data), ()
             selection = select(data, extra=offered[name])
-            return selection.fit, _doubt(name, selection)
+            return selection.fit, _ambiguity(name, selection)
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -272,21 +248,23 @@ def calibrate(
 
     workers = Parallel(n_jobs=jobs, prefer="threads")
     found = dict(zip(alive, workers(delayed(one)(name) for name in alive), strict=True))
-    tell("")
+    report("")
     skipped = dead | {
-        name: str(error) for name, error in found.items() if isinstance(error, InputError)
+        name: Notice(error.code or "not-estimable", "bad", name, str(error))
+        for name, error in found.items()
+        if isinstance(error, InputError)
     }
     source = ", ".join(each.source for each in recordings)
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
     fits = {name: fitted for name, (fitted, _) in done.items()}
     if not fits:
-        raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values()))}")
+        raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
     several = len(recordings) > 1
-    findings = told_of_terms(
+    notices = with_outcomes(
         [
-            replace(finding, recording=each.recording.source) if several else finding
+            replace(notice, source=each.recording.source) if several else notice
             for each in treated
-            for finding in each.findings
+            for notice in each.notices
         ],
         {name: fitted.model for name, fitted in fits.items()},
         offered if model is None else {},
@@ -297,12 +275,7 @@ def calibrate(
         source=source,
         rate=recordings[0].rate,
         n=sum(each.n for each in recordings),
-        notes=tuple(
-            f"{each.source}: {note}" if several else note
-            for each in recordings
-            for note in each.notes
-        ),
-        findings=(*findings, *(finding for _, doubts in done.values() for finding in doubts)),
+        notices=(*notices, *(notice for _, ties in done.values() for notice in ties)),
     )
 
 
@@ -312,36 +285,37 @@ def _check_together(recordings: Sequence[Recording]) -> None:
     for each in recordings:
         if not isinstance(each, Recording):
             raise InputError(
-                f"{checks.shown(each)} is no recording: give what gmwm.read returns, or make one "
-                "with Recording.from_arrays"
+                f"{checks.shown(each)} is not a recording: give what gmwm.read returns, or "
+                "make one with Recording.from_arrays"
             )
     first = recordings[0]
     for other in recordings[1:]:
-        if abs(other.rate / first.rate - 1.0) > _SAME_RATE:
+        if abs(other.rate / first.rate - 1.0) > tuning.SAME_RATE:
             raise InputError(
                 f"{other.source} has {other.rate:g} Hz and {first.source} {first.rate:g} Hz: "
                 "calibrate recordings of different rates one by one"
             )
 
 
-def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], dict[str, str]]:
+def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], dict[str, Notice]]:
     """Each channel in the recordings where it can be used, and why others are skipped."""
     rate = recordings[0].rate
     alive: dict[str, list[Channel]] = {}
-    dead: dict[str, str] = {}
+    dead: dict[str, Notice] = {}
     for recording in recordings:
-        for channel in recording:
+        for channel in recording.inertial:
             why = _reason_to_skip(channel)
-            if why:
+            if why is not None:
                 dead.setdefault(channel.name, why)
             else:
                 alive.setdefault(channel.name, []).append(replace(channel, dt=1.0 / rate))
     return alive, {name: why for name, why in dead.items() if name not in alive}
 
 
-def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, str]) -> str:
-    which = "; ".join(f"{name}: {why}" for name, why in dead.items())
-    if all(c.is_constant and c.is_complete for recording in recordings for c in recording):
+def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) -> str:
+    which = "; ".join(f"{name}: {why.text}" for name, why in dead.items())
+    which = which or "only auxiliary channels"
+    if dead and all(why.code == "constant" for why in dead.values()):
         which = "every channel is constant"
     return (
         f"{recordings[0].source or 'the recording'}: {which}, nothing to calibrate: check the "
@@ -349,14 +323,19 @@ def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, str]) -> 
     )
 
 
-def _reason_to_skip(channel: Channel) -> str:
-    """Why a channel is skipped; empty if it is not."""
+def _reason_to_skip(channel: Channel) -> Notice | None:
+    """Why a channel is skipped, if it is."""
     missing = channel.missing
     if missing == channel.n:
-        return "all samples missing"
-    if missing > channel.n / 2:
-        return f"{missing:,} of {channel.n:,} samples missing, more than half"
-    return f"constant at {channel.mean:.6g} {channel.unit}" if channel.is_constant else ""
+        code, text = "all-missing", "all samples missing"
+    elif missing > channel.n / 2:
+        code = "mostly-missing"
+        text = f"{missing:,} of {channel.n:,} samples missing, more than half"
+    elif channel.is_constant:
+        code, text = "constant", f"constant at {channel.mean:.6g} {channel.unit}"
+    else:
+        return None
+    return Notice(code, "bad", channel.name, text, {"missing": missing})
 
 
 def _model_of(
@@ -369,7 +348,7 @@ def _model_of(
     return model[name]
 
 
-def _doubt(name: str, selection: Selection) -> tuple[Finding, ...]:
+def _ambiguity(name: str, selection: Selection) -> tuple[Notice, ...]:
     """Which models tie, and the parameters of which that leaves less known."""
     if not selection.rivals:
         return ()
@@ -378,4 +357,5 @@ def _doubt(name: str, selection: Selection) -> tuple[Finding, ...]:
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
         text += f". If none of them is ruled out: {', '.join(wider)}"
-    return (Finding(name, "choice", "note", text, "the first is used"),)
+    values = {"models": len(models)}
+    return (Notice(AMBIGUITY, "note", name, text, values, "the first is used"),)

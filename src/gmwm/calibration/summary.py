@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.units import field_units
+from gmwm.calibration import tuning
 from gmwm.errors import InputError
 from gmwm.estimate import fit
 from gmwm.estimate.result import Fit
 from gmwm.process import Process, RandomWalk, WhiteNoise
 
-_REFERENCE = 1.0  # s, the averaging time at which white noise is read off an Allan plot
-_WHITE_RATIO = 0.6  # of wavelet variances at 2 s and 1 s, below which a term acts as white noise
 _PLATEAU = np.sqrt(2.0 * np.log(2.0) / np.pi)
 
 
@@ -49,11 +48,11 @@ def white_density(fitted: Fit) -> float:
     float
         In u/sqrt(Hz); zero if no term of the model is fast.
     """
-    tau = np.array([1.0, 2.0]) * max(_REFERENCE, 4.0 * fitted.wv.dt)
+    tau = np.array([1.0, 2.0]) * max(tuning.REFERENCE_TIME, 4.0 * fitted.wv.dt)
     total = 0.0
     for term in fitted.model.terms:
         first, second = term.haar_variance(tau, fitted.wv.dt)
-        if first > 0.0 and second < _WHITE_RATIO * first:
+        if first > 0.0 and second < tuning.WHITE_RATIO * first:
             total += 2.0 * tau[0] * first
     return float(np.sqrt(total))
 

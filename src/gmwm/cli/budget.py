@@ -28,9 +28,10 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
       gmwm budget out/calibration.json --times 1,10,60
     """
     from gmwm.budget import error_budget
-    from gmwm.calibration import load
+    from gmwm.calibration import Calibration
 
-    click.echo(error_budget(load(file), _seconds(times), calibrated=not unknown_start))
+    calibration = Calibration.load(file)
+    click.echo(error_budget(calibration, _seconds(times), calibrated=not unknown_start))
 
 
 def _seconds(text: str) -> list[float]:

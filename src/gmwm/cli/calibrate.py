@@ -15,7 +15,11 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration
+
+_SHOWN_OTHERWISE = ("gap", "dead", "infinite", "length")
+"""Codes of issues that the head line, notices of the reader or reasons to skip say already."""
 
 
 def output_option(default: str) -> Callable[[Any], Any]:
@@ -38,7 +42,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
               type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
               metavar="WHAT",
               help="Leave events, lines, resonances, outliers or all as they are: samples of "
-                   "knocks are masked otherwise, lines and resonances are terms that a model may "
+                   "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 def calibrate(
@@ -66,7 +70,7 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm._core.files import folder_to_fill
-    from gmwm.calibration import REMEDIES, calibrate as run
+    from gmwm.calibration import SCREENING, calibrate as run
 
     with folder_to_fill(output) as folder:
         recordings = [
@@ -74,8 +78,8 @@ def calibrate(
             for file in files
         ]
         with progress_bar("calibrating", "channels") as bar:
-            chosen = () if "all" in left else [name for name in REMEDIES if name not in left]
-            result = run(recordings, remedies=chosen, jobs=jobs, progress=bar)
+            chosen = () if "all" in left else [name for name in SCREENING if name not in left]
+            result = run(recordings, screening=chosen, jobs=jobs, progress=bar)
         # The files first: who pipes the table into head must not lose them.
         written = write_files(result, folder)
     show(result)
@@ -93,15 +97,25 @@ def show(result: Calibration) -> None:
         highlight=False,
     )
     print_whole(console, _table(result))
-    for note in (*result.notes, *result.warnings):
-        console.print(f"- {note}", highlight=False)
+    for notice in result.notices:
+        if _is_shown(notice):
+            console.print(f"- {notice}", highlight=False)
     for name, why in result.skipped.items():
-        console.print(f"- {name} skipped: {why}", highlight=False)
+        console.print(f"- {name} skipped: {why.text}", highlight=False)
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             console.print(f"- {name}: {fit.agreement}", highlight=False)
         for notice in fit.notices:
             console.print(f"- {name}: {notice}", highlight=False)
+
+
+def _is_shown(notice: Notice) -> bool:
+    """How the file was read, and what may spoil the estimates; the report has the rest."""
+    from gmwm.readers import READING
+
+    if notice.code in (*READING, "events-left-out"):
+        return True
+    return notice.severity in ("warning", "bad") and notice.code not in _SHOWN_OTHERWISE
 
 
 def _table(result: Calibration) -> Table:

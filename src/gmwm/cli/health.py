@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
@@ -26,7 +25,7 @@ def health(
 ) -> None:
     """Find what is wrong with a static recording before it is calibrated.
 
-    Gaps, dead and stuck channels, saturation, spikes and knocks, rounding, periodic lines,
+    Gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
     resonances, drift, changes of the noise, dependence between channels; worst first, with what
     to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate.
 
@@ -34,7 +33,7 @@ def health(
     Example:
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
-    from gmwm._core.files import replaceable, written
+    from gmwm._core.files import replaceable
     from gmwm.diagnosis import health as examine
 
     if json_path is not None:
@@ -43,9 +42,7 @@ def health(
     found = examine(recording)
     # The file first: who pipes the table into head must not lose it.
     if json_path is not None:
-        with written(json_path) as stream:
-            json.dump(found.to_dict(), stream, indent=1, allow_nan=False)
-            stream.write("\n")
+        found.save(json_path)
     click.echo(found)
     if json_path is not None:
         click.echo(f"\nwrote {json_path}")

@@ -11,6 +11,7 @@ from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.demo import demo
 from gmwm.cli.health import health
+from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError
@@ -33,7 +34,7 @@ def main() -> None:
     try:
         cli.main(standalone_mode=False)
     except InputError as error:
-        click.echo(f"gmwm: {error}", err=True)
+        click.echo(f"gmwm: {with_hint(error)}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.exceptions.Exit as error:
         sys.exit(error.exit_code)

@@ -1,6 +1,6 @@
 """What is wrong with a recording, before a model is fitted to it."""
 
 from gmwm.diagnosis.check import health
-from gmwm.diagnosis.findings import ChannelHealth, Finding, Health
+from gmwm.diagnosis.result import ChannelHealth, Health
 
-__all__ = ["ChannelHealth", "Finding", "Health", "health"]
+__all__ = ["ChannelHealth", "Health", "health"]

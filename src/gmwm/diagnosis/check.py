@@ -7,32 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.typing import BoolArray, FloatArray, Progress
-from gmwm.diagnosis.contamination import contamination, contamination_finding
-from gmwm.diagnosis.drift import drift_finding, variance_finding
-from gmwm.diagnosis.events import event_finding, find_events
-from gmwm.diagnosis.findings import ChannelHealth, Finding, Health, Severity, worst_first
-from gmwm.diagnosis.innovations import FEWEST, Innovations, innovations
-from gmwm.diagnosis.lines import Line, find_lines, line_findings
-from gmwm.diagnosis.pairs import crosstalk_findings, temperature_findings
-from gmwm.diagnosis.resolution import rounding_finding, step_size
-from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_finding
-from gmwm.diagnosis.samples import dead_finding, gap_findings, saturation_finding, stuck_finding
-from gmwm.diagnosis.spectrum import FEWEST as FEWEST_OF_SPECTRUM, background, bands, spectrum
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.contamination import contamination, contamination_notice
+from gmwm.diagnosis.drift import drift_notice, variance_notice
+from gmwm.diagnosis.events import event_notice, find_events
+from gmwm.diagnosis.innovations import Innovations, innovations
+from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
+from gmwm.diagnosis.resolution import rounding_notice, step_size
+from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
+from gmwm.diagnosis.result import ChannelHealth, Health
+from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
+from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
 
-_LONG_ENOUGH = 3600.0  # s: slow errors of inertial sensors have correlation times of minutes
-_JITTER, _LARGE_JITTER = 0.1, 0.3  # of a sampling interval, rms
-_SAID_OTHERWISE = "samples missing"
 _SEVERE = ("warning", "bad")
 
 
 @dataclass(frozen=True, eq=False)
 class _Examined:
-    """A channel: its findings, its numbers, and its prediction errors in standard deviations."""
+    """A channel: its notices, its numbers, and its prediction errors in standard deviations."""
 
-    findings: list[Finding]
+    notices: list[Notice]
     facts: ChannelHealth
     errors: FloatArray | None
 
@@ -40,9 +39,9 @@ class _Examined:
 def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """Find what is wrong with a static recording, or needs a term of its own in the model.
 
-    Gaps, dead and stuck channels, saturation, spikes and knocks, outliers spread over the record,
+    Gaps, dead and stuck channels, saturation, spikes and shocks, outliers spread over the record,
     rounding, periodic lines, resonances, drift, changes of the noise, an uneven clock, dependence
-    on temperature and between channels. Each kind of finding is made in at most about one of a
+    on temperature and between channels. Each kind of notice is made in at most about one of a
     thousand channels of clean Gaussian noise.
 
     Parameters
@@ -69,30 +68,33 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """
     if not isinstance(recording, Recording):
         raise InputError(
-            f"{checks.shown(recording)} is no recording: give what gmwm.read returns, or make one "
-            "with Recording.from_arrays"
+            f"{checks.shown(recording)} is not a recording: give what gmwm.read returns, or "
+            "make one with Recording.from_arrays"
         )
-    whole = [_length(recording), *_reader_findings(recording), *_clock(recording)]
+    # What is missing is counted anew, channel by channel.
+    read = [notice for notice in recording.notices if notice.code != "missing-samples"]
+    whole = [_length(recording), *read, *_clock(recording)]
     examined: dict[str, _Examined] = {}
-    for channel in recording:
+    channels = recording.inertial
+    for channel in channels:
         if progress is not None:
-            progress(len(examined), len(recording), channel.name)
+            progress(len(examined), len(channels), channel.name)
         examined[channel.name] = _examined(channel)
     if progress is not None:
-        progress(len(recording), len(recording), "")
-    shared = gap_findings(recording, recording.dt)
-    shared += crosstalk_findings(
+        progress(len(channels), len(channels), "")
+    shared = gap_notices(channels, recording.dt)
+    shared += crosstalk_notices(
         {name: one.errors for name, one in examined.items() if one.errors is not None}
     )
-    shared += temperature_findings(recording)
-    findings = worst_first(whole + [found for found in shared if not found.channel])
+    shared += temperature_notices(recording)
+    notices = worst_first(whole + [found for found in shared if not found.where])
     for name, one in examined.items():
-        own = one.findings + [found for found in shared if found.channel == name]
+        own = one.notices + [found for found in shared if found.where == name]
         if not any(found.severity in _SEVERE for found in own):
             own.append(_clean(name))
-        findings += worst_first(own)
+        notices += worst_first(own)
     return Health(
-        findings=tuple(findings),
+        notices=tuple(notices),
         channels={name: one.facts for name, one in examined.items()},
         source=recording.source,
         rate=recording.rate,
@@ -100,65 +102,61 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     )
 
 
-def _length(recording: Recording) -> Finding:
+def _length(recording: Recording) -> Notice:
     length = recording.duration
     text = f"{recording.n:,} samples at {recording.rate:g} Hz, {length:.6g} s"
     numbers = {"duration": length, "rate": recording.rate}
-    if length < _LONG_ENOUGH:
-        return Finding(
-            "", "length", "note", f"{text}, too short for slow errors of minutes and more",
-            "an hour or more shows them", numbers,
-        )  # fmt: skip
-    return Finding("", "length", "good", text, "", numbers)
+    if length < tuning.LONG_RECORD:
+        return Notice(
+            "length",
+            "note",
+            "",
+            f"{text}, too short for slow errors of minutes and more",
+            numbers,
+            "an hour or more shows them",
+        )
+    return Notice("length", "good", "", text, numbers)
 
 
-def _reader_findings(recording: Recording) -> list[Finding]:
-    """The reader's notes, but for those on missing samples of channels, which are told anew."""
-    findings = []
-    for note in recording.notes:
-        before = note.partition(": ")[0].split(", ")
-        if _SAID_OTHERWISE in note and set(before) <= set(recording.names):
-            continue
-        findings.append(Finding("", "reader", "note", note.removesuffix(".")))
-    return findings
-
-
-def _clock(recording: Recording) -> list[Finding]:
-    """Time stamps that come unevenly; small jitter is told by the reader's note alone."""
+def _clock(recording: Recording) -> list[Notice]:
+    """Time stamps that come unevenly; for small jitter the notice of the reader is enough."""
     jitter = recording.jitter
-    if jitter is None or jitter < _JITTER:
+    if jitter is None or jitter < tuning.JITTER:
         return []
-    severity: Severity = "warning" if jitter > _LARGE_JITTER else "note"
+    severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
     text = f"the steps of the time stamps vary by {100.0 * jitter:.2g} % rms"
     action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
-    return [Finding("", "clock", severity, text, action, {"jitter": jitter})]
+    return [Notice("clock", severity, "", text, {"jitter": jitter}, action)]
 
 
-def _clean(name: str) -> Finding:
+def _clean(name: str) -> Notice:
     text = "nothing found that spoils the estimates"
-    return Finding(name, "clean", "good", text, "", {})
+    return Notice("clean", "good", name, text)
 
 
 def _examined(channel: Channel) -> _Examined:
     name, unit, dt = channel.name, channel.unit, channel.dt
     values = np.asarray(channel.values, dtype=float)
-    dead = dead_finding(channel)
+    dead = dead_notice(channel)
     if dead is not None or channel.missing == channel.n:
         return _Examined([dead] if dead else [], ChannelHealth(), None)
     infinite = int(np.count_nonzero(np.isinf(values)))
     if infinite:
         text = f"{infinite:,} infinite samples"
         repair = "repair them, or set them to NaN for missing"
-        return _Examined([Finding(name, "infinite", "bad", text, repair)], ChannelHealth(), None)
+        return _Examined(
+            [Notice("infinite", "bad", name, text, action=repair)], ChannelHealth(), None
+        )
     present = values[~np.isnan(values)]
     step = step_size(present)
     errors = innovations(values, step)
     if errors is None:
-        text = f"fewer than {FEWEST} samples in a row: nothing more can be said"
+        text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
         return _Examined(
-            [Finding(name, "length", "warning", text, "record longer")],
-            ChannelHealth(lsb=step), None,
-        )  # fmt: skip
+            [Notice("length", "warning", name, text, action="record longer")],
+            ChannelHealth(lsb=step),
+            None,
+        )
     events = find_events(errors)
     outliers = contamination(errors, events)
     usable = errors.known.copy()
@@ -167,20 +165,20 @@ def _examined(channel: Channel) -> _Examined:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
     found = [
-        stuck_finding(name, unit, dt, values, step, errors),
-        saturation_finding(name, unit, present, step),
-        event_finding(name, unit, dt, values, events, errors.level),
-        contamination_finding(name, outliers),
-        rounding_finding(name, unit, step, errors.level),
-        variance_finding(name, unit, dt, errors, usable, step),
-        drift_finding(name, unit, dt, quiet),
+        stuck_notice(name, unit, dt, values, step, errors),
+        saturation_notice(name, unit, present, step),
+        event_notice(name, unit, dt, values, events, errors.level),
+        contamination_notice(name, outliers),
+        rounding_notice(name, unit, step, errors.level),
+        variance_notice(name, unit, dt, errors, usable, step),
+        drift_notice(name, unit, dt, quiet),
     ]
-    findings = [one for one in found if one is not None]
+    notices = [one for one in found if one is not None]
     lines, bumps = _peaks(quiet, dt)
-    if any(one.kind == "rounding" and one.severity == "bad" for one in findings):
+    if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
-    findings += line_findings(name, unit, lines)
-    findings += [resonance_finding(name, unit, bump) for bump in bumps]
+    notices += line_notices(name, unit, lines)
+    notices += [resonance_notice(name, unit, bump) for bump in bumps]
     facts = ChannelHealth(
         lines=tuple((line.frequency, line.amplitude) for line in lines),
         resonances=tuple((bump.frequency, bump.damping) for bump in bumps),
@@ -188,23 +186,26 @@ def _examined(channel: Channel) -> _Examined:
         lsb=step,
         outliers=outliers,
     )
-    return _Examined(findings, facts, _standardized(errors, usable))
+    return _Examined(notices, facts, _standardized(errors, usable))
 
 
 def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
     """Lines, and resonances of what they leave."""
-    if values.size < FEWEST_OF_SPECTRUM or np.count_nonzero(~np.isnan(values)) < values.size / 2:
+    if (
+        values.size < tuning.FEWEST_OF_SPECTRUM
+        or np.count_nonzero(~np.isnan(values)) < values.size / 2
+    ):
         return (), ()
     power = spectrum(values, dt)
     if not np.any(power.density > 0.0):
         return (), ()
     lines = find_lines(power, background(power, bands(power)))
-    taken = np.zeros(power.density.size, dtype=bool)
+    occupied = np.zeros(power.density.size, dtype=bool)
     for line in lines:
         margin = (line.stop - line.start) // 2
-        taken[max(line.start - margin, 0) : line.stop + margin] = True
-    rest = bands(power, taken)
-    return lines, find_resonances(power, rest, background(power, rest), taken)
+        occupied[max(line.start - margin, 0) : line.stop + margin] = True
+    rest = bands(power, occupied)
+    return lines, find_resonances(power, rest, background(power, rest), occupied)
 
 
 def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:

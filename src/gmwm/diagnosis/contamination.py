@@ -1,6 +1,6 @@
-"""Contamination: outliers too many, and too far apart, to be knocks.
+"""Contamination: outliers too many, and too far apart, to be shocks.
 
-A knock is left out with the samples around it. Outliers spread over the record cannot be: what is
+A shock is left out with the samples around it. Outliers spread over the record cannot be: what is
 left between them has no long averaging times. The robust wavelet variance bounds their influence
 instead, at the price of standard errors 1.3 times as large, so that it is used only where outliers
 do more harm than that.
@@ -11,13 +11,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binom, norm
 
-from gmwm.diagnosis.events import FALSE_ALARM
-from gmwm.diagnosis.findings import Finding
+from gmwm._core.notices import Notice
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 
-_FAR = 4.0  # robust standard deviations
-_NOISE = 2.0 * float(norm.sf(_FAR))  # share of Gaussian noise beyond
-_HARMFUL = 1e-3  # share of outliers; they add 16 times as much to the variance, or more
+_NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond
 
 
 def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> float:
@@ -38,15 +36,15 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
     outside = errors.known.copy()
     for start, stop in events:
         outside[start:stop] = False
-    # What rounding can add to an error is taken from it.
-    far = np.abs(errors.values) - errors.rounding > _FAR * errors.scale
+    # What rounding can add to an error is subtracted.
+    far = np.abs(errors.values) - errors.rounding > tuning.FAR * errors.scale
     count = int(np.count_nonzero(far & outside)) + len(events)
     known = int(np.count_nonzero(errors.known))
-    is_chance = bool(binom.sf(count - 1, known, _NOISE) > FALSE_ALARM)
-    return 0.0 if is_chance or count <= _HARMFUL * known else count / known
+    is_chance = bool(binom.sf(count - 1, known, _NOISE) > tuning.FALSE_ALARM)
+    return 0.0 if is_chance or count <= tuning.HARMFUL_OUTLIERS * known else count / known
 
 
-def contamination_finding(name: str, share: float) -> Finding | None:
+def contamination_notice(name: str, share: float) -> Notice | None:
     """Say how many outliers there are.
 
     Parameters
@@ -58,10 +56,12 @@ def contamination_finding(name: str, share: float) -> Finding | None:
     """
     if share == 0.0:
         return None
-    return Finding(
-        name, "outliers", "warning",
+    return Notice(
+        "outliers",
+        "warning",
+        name,
         f"{100.0 * share:.2g} % of the samples are outliers spread over the record, beyond four "
         f"standard deviations, where noise has {100.0 * _NOISE:.2g} %",
-        "gmwm calibrate takes robust wavelet variances (in Python robust=True)",
         {"share": share},
-    )  # fmt: skip
+        "gmwm calibrate takes robust wavelet variances (in Python robust=True)",
+    )

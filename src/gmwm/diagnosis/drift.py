@@ -7,35 +7,24 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import f as f_distribution, norm
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 
-FALSE_ALARM = 1e-3
-"""Chance of each finding where noise is Gaussian and stationary."""
 
-PARTS = 64
-"""Parts of the record whose means show the wander."""
-
-_SHORT = 64  # samples whose means give the fast noise
-_RAMP = 20.0  # change over the record, in rms of the wander: one random walk in 1000 has more
-_TENTHS = 10
-_CHANGE = 0.05  # of the standard deviation between halves that is worth a word
-_LARGE_CHANGE = 0.2
-
-
-def part_means(values: FloatArray, parts: int = PARTS) -> FloatArray:
-    """Means of equal parts of a series; NaN where more than half of a part is missing."""
+def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
+    """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
     rows = values[: size * parts].reshape(parts, size)
     known = ~np.isnan(rows)
     count = np.count_nonzero(known, axis=1)
     total = np.sum(np.where(known, rows, 0.0), axis=1)
-    return np.where(count > size / 2, total / np.maximum(count, 1), np.nan)
+    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
-def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Finding | None:
+def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice | None:
     """Say how far the level wanders, and whether it does so in one direction.
 
     The variance of the means of 64 parts is compared with what the differences between means of
@@ -52,16 +41,16 @@ def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Findin
     values : (n,) ndarray
         Samples, NaN where missing.
     """
-    size = values.size // PARTS
-    if size < 2 * _SHORT:
+    size = values.size // tuning.PARTS
+    if size < 2 * tuning.SHORT_MEAN:
         return None
     means = part_means(values)
-    place = np.arange(PARTS) - 0.5 * (PARTS - 1)
+    place = np.arange(tuning.PARTS) - 0.5 * (tuning.PARTS - 1)
     known = ~np.isnan(means)
-    short = part_means(values, values.size // _SHORT)
+    short = part_means(values, values.size // tuning.SHORT_MEAN)
     steps = np.diff(short)
     steps = steps[~np.isnan(steps)]
-    if np.count_nonzero(known) < PARTS / 2 or steps.size < PARTS:
+    if np.count_nonzero(known) < tuning.PARTS / 2 or steps.size < tuning.PARTS:
         return None
     means, place = means[known], place[known]
     place = place - np.mean(place)
@@ -70,40 +59,42 @@ def drift_finding(name: str, unit: str, dt: float, values: FloatArray) -> Findin
     freedom = means.size - 2
     wander = float(np.sqrt(rest @ rest / freedom))
     # Differences of means that are not independent have two thirds of the degrees of freedom.
-    white = float(np.sqrt(0.5 * np.mean(steps**2) * _SHORT / size))
+    white = float(np.sqrt(0.5 * np.mean(steps**2) * tuning.SHORT_MEAN / size))
     if not white > 0.0:
         return None
-    change = slope * PARTS
+    change = slope * tuning.PARTS
     ratio = wander / white
-    ramp = abs(change) > _RAMP * wander
-    wanders = ratio**2 > f_distribution.isf(FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
+    ramp = abs(change) > tuning.RAMP * wander
+    wanders = ratio**2 > f_distribution.isf(tuning.FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
     if not (wanders or ramp):
         return None
     numbers = {"wander": wander, "white": white, "change": change}
     if ramp:
-        return Finding(
-            name, "drift", "warning",
-            f"drifts by {spoken(change, unit, sign=True)} over the record, and wanders about "
-            f"that by {spoken(wander, unit)} rms",
-            "add a RateRamp to the model, or leave out the warm-up",
+        return Notice(
+            "drift",
+            "warning",
+            name,
+            f"drifts by {readable(change, unit, sign=True)} over the record, and wanders about "
+            f"that by {readable(wander, unit)} rms",
             numbers,
-        )  # fmt: skip
+            "add a RateRamp to the model, or leave out the warm-up",
+        )
     text = (
-        f"means of {size * dt:.3g} s wander by {spoken(wander, unit)} rms, {ratio:.2g} times "
+        f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {ratio:.2g} times "
         "what the fast noise leaves"
     )
     action = "estimated as random walk or slow Gauss-Markov process"
-    return Finding(name, "drift", "note", text, action, numbers)
+    return Notice("drift", "note", name, text, numbers, action)
 
 
-def variance_finding(
+def variance_notice(
     name: str,
     unit: str,
     dt: float,
     errors: Innovations,
     usable: BoolArray,
     step: float,
-) -> Finding | None:
+) -> Notice | None:
     """Say whether the noise is as large at the end as at the beginning.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
@@ -132,12 +123,16 @@ def variance_finding(
     usual = float(np.median(means))
     loudest = int(np.argmax(means))
     jump = np.sqrt(means[loudest] / usual) - 1.0
-    tail = norm.isf(FALSE_ALARM / _TENTHS) * np.sqrt(spread[loudest]) / usual
-    is_loud = jump > _LARGE_CHANGE and means[loudest] / usual - 1.0 > tail
+    tail = norm.isf(tuning.FALSE_ALARM / tuning.TENTHS) * np.sqrt(spread[loudest]) / usual
+    is_loud = jump > tuning.LARGE_CHANGE and means[loudest] / usual - 1.0 > tail
     # One loud tenth makes its half louder, which is no trend.
-    counted = np.arange(_TENTHS) != loudest if is_loud else np.ones(_TENTHS, dtype=bool)
-    first, first_error = _mean_of(means, spread, counted & (np.arange(_TENTHS) < _TENTHS // 2))
-    second, second_error = _mean_of(means, spread, counted & (np.arange(_TENTHS) >= _TENTHS // 2))
+    counted = np.arange(tuning.TENTHS) != loudest if is_loud else np.ones(tuning.TENTHS, dtype=bool)
+    first, first_error = _mean_of(
+        means, spread, counted & (np.arange(tuning.TENTHS) < tuning.TENTHS // 2)
+    )
+    second, second_error = _mean_of(
+        means, spread, counted & (np.arange(tuning.TENTHS) >= tuning.TENTHS // 2)
+    )
     numbers = {
         "first_half": float(np.sqrt(first)),
         "second_half": float(np.sqrt(second)),
@@ -145,24 +140,26 @@ def variance_finding(
         "loudest": float(np.sqrt(means[loudest])),
     }
     # On the logarithmic scale the ratio of two variances is nearly normal.
-    error = norm.isf(0.5 * FALSE_ALARM) * np.hypot(first_error / first, second_error / second)
+    error = norm.isf(0.5 * tuning.FALSE_ALARM) * np.hypot(
+        first_error / first, second_error / second
+    )
     growth = np.sqrt(second / first) - 1.0
-    if abs(np.log(second / first)) > error and abs(growth) > _CHANGE:
-        severity: Severity = "warning" if abs(growth) > _LARGE_CHANGE else "note"
+    if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
+        severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
         text = (
             f"the noise is {100.0 * abs(growth):.2g} % {'larger' if growth > 0.0 else 'smaller'} "
             "in the second half than in the first"
         )
         action = "the model is an average: use the part that is like the use"
-        return Finding(name, "variance", severity, text, action, numbers)
+        return Notice("variance", severity, name, text, numbers, action)
     if is_loud:
-        start = loudest * errors.values.size // _TENTHS * dt
+        start = loudest * errors.values.size // tuning.TENTHS * dt
         text = (
             f"the noise is {100.0 * jump:.2g} % larger than usual in the tenth of the record that "
             f"begins at {start:.4g} s"
         )
         action = "look for people or machines then, and leave it out if it is none of the sensor"
-        return Finding(name, "variance", "warning", text, action, numbers)
+        return Notice("variance", "warning", name, text, numbers, action)
     return None
 
 
@@ -173,5 +170,5 @@ def _mean_of(means: FloatArray, spread: FloatArray, which: BoolArray) -> tuple[f
 
 
 def _tenths(values: FloatArray, usable: BoolArray) -> list[tuple[FloatArray, BoolArray]]:
-    edges = np.linspace(0, values.size, _TENTHS + 1).astype(int)
+    edges = np.linspace(0, values.size, tuning.TENTHS + 1).astype(int)
     return [(values[a:b], usable[a:b]) for a, b in pairwise(edges)]

@@ -1,22 +1,16 @@
-"""Spikes and knocks: samples that the noise does not explain."""
+"""Spikes and shocks: samples that the noise does not explain."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import norm
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
-from gmwm.diagnosis.findings import Finding
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 
-FALSE_ALARM = 1e-3
-"""Chance of an event in a channel of Gaussian noise, however long."""
-
-_RING = 4.0  # standard deviations: what belongs to a knock, once there is one
-_JOINED = 24  # samples between exceedances of one event
-_GUARD = 8  # samples before and at least as many after that are left out with it
-_BESIDE = 200  # samples on both sides that tell the level without the event
 _LISTED = 3
 
 
@@ -24,8 +18,8 @@ def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
     """Sample intervals in which prediction errors are too large for noise.
 
     An error is too large beyond the quantile of the normal distribution that noise passes with
-    `FALSE_ALARM` in the whole channel, plus what rounding can add. Errors beyond four standard
-    deviations next to it belong to the same event.
+    `tuning.FALSE_ALARM` in the whole channel, plus what rounding can add. Errors beyond four
+    standard deviations next to it belong to the same event.
 
     Parameters
     ----------
@@ -39,32 +33,32 @@ def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
     n = errors.values.size
     beyond = np.abs(errors.values) - errors.rounding
     known = max(int(np.count_nonzero(errors.known)), 1)
-    limit = float(norm.isf(0.5 * FALSE_ALARM / known))
+    limit = float(norm.isf(0.5 * tuning.FALSE_ALARM / known))
     if not np.any(beyond > limit * errors.scale):
         return ()
-    weak = np.flatnonzero(beyond > _RING * errors.scale)
-    groups = np.split(weak, np.flatnonzero(np.diff(weak) > _JOINED) + 1)
+    weak = np.flatnonzero(beyond > tuning.RINGING * errors.scale)
+    groups = np.split(weak, np.flatnonzero(np.diff(weak) > tuning.JOINED) + 1)
     found: list[tuple[int, int]] = []
     for group in groups:
         if not np.any(beyond[group] > limit * errors.scale[group]):
             continue
         # What rings dies away below the noise: as long again is left out.
-        after = max(_GUARD, int(group[-1] - group[0]))
-        start, stop = max(int(group[0]) - _GUARD, 0), min(int(group[-1]) + after + 1, n)
+        after = max(tuning.GUARD, int(group[-1] - group[0]))
+        start, stop = max(int(group[0]) - tuning.GUARD, 0), min(int(group[-1]) + after + 1, n)
         if found and start <= found[-1][1]:
             start = found.pop()[0]
         found.append((start, stop))
     return tuple(found)
 
 
-def event_finding(
+def event_notice(
     name: str,
     unit: str,
     dt: float,
     values: FloatArray,
     events: tuple[tuple[int, int], ...],
     scatter: float,
-) -> Finding | None:
+) -> Notice | None:
     """Say when the events are, how large and how long.
 
     Parameters
@@ -97,8 +91,8 @@ def event_finding(
     harmful = share > np.sqrt(2.0 / known)
     length = (stop - start) * dt
     many = len(events) > 1
-    which = f"{len(events):,} spikes or knocks, the largest" if many else "a spike or knock"
-    height = spoken(heights[largest], unit, sign=True)
+    which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
+    height = readable(heights[largest], unit, sign=True)
     text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
     if 1 < len(events) <= _LISTED + 1:
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
@@ -116,12 +110,17 @@ def event_finding(
         "samples": float(samples),
         "variance_share": float(share),
     }
-    return Finding(name, "event", "warning" if harmful else "note", text, action, numbers)
+    return Notice("event", "warning" if harmful else "note", name, text, numbers, action)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:
     """Largest departure from the level beside the event, and the sum of squares."""
-    beside = np.concatenate([clean[max(start - _BESIDE, 0) : start], clean[stop : stop + _BESIDE]])
+    beside = np.concatenate(
+        [
+            clean[max(start - tuning.BESIDE_EVENT, 0) : start],
+            clean[stop : stop + tuning.BESIDE_EVENT],
+        ]
+    )
     beside = beside[~np.isnan(beside)]
     inside = values[start:stop]
     inside = inside[~np.isnan(inside)]

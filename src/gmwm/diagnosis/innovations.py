@@ -1,7 +1,7 @@
-"""What each sample brings that those before it do not foretell.
+"""What cannot be predicted of each sample from those before it.
 
-Spikes, stuck values and changes of the noise are told apart from the noise of a sensor where that
-noise is white. An autoregression of the first differences makes it so, whether it was white, a
+Spikes, stuck values and changes of the noise are distinguished from the noise of a sensor where
+that noise is white. An autoregression of the first differences makes it so, whether it was white, a
 random walk or a resonance; outliers are clipped before it is fitted.
 """
 
@@ -15,15 +15,9 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 from gmwm._core.typing import BoolArray, FloatArray, inner
+from gmwm.diagnosis import tuning
 
-FEWEST = 64
-"""Samples below which there are no innovations."""
-
-_ORDER = 16
-_SAMPLES_PER_COEFFICIENT = 16
-_BLOCK = 2048  # samples over which the scale is taken: 2 % of error
-_CLIP = 4.0  # standard deviations
-_CLIPPED = 0.99892  # variance of the normal distribution within _CLIP
+_CLIPPED = 0.99892  # variance of the normal distribution within tuning.CLIP
 _NORMAL_MAD = 1.482602  # standard deviation over median absolute value
 _ROUNDS = 20
 
@@ -73,7 +67,7 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     n = values.size
     differences = np.diff(values)
     known = ~np.isnan(differences)
-    if np.count_nonzero(known) < FEWEST:
+    if np.count_nonzero(known) < tuning.FEWEST_KNOWN:
         return None
     filled = np.where(known, differences, 0.0)
     floor = step / np.sqrt(12.0)
@@ -89,7 +83,7 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     errors[:-1], present[:-1] = np.where(has_future, backward, 0.0), has_future
     errors[1:] = np.where(has_past, forward, errors[1:])
     present[1:] |= has_past
-    if np.count_nonzero(present) < FEWEST:
+    if np.count_nonzero(present) < tuning.FEWEST_KNOWN:
         return None
     scale = np.ones(n) * floor
     scale[present] = _running_scale(errors[present], floor)
@@ -105,7 +99,7 @@ def robust_scale(values: FloatArray, floor: float) -> float:
     size = np.abs(values)
     scale = max(_NORMAL_MAD * float(np.median(size)), floor)
     for _ in range(_ROUNDS):
-        inner = size[size <= _CLIP * scale]
+        inner = size[size <= tuning.CLIP * scale]
         new = max(float(np.sqrt(np.mean(inner**2) / _CLIPPED)), floor) if inner.size else scale
         if abs(new - scale) <= 1e-3 * scale:
             break
@@ -115,12 +109,12 @@ def robust_scale(values: FloatArray, floor: float) -> float:
 
 def _limits(differences: FloatArray, known: BoolArray, floor: float) -> tuple[float, float]:
     scale = robust_scale(differences[known], floor)
-    return -_CLIP * scale, _CLIP * scale
+    return -tuning.CLIP * scale, tuning.CLIP * scale
 
 
 def _autoregression(differences: FloatArray, known: int) -> FloatArray:
     """Prediction error filter by the Yule-Walker equations, missing differences being zero."""
-    order = min(_ORDER, known // _SAMPLES_PER_COEFFICIENT)
+    order = min(tuning.ORDER, known // tuning.SAMPLES_PER_COEFFICIENT)
     n = differences.size
     covariance = np.array([inner(differences[: n - k], differences[k:]) for k in range(order + 1)])
     if not covariance[0] > 0.0:
@@ -141,9 +135,9 @@ def _complete(known: BoolArray, order: int) -> BoolArray:
 def _running_scale(errors: FloatArray, floor: float) -> FloatArray:
     """Scale in blocks, each replaced by the median of itself and its four neighbours.
 
-    A knock may fill a block; it does not fill three of five.
+    A shock may fill a block; it does not fill three of five.
     """
-    blocks = max(errors.size // _BLOCK, 1)
+    blocks = max(errors.size // tuning.SCALE_BLOCK, 1)
     edges = np.linspace(0, errors.size, blocks + 1).astype(int)
     scales = [robust_scale(errors[a:b], floor) for a, b in pairwise(edges)]
     padded = np.pad(np.array(scales), 2, mode="reflect" if blocks > 2 else "edge")

@@ -7,24 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.diagnosis.findings import Finding
-from gmwm.diagnosis.spectrum import FIRST, POWER_INFLATION, Spectrum
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.spectrum import POWER_INFLATION, Spectrum
 
-FALSE_ALARM = 1e-3
-"""Chance of a line in a channel of Gaussian noise."""
-
-_NARROW = 0.01  # of the frequency: wider is a resonance
-_UNRESOLVED = 6  # bins that a pure line takes
-_BESIDE = 64  # bins on both sides that tell the local background, or
-_BESIDE_SHARE = 0.015  # this part of the frequency
 _CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
 _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
-_MOST = 40  # lines of one channel
-_NAMED = 4  # lines in the findings
-_ABOVE = 1.5  # ratio to the background that ends the foot of a line
-_FOOT = 0.05  # of the frequency: no foot reaches farther
 
 
 @dataclass(frozen=True)
@@ -57,8 +47,8 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     """Lines by their power, strongest first.
 
     The mean of m = 1, 2, 4, ... neighbouring bins, over the local background, is compared with
-    the quantile of an F distribution that noise passes with `FALSE_ALARM` in all bins and widths
-    together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
+    the quantile of an F distribution that noise passes with `tuning.FALSE_ALARM` in all bins and
+    widths together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
     correlation between Hann bins, which rules the tail. Wider means find lines that wander.
 
     Parameters
@@ -68,19 +58,21 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
         Background, u^2/Hz.
     """
     last = spectrum.density.size - 1
-    if last <= FIRST + 2 * _UNRESOLVED:
+    if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
         return ()
     local, freedom = _local_background(spectrum.density, smooth)
     ratio = spectrum.density / local
     grid, limits = _limits(last, freedom)
     score, best = _scores(ratio, freedom, grid, limits, 0, last)
     lines: list[Line] = []
-    for _ in range(_MOST):
+    for _ in range(tuning.MOST_LINES):
         k = int(np.argmax(score))
         if score[k] <= 1.0:
             break
         line = _measured(spectrum, local, k, int(best[k]))
-        wide = line.width > max(_NARROW * line.frequency, _UNRESOLVED * spectrum.resolution)
+        wide = line.width > max(
+            tuning.NARROW * line.frequency, tuning.UNRESOLVED * spectrum.resolution
+        )
         if not wide:
             lines.append(line)
         # What it takes, and half of that on both sides, is noise from here on.
@@ -92,12 +84,12 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     return tuple(sorted(lines, key=lambda line: -line.amplitude))
 
 
-def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding]:
-    """One finding for each of the strongest lines and its harmonics, one for the rest."""
+def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
+    """One notice for each of the strongest lines and its harmonics, one for the rest."""
     families = _families(lines)
-    findings = []
-    for main, harmonics in families[:_NAMED]:
-        amplitude = spoken(main.amplitude, unit)
+    notices = []
+    for main, harmonics in families[: tuning.NAMED_LINES]:
+        amplitude = readable(main.amplitude, unit)
         text = (
             f"a periodic line at {main.frequency:.4g} Hz, amplitude {amplitude}, "
             f"{main.ratio:.3g} times its surroundings"
@@ -105,10 +97,12 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
         if harmonics:
             at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
             text += f", with harmonics at {at} Hz"
-        findings.append(
-            Finding(
-                name, "line", "warning", text,
-                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
+        notices.append(
+            Notice(
+                "line",
+                "warning",
+                name,
+                text,
                 {
                     "frequency": main.frequency,
                     "amplitude": main.amplitude,
@@ -116,19 +110,23 @@ def line_findings(name: str, unit: str, lines: tuple[Line, ...]) -> list[Finding
                     "width": main.width,
                     "harmonics": float(len(harmonics)),
                 },
+                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
             )
-        )  # fmt: skip
-    rest = families[_NAMED:]
+        )
+    rest = families[tuning.NAMED_LINES :]
     if rest:
         strongest = rest[0][0]
         text = (
             f"{len(rest)} weaker periodic line{'s' if len(rest) > 1 else ''}, the strongest at "
-            f"{strongest.frequency:.4g} Hz, amplitude {spoken(strongest.amplitude, unit)}"
+            f"{strongest.frequency:.4g} Hz, amplitude {readable(strongest.amplitude, unit)}"
         )
-        numbers = {"count": float(len(rest)), "frequency": strongest.frequency,
-                   "amplitude": strongest.amplitude}  # fmt: skip
-        findings.append(Finding(name, "line", "note", text, "", numbers))
-    return findings
+        numbers = {
+            "count": float(len(rest)),
+            "frequency": strongest.frequency,
+            "amplitude": strongest.amplitude,
+        }
+        notices.append(Notice("line", "note", name, text, numbers))
+    return notices
 
 
 def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -137,8 +135,11 @@ def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArr
     Mean logarithm over the neighbours, those cut that are too high for noise.
     """
     k = np.arange(density.size)
-    reach = np.maximum(_BESIDE, (_BESIDE_SHARE * k).astype(int))
-    low, high = np.maximum(k - reach, FIRST // 2), np.minimum(k + reach + 1, density.size - 1)
+    reach = np.maximum(tuning.BESIDE_LINE, (tuning.BESIDE_LINE_FRACTION * k).astype(int))
+    low, high = (
+        np.maximum(k - reach, tuning.FIRST_BIN // 2),
+        np.minimum(k + reach + 1, density.size - 1),
+    )
     low = np.minimum(low, high - 1)
     count = high - low
     logs = np.log(np.maximum(density / smooth, np.finfo(float).tiny)) + np.euler_gamma
@@ -153,10 +154,10 @@ def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArr
 
 def _limits(bins: int, freedom: FloatArray) -> tuple[FloatArray, dict[int, FloatArray]]:
     """Grid of degrees of freedom of the background, and largest ratios of noise on it by width."""
-    widest = max(int(_NARROW * bins), 1)
+    widest = max(int(tuning.NARROW * bins), 1)
     widths = [2**i for i in range(int(np.log2(widest)) + 1)]
     grid = np.geomspace(np.min(freedom), np.max(freedom) * 1.001, 12)
-    chance = FALSE_ALARM / (bins * len(widths))
+    chance = tuning.FALSE_ALARM / (bins * len(widths))
     limits = {}
     for width in widths:
         eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
@@ -191,8 +192,8 @@ def _scores(
     total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
     score, best = np.zeros(stop - start), np.ones(stop - start, dtype=int)
     for width, limit in limits.items():
-        slowest = int(width / _NARROW) if width > _UNRESOLVED else 0
-        centre = np.arange(max(start, FIRST, slowest, low + width // 2), stop)
+        slowest = int(width / tuning.NARROW) if width > tuning.UNRESOLVED else 0
+        centre = np.arange(max(start, tuning.FIRST_BIN, slowest, low + width // 2), stop)
         begin = centre - width // 2 - low
         fits = begin + width < total.size
         centre, begin = centre[fits], begin[fits]
@@ -212,8 +213,8 @@ def _measured(spectrum: Spectrum, local: FloatArray, k: int, width: int) -> Line
     # The feet of a strong line that wanders raise the background beneath it: look beyond them.
     for _ in range(2):
         start, stop = _foot(density / surroundings, k, width)
-        reach = max(_BESIDE, int(_BESIDE_SHARE * k))
-        sides = local[np.clip([start - reach, stop + reach], FIRST, local.size - 2)]
+        reach = max(tuning.BESIDE_LINE, int(tuning.BESIDE_LINE_FRACTION * k))
+        sides = local[np.clip([start - reach, stop + reach], tuning.FIRST_BIN, local.size - 2)]
         surroundings = float(min(np.exp(np.mean(np.log(sides))), local[k]))
     bins = np.arange(start, stop)
     excess = density[start:stop] - surroundings
@@ -234,9 +235,9 @@ def _foot(ratio: FloatArray, k: int, width: int) -> tuple[int, int]:
     ends = []
     for sign in (-1, 1):
         at = k
-        for _ in range(4 + int(2.0 * _FOOT * k / step)):
+        for _ in range(4 + int(2.0 * tuning.FOOT * k / step)):
             block = ratio[max(at - step // 2, 1) : at + step // 2 + 1]
-            if block.size == 0 or np.mean(block) < _ABOVE:
+            if block.size == 0 or np.mean(block) < tuning.FOOT_RATIO:
                 break
             at += sign * (step // 2)
         ends.append(int(np.clip(at, 1, ratio.size - 1)))

@@ -7,23 +7,15 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import norm, t as t_distribution
 
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
-from gmwm.diagnosis.drift import PARTS, part_means
-from gmwm.diagnosis.findings import Finding, Severity
-from gmwm.diagnosis.innovations import FEWEST
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.drift import part_means
 from gmwm.readers import Recording
 
-FALSE_ALARM = 1e-3
-"""Chance of a finding where no two channels depend on each other."""
 
-_WORTH_A_WORD = 0.05
-_STRONG = 0.3
-_CLIP = 4.0  # standard deviations
-_FEWEST_PARTS = 16
-_PART = 32  # samples
-
-
-def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
+def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
     """Find pairs of channels whose prediction errors are correlated.
 
     The correlation of two white series has the variance 1/n, whatever the spectra of the channels
@@ -37,60 +29,75 @@ def crosstalk_findings(errors: dict[str, FloatArray]) -> list[Finding]:
     """
     pairs = list(combinations(errors, 2))
     # Zero counts for nothing in a sum of products.
-    clipped = {name: np.nan_to_num(np.clip(e, -_CLIP, _CLIP)) for name, e in errors.items()}
-    findings = []
+    clipped = {
+        name: np.nan_to_num(np.clip(e, -tuning.CLIP, tuning.CLIP)) for name, e in errors.items()
+    }
+    notices = []
     for one, other in pairs:
         a, b = clipped[one], clipped[other]
         n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
-        if n < FEWEST:
+        if n < tuning.FEWEST_KNOWN:
             continue
         r = inner(a, b) / np.sqrt(inner(a, a) * inner(b, b))
-        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * FALSE_ALARM / len(pairs)):
+        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * tuning.FALSE_ALARM / len(pairs)):
             continue
-        if abs(r) > _WORTH_A_WORD:
-            severity: Severity = "warning" if abs(r) > _STRONG else "note"
-            findings.append(
-                Finding(
-                    "", "crosstalk", severity,
+        if abs(r) > tuning.CORRELATED:
+            severity: Severity = "warning" if abs(r) > tuning.STRONGLY_CORRELATED else "note"
+            notices.append(
+                Notice(
+                    "crosstalk",
+                    severity,
+                    "",
                     f"fast noise of {one} and {other} is correlated by {r:.2g}",
-                    "each channel is modelled for itself; a filter may want their covariance",
                     {"correlation": r, "samples": float(n)},
+                    "each channel is modelled for itself; a filter may want their covariance",
                 )
-            )  # fmt: skip
-    return findings
+            )
+    return notices
 
 
-def temperature_findings(recording: Recording) -> list[Finding]:
-    """Find channels that follow a temperature channel (one whose name begins with ``temp``).
+def temperature_notices(recording: Recording) -> list[Notice]:
+    """Find channels that follow a temperature channel, each with the one it follows most closely.
 
     Changes from one of 64 parts of the record to the next are correlated: what only drifts in
     the same direction does not count.
     """
-    thermometers = [c for c in recording if c.name.lower().startswith("temp")]
-    others = [c for c in recording if c not in thermometers]
-    if recording.n < PARTS * _PART:
+    thermometers = [c for c in recording.values() if c.quantity == "temperature"]
+    if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:
         return []
-    findings = []
-    for thermometer in thermometers:
-        warmer = np.diff(part_means(thermometer.values))
-        for channel in others:
-            step = np.diff(part_means(channel.values))
-            known = ~np.isnan(warmer + step)
-            n = int(np.count_nonzero(known))
-            if n < _FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
-                continue
-            r = float(np.corrcoef(warmer[known], step[known])[0, 1])
-            size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-            if size <= t_distribution.isf(0.5 * FALSE_ALARM / len(others), n - 2):
-                continue
-            slope = float(np.polyfit(warmer[known], step[known], 1)[0])
-            findings.append(
-                Finding(
-                    channel.name, "temperature", "warning",
-                    f"follows {thermometer.name} by {slope:.2g} {channel.unit} a degree "
-                    f"(correlation {r:.2g})",
-                    "compensate for it first, or slow terms of the model will stand for it",
-                    {"correlation": r, "slope": slope},
-                )
-            )  # fmt: skip
-    return findings
+    pairs = len(thermometers) * len(recording.inertial)
+    # Thermometers are often slower than the other sensors.
+    warmer = {c.name: np.diff(part_means(c.values, least=0.0)) for c in thermometers}
+    notices = []
+    for channel in recording.inertial:
+        step = np.diff(part_means(channel.values))
+        found = [
+            (size, r, slope, thermometer)
+            for thermometer in thermometers
+            for size, r, slope in _correlation(warmer[thermometer.name], step, pairs)
+        ]
+        if found:
+            _, r, slope, thermometer = max(found, key=lambda one: one[0])
+            text = (
+                f"follows {thermometer.name} by {readable(slope, channel.unit)} per "
+                f"{thermometer.unit or 'unit'} (correlation {r:.2g})"
+            )
+            values = {"correlation": r, "slope": slope}
+            action = "compensate for it first, or slow terms of the model will stand for it"
+            notices.append(Notice("temperature", "warning", channel.name, text, values, action))
+    return notices
+
+
+def _correlation(
+    warmer: FloatArray, step: FloatArray, pairs: int
+) -> list[tuple[float, float, float]]:
+    """Student's t, correlation and slope, if there is a correlation."""
+    known = ~np.isnan(warmer + step)
+    n = int(np.count_nonzero(known))
+    if n < tuning.FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
+        return []
+    r = float(np.corrcoef(warmer[known], step[known])[0, 1])
+    size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
+    if size <= t_distribution.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
+        return []
+    return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

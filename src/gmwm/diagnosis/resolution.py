@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
-from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis import tuning
 
-_LOOKED_AT = 65_536  # samples; a lattice shows in fewer
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
-_CLOSE = 1.5  # steps up to this many times the smallest are counted as one step
-_DIVISORS = range(1, 7)  # the smallest difference seen may be a few steps
-_OFF_LATTICE = 0.1  # rms distance from the lattice, in steps; numbers at random have 0.29
-_FEWEST = 8  # levels that prove a lattice by their places alone
 
 
 def step_size(values: FloatArray) -> float:
@@ -32,7 +28,7 @@ def step_size(values: FloatArray) -> float:
     float
         In the unit of ``values``; 0 if there is none.
     """
-    stride = -(-values.size // _LOOKED_AT)
+    stride = -(-values.size // tuning.LEVELS_SAMPLED)
     part = values[::stride]
     levels = np.unique(part)
     if levels.size < 2:
@@ -40,13 +36,13 @@ def step_size(values: FloatArray) -> float:
     differences = np.diff(levels)
     differences = differences[differences > _SMALLEST * (levels[-1] - levels[0])]
     smallest = float(np.min(differences))
-    first = float(np.median(differences[differences <= _CLOSE * smallest]))
+    first = float(np.median(differences[differences <= tuning.ONE_STEP * smallest]))
     # Few levels that come again and again are steps whatever their places.
-    if levels.size < _FEWEST and levels.size > part.size / 2:
+    if levels.size < tuning.FEWEST_LEVELS and levels.size > part.size / 2:
         return 0.0
-    for divisor in _DIVISORS:
+    for divisor in tuning.DIVISORS:
         step, off = _lattice(levels, first / divisor)
-        if off <= _OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
+        if off <= tuning.OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
             return step
     return 0.0
 
@@ -62,7 +58,7 @@ def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
     return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
 
 
-def rounding_finding(name: str, unit: str, step: float, scatter: float) -> Finding | None:
+def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
@@ -76,30 +72,35 @@ def rounding_finding(name: str, unit: str, step: float, scatter: float) -> Findi
     step : float
         u; 0 if there is none.
     scatter : float
-        Standard deviation of what cannot be foreseen from the samples before, rounding included,
+        Standard deviation of what cannot be predicted from the samples before, rounding included,
         u.
     """
     if step == 0.0:
         return None
     noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
-    text = f"samples come in steps of {spoken(step, unit)}"
+    text = f"samples come in steps of {readable(step, unit)}"
     if noise < step / 3.0:
-        return Finding(
-            name, "rounding", "bad",
+        return Notice(
+            "rounding",
+            "bad",
+            name,
             f"{text}, more than three times the noise below them",
+            values,
             "nothing mends it: the noise below the step cannot be estimated; use a finer range",
-            values,
-        )  # fmt: skip
+        )
     ratio = step / noise
-    text = f"{text}, {ratio:.2g} times the white noise of {spoken(noise, unit)}"
+    text = f"{text}, {ratio:.2g} times the white noise of {readable(noise, unit)}"
     if ratio > 1.0:
-        return Finding(
-            name, "rounding", "warning", text,
-            "counted as additive noise, which is nearly true up to a step of twice the noise",
+        return Notice(
+            "rounding",
+            "warning",
+            name,
+            text,
             values,
-        )  # fmt: skip
+            "counted as additive noise, which is nearly true up to a step of twice the noise",
+        )
     severity: Severity = "note" if ratio > 0.5 else "good"
     share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
     action = f"counted as white noise: {100.0 * share:.2g} % of it"
-    return Finding(name, "rounding", severity, text, action, values)
+    return Notice("rounding", severity, name, text, values, action)

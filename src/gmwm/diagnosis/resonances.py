@@ -7,24 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice
+from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm.diagnosis.findings import Finding
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.spectrum import Bands, Spectrum
 from gmwm.process import Resonance
 
-FALSE_ALARM = 1e-3
-"""Chance of a resonance in a channel of Gaussian noise with a monotone spectrum."""
-
-_FEWEST_BANDS = 24
-_LEAST = 1.5  # ratio to the background
-_SLOWEST = 64  # bin: below, bands are wider than a bump
-_REACH = 2.0  # frequencies from f/2 to 2 f are fitted
-_POINTS = 300
-_WIDEST = 0.3  # damping ratio
-_NARROWEST = 0.005  # damping ratio: what is narrower than a hundredth of its frequency is a line
-_MOST = 4
-_STARTS = (0.01, 0.05, 0.15)  # damping ratios
 # Logarithms of frequency over that of the band, of damping and of height; background.
 _LOW = np.array([-0.2, np.log(1e-3), -5.0, -8.0, -8.0, -8.0])
 _HIGH = np.array([0.2, np.log(0.9), 12.0, 8.0, 8.0, 8.0])
@@ -77,17 +66,20 @@ def find_resonances(
     """
     height = found.level - found.smooth
     count = height.size
-    if count < _FEWEST_BANDS:
+    if count < tuning.FEWEST_BANDS:
         return ()
     median_error = 0.5 * np.pi * np.mean(found.variance) / min(25, count)
-    limit = norm.isf(FALSE_ALARM / count) * np.sqrt(found.variance + median_error)
+    limit = norm.isf(tuning.FALSE_ALARM / count) * np.sqrt(found.variance + median_error)
     excess = np.where(
-        (height > np.maximum(limit, np.log(_LEAST))) & (found.edges[:-1] >= _SLOWEST), height, 0.0
+        (height > np.maximum(limit, np.log(tuning.LEAST_PEAK)))
+        & (found.edges[:-1] >= tuning.SLOWEST_BIN),
+        height,
+        0.0,
     )
     bumps: list[Bump] = []
-    for _ in range(2 * _MOST):
+    for _ in range(2 * tuning.MOST_RESONANCES):
         j = int(np.argmax(excess))
-        if excess[j] <= 0.0 or len(bumps) == _MOST:
+        if excess[j] <= 0.0 or len(bumps) == tuning.MOST_RESONANCES:
             break
         start, stop = _sides(height, j)
         excess[start:stop] = 0.0
@@ -99,11 +91,11 @@ def find_resonances(
     return tuple(sorted(bumps, key=lambda bump: -bump.ratio))
 
 
-def resonance_finding(name: str, unit: str, bump: Bump) -> Finding:
+def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
     """Say where it is, how damped and how high."""
     text = (
         f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
-        f"{bump.ratio:.2g} times its surroundings, {spoken(bump.sigma, unit)} rms"
+        f"{bump.ratio:.2g} times its surroundings, {readable(bump.sigma, unit)} rms"
     )
     action = "gmwm calibrate adds a Resonance to the model where it is needed"
     numbers = {
@@ -112,7 +104,7 @@ def resonance_finding(name: str, unit: str, bump: Bump) -> Finding:
         "ratio": bump.ratio,
         "sigma": bump.sigma,
     }
-    return Finding(name, "resonance", "note", text, action, numbers)
+    return Notice("resonance", "note", name, text, numbers, action)
 
 
 def _sides(height: FloatArray, j: int) -> tuple[int, int]:
@@ -132,22 +124,26 @@ def _fitted(
     spectrum: Spectrum, smooth: FloatArray, left_out: BoolArray, centre: float, height: float
 ) -> Bump | None:
     """Whittle fit of a resonance on a background whose logarithm is a parabola in log f."""
-    start = max(int(centre / _REACH / spectrum.resolution), 1)
-    stop = min(int(centre * _REACH / spectrum.resolution), spectrum.density.size - 1)
+    start = max(int(centre / tuning.FITTED_OCTAVES / spectrum.resolution), 1)
+    stop = min(int(centre * tuning.FITTED_OCTAVES / spectrum.resolution), spectrum.density.size - 1)
     f, power, weight = _points(spectrum, left_out, start, stop)
     level = float(np.interp(centre, spectrum.frequency, smooth))
     power = power / level
     place = np.log(f / centre)
 
-    starts = (np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
-              for damping in _STARTS)  # fmt: skip
-    free, _ = min((_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
-                  key=lambda result: result[1])  # fmt: skip
+    starts = (
+        np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
+        for damping in tuning.DAMPING_STARTS
+    )
+    free, _ = min(
+        (_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
+        key=lambda result: result[1],
+    )
     unit = _unit(free, centre, spectrum.dt)
     bottom = float(np.interp(unit.frequency, f, _floor(free, place)))
     peak = float(np.exp(free[2]))
     ratio = (bottom + peak) / bottom
-    if ratio < _LEAST or not _NARROWEST <= unit.damping <= _WIDEST:
+    if ratio < tuning.LEAST_PEAK or not tuning.NARROWEST <= unit.damping <= tuning.WIDEST:
         return None
     height_of_unit = 2.0 * float(unit.psd(np.array([unit.frequency]), spectrum.dt)[0])
     sigma = float(np.sqrt(peak * level / height_of_unit))
@@ -220,7 +216,7 @@ def _points(
     spectrum: Spectrum, left_out: BoolArray, start: int, stop: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequency, mean density and number of bins of groups of bins without lines."""
-    groups = min(_POINTS, stop - start)
+    groups = min(tuning.FITTED_POINTS, stop - start)
     edges = np.linspace(start, stop, groups + 1).astype(int)[:-1]
     used = np.where(left_out[:stop], 0.0, 1.0)
     count = np.add.reduceat(used, edges)

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import binom
 
-from gmwm._core.text import spoken
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.diagnosis.findings import Finding, Severity
+from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 from gmwm.readers import Channel
 
-FALSE_ALARM = 1e-3
-"""Chance of a stuck value or of saturation in a channel of Gaussian noise."""
 
-_MUCH_MISSING = 0.1
-_TOO_MUCH_MISSING = 0.5
-_DITHERED = 0.05  # share of differences of two steps and more at which noise tells samples apart
-_LONG = 32  # equal samples in a row that are not asked whether noise tells samples apart
-_FEWEST_AT_END = 8
-
-
-def gap_findings(channels: Iterable[Channel], dt: float) -> list[Finding]:
-    """How much is missing; one finding for the recording where all channels miss the same."""
-    findings = [found for channel in channels if (found := _gap_finding(channel, dt))]
-    alike = {(found.sentence, found.severity) for found in findings}
-    channels = list(channels)
-    if len(findings) == len(channels) > 1 and len(alike) == 1:
-        first = findings[0]
-        return [Finding("", "gap", first.severity, first.sentence, first.action, first.values)]
-    return findings
+def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
+    """How much is missing; one notice for the recording where all channels miss the same."""
+    notices = [found for channel in channels if (found := _gap_notice(channel, dt))]
+    if len(notices) == len(channels) > 1 and all(n.values == notices[0].values for n in notices):
+        return [replace(notices[0], where="")]
+    return notices
 
 
-def _gap_finding(channel: Channel, dt: float) -> Finding | None:
+def _gap_notice(channel: Channel, dt: float) -> Notice | None:
     gone = np.isnan(channel.values)
     missing = int(np.count_nonzero(gone))
     if not missing:
@@ -49,31 +39,33 @@ def _gap_finding(channel: Channel, dt: float) -> Finding | None:
         "longest": float(np.max(lengths)) * dt,
     }
     if missing == channel.n:
-        return Finding(
-            channel.name, "gap", "bad", "all samples missing", "look at cable and columns", values
+        return Notice(
+            "gap", "bad", channel.name, "all samples missing", values, "look at cable and columns"
         )
     plural = "s" if lengths.size > 1 else ""
     text = (
         f"{missing:,} of {channel.n:,} samples missing ({share:.2g} of all) in {lengths.size:,} "
         f"gap{plural}, the longest {values['longest']:.3g} s"
     )
-    if share > _TOO_MUCH_MISSING:
-        return Finding(channel.name, "gap", "bad", text, "too few are left: record again", values)
-    severity: Severity = "warning" if share > _MUCH_MISSING else "note"
+    if share > tuning.TOO_MUCH_MISSING:
+        return Notice("gap", "bad", channel.name, text, values, "too few are left: record again")
+    severity: Severity = "warning" if share > tuning.MUCH_MISSING else "note"
     action = "the wavelet variance bridges short gaps and leaves out what others touch"
-    return Finding(channel.name, "gap", severity, text, action, values)
+    return Notice("gap", severity, channel.name, text, values, action)
 
 
-def dead_finding(channel: Channel) -> Finding | None:
+def dead_notice(channel: Channel) -> Notice | None:
     """Say that a channel never changes."""
     if channel.missing == channel.n or not channel.is_constant:
         return None
-    return Finding(
-        channel.name, "dead", "bad",
-        f"every sample is {spoken(channel.mean, channel.unit, digits=6)}: the channel is dead",
-        "check sensor and columns; it is skipped in the calibration",
+    return Notice(
+        "dead",
+        "bad",
+        channel.name,
+        f"every sample is {readable(channel.mean, channel.unit, digits=6)}: the channel is dead",
         {"value": channel.mean},
-    )  # fmt: skip
+        "check sensor and columns; it is skipped in the calibration",
+    )
 
 
 def is_dithered(values: FloatArray, step: float) -> bool:
@@ -87,11 +79,11 @@ def is_dithered(values: FloatArray, step: float) -> bool:
         To which they are rounded, u; 0 if they are not.
     """
     lengths = run_lengths(values)
-    free = np.repeat(lengths < _LONG, lengths)
+    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     steps = np.abs(np.diff(values))[free[1:] & free[:-1]]
-    if steps.size < _LONG:
+    if steps.size < tuning.LONG_RUN:
         return False
-    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > _DITHERED
+    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > tuning.DITHERED
 
 
 def run_lengths(values: FloatArray) -> IntArray:
@@ -100,9 +92,9 @@ def run_lengths(values: FloatArray) -> IntArray:
     return np.diff(np.concatenate([[0], changes, [values.size]]))
 
 
-def stuck_finding(
+def stuck_notice(
     name: str, unit: str, dt: float, values: FloatArray, step: float, errors: Innovations
-) -> Finding | None:
+) -> Notice | None:
     """Find runs of equal samples longer than rounding explains.
 
     Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
@@ -142,21 +134,21 @@ def stuck_finding(
         "value": float(series[starts[worst]]),
         "samples": float(total),
     }
-    value = spoken(numbers["value"], unit, digits=5)
+    value = readable(numbers["value"], unit, digits=5)
     many = f"{stuck.size:,} times, the longest" if stuck.size > 1 else ""
     text = (
         f"stuck {many} at {value} for {lengths[worst]:,} samples from "
         f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
     ).replace("  ", " ")
-    severity: Severity = "bad" if share > _MUCH_MISSING else "warning"
-    return Finding(
-        name, "stuck", severity, text, "make such samples missing (NaN) before the fit", numbers
+    severity: Severity = "bad" if share > tuning.MUCH_MISSING else "warning"
+    return Notice(
+        "stuck", severity, name, text, numbers, "make such samples missing (NaN) before the fit"
     )
 
 
 def _scale_between(errors: Innovations, present: IntArray, lengths: IntArray) -> float:
     """Usual standard deviation of prediction errors outside long runs."""
-    free = np.repeat(lengths < _LONG, lengths)
+    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     kept = present[free]
     kept = kept[errors.known[kept]]
     sizes = errors.values[kept]
@@ -173,10 +165,10 @@ def _longest_by_chance(n: int, step: float, scale: float) -> int:
     fewest = 3  # equal numbers of a file with few digits
     if same <= 0.0:
         return fewest
-    return max(int(np.ceil(np.log(FALSE_ALARM / n) / np.log(same))) + 1, fewest)
+    return max(int(np.ceil(np.log(tuning.FALSE_ALARM / n) / np.log(same))) + 1, fewest)
 
 
-def saturation_finding(name: str, unit: str, values: FloatArray, step: float) -> Finding | None:
+def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> Notice | None:
     """Find more samples at the largest or smallest value than at the one before it.
 
     A tail falls outwards, and for noise faster and faster: from the last step but one to the last
@@ -210,19 +202,21 @@ def saturation_finding(name: str, unit: str, values: FloatArray, step: float) ->
         ]
         fall = _slowest_fall(*next_two)
         chance = float(binom.sf(last - 1, last + next_two[0], fall / (1.0 + fall)))
-        if last >= _FEWEST_AT_END and chance < 0.5 * FALSE_ALARM:
+        if last >= tuning.FEWEST_AT_END and chance < 0.5 * tuning.FALSE_ALARM:
             ends[end] = last
     if not ends:
         return None
     count = sum(ends.values())
     share = count / values.size
-    where = " and ".join(spoken(end, unit, digits=5) for end in ends)
-    return Finding(
-        name, "saturation", "bad" if share > FALSE_ALARM else "warning",
+    where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    return Notice(
+        "saturation",
+        "bad" if share > tuning.FALSE_ALARM else "warning",
+        name,
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
-        "use a wider range; make such samples missing (NaN) if they are few",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
-    )  # fmt: skip
+        "use a wider range; make such samples missing (NaN) if they are few",
+    )
 
 
 def _slowest_fall(near: int, far: int) -> float:

@@ -8,19 +8,12 @@ import numpy as np
 from scipy import fft
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, inner
-
-FEWEST = 512
-"""Samples below which there is no spectrum worth a look."""
-
-FIRST = 20
-"""First bin that is looked at: slower than a twentieth of the record is drift, not a line."""
+from gmwm.diagnosis import tuning
 
 POWER_INFLATION = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)
 """Variance of means of neighbouring Hann periodogram bins, over that of independent ones."""
 
-_BINS_PER_OCTAVE = 24
-_FEWEST_IN_BIN = 8
-_HALF_OCTAVE = _BINS_PER_OCTAVE // 2
+_HALF_OCTAVE = tuning.BANDS_PER_OCTAVE // 2
 _LOG_VARIANCE = np.pi**2 / 6.0  # of the logarithm of an exponential variate
 
 
@@ -146,7 +139,9 @@ def _edges(last: int) -> IntArray:
     """Bins at which bands begin: a 24th of an octave, but eight bins at least."""
     edges = [4]
     while edges[-1] < last:
-        width = max(_FEWEST_IN_BIN, round(edges[-1] * (2.0 ** (1.0 / _BINS_PER_OCTAVE) - 1.0)))
+        width = max(
+            tuning.FEWEST_IN_BAND, round(edges[-1] * (2.0 ** (1.0 / tuning.BANDS_PER_OCTAVE) - 1.0))
+        )
         edges.append(edges[-1] + width)
     if edges[-1] > last:
         edges.pop()

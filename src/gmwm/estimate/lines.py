@@ -188,6 +188,7 @@ class AllanLines:
             upper_bounds={},
             objective=float(whitened @ whitened),
             chi_square=float("nan"),
+            chi_square_allowed=float("nan"),
             dof=wv.tau.size - len(keys),
             discrepancy=0.0,
             method=self.name,

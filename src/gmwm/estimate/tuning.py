@@ -90,6 +90,10 @@ SETTLED = 1e-4
 
 # -- the rate ramp --------------------------------------------------------------------------------
 
+WALK_RATIOS = (0.03, 3000.0)
+"""Walks that a slope is judged beside: what they add to its variance, over what the noise gives.
+Below, a walk changes nothing; above, none of a thousand records would hide it."""
+
 FEWEST_BLOCKS = 8
 """Blocks of samples from which a slope is estimated."""
 

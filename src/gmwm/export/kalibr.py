@@ -43,9 +43,9 @@ def kalibr_text(calibration: Calibration) -> str:
         lines += _entry(f"{name}_noise_density", density_unit, "white noise", densities)
         walks = {key: random_walk(fitted) for key, fitted in fits.items()}
         lines += _entry(f"{name}_random_walk", walk_unit, "random walk", walks)
-    doubtful = [name for name, fitted in calibration.fits.items() if not fitted.valid]
-    if doubtful:
-        lines.append(f"# not valid, see the report before use: {', '.join(doubtful)}")
+    not_valid = [name for name, fitted in calibration.fits.items() if not fitted.valid]
+    if not_valid:
+        lines.append(f"# not valid, see the report before use: {', '.join(not_valid)}")
     lines.append("rostopic: /imu0  # set to the topic of your bag")
     lines.append(f"update_rate: {calibration.rate:.6g}  # Hz")
     return "\n".join(lines) + "\n"

@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.names import AXES, CANONICAL, meaning
-from gmwm.readers.table import FEWEST, LARGEST, label, usable
+from gmwm.readers.table import LARGEST, label, usable
 
 _AnyArray = npt.NDArray[Any]
 _Column = tuple[str, _AnyArray]
@@ -32,7 +34,7 @@ _ZIP_MAGIC = b"PK"
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
 
-# Stands for an entry of an NPZ file that is no plain array: it does no harm unless it is wanted.
+# Stands for an entry of an NPZ file that is not a plain array: it does no harm unless it is wanted.
 _OBJECTS = np.empty(0, dtype=object)
 _KINDS = {
     "O": "Python objects",
@@ -47,14 +49,14 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class ArrayTable:
-    """Columns taken from arrays."""
+    """Columns of arrays."""
 
     source: str
     names: tuple[str, ...]
     arrays: tuple[_AnyArray, ...]
     rate: float | None = None
     tentative: bool = False
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @classmethod
     def open(cls, path: Path) -> ArrayTable:
@@ -63,7 +65,7 @@ class ArrayTable:
         Raises
         ------
         InputError
-            If it is damaged, or its arrays are no columns.
+            If it is damaged, or its arrays are not columns.
         """
         source, rate = path.name, None
         if path.suffix.lower() == ".npz":
@@ -164,7 +166,7 @@ def _load_npz(path: Path) -> dict[str, _AnyArray]:
     # Opened here: numpy leaves a damaged archive open.
     with _damage_named(path.name), path.open("rb") as stream:
         magic = stream.read(len(_ZIP_MAGIC))
-        # Without the magic number at the beginning, numpy would take it for pickled objects.
+        # Without the magic number at the beginning, numpy would read it as pickled objects.
         if magic == _ZIP_MAGIC and zipfile.is_zipfile(stream):
             stream.seek(0)
             with np.load(stream, allow_pickle=False) as archive:
@@ -228,7 +230,7 @@ def _columns_of_entries(source: str, entries: Mapping[str, _AnyArray]) -> list[_
 
 def _unnamed(source: str, array: _AnyArray) -> list[_Column]:
     rows, width = array.shape
-    if width > rows and width >= FEWEST:
+    if width > rows and width >= tuning.FEWEST_SAMPLES:
         raise InputError(
             f"{source} has shape {array.shape}: samples run along the rows here, save array.T"
         )

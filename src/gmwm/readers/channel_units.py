@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers.names import meaning
@@ -15,7 +16,7 @@ _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
 
 def channel_units(
     table: Table, roles: Roles, units: Mapping[str, str]
-) -> tuple[dict[str, str], tuple[str, ...]]:
+) -> tuple[dict[str, str], tuple[Notice, ...]]:
     """Find the unit of every channel.
 
     Parameters
@@ -29,7 +30,7 @@ def channel_units(
     -------
     units : dict of str to str
         By channel.
-    notes : tuple of str
+    notices : tuple of Notice
         Where they come from, if not from the user alone.
 
     Raises
@@ -54,7 +55,7 @@ def channel_units(
             from_header[channel] = unit
         elif in_header not in (None, given):
             overruled[channel] = f"{in_header}, not {given}"
-    return found, tuple(_notes(from_header, overruled))
+    return found, tuple(_notices(from_header, overruled))
 
 
 def _sensor(channel: str, column: str) -> str | None:
@@ -67,11 +68,12 @@ def _sensor(channel: str, column: str) -> str | None:
 
 
 def _check_keys(units: Mapping[str, str], roles: Roles) -> None:
+    known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
-        if key not in SI_UNIT and key not in roles.channels:
+        if key not in SI_UNIT and key not in known:
             raise InputError(
                 f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
-                f"are {', '.join(roles.channels)}"
+                f"are {', '.join(known)}"
             )
 
 
@@ -89,25 +91,29 @@ def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
     if sensor is None:
         return InputError(
             f"{table.source} does not say the unit of {channel}: give it, e.g. "
-            f'units={{"{channel}": "deg/s"}}'
+            f'units={{"{channel}": "deg/s"}}',
+            "unit-missing",
         )
     example = _EXAMPLES[sensor]
     return InputError(
         f"{table.source} does not say the unit of {channel}: give it, e.g. "
-        f'units={{"{sensor}": "{example}"}} (on the command line --{sensor}-unit {example})'
+        f'units={{"{sensor}": "{example}"}}',
+        f"{sensor}-unit-missing",
     )
 
 
-def _notes(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[str]:
-    notes = []
+def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[Notice]:
+    notices = []
     if from_header:
         by_unit = {
             unit: ", ".join(name for name, u in from_header.items() if u == unit)
             for unit in dict.fromkeys(from_header.values())
         }
         parts = "; ".join(f"{names} in {unit}" for unit, names in by_unit.items())
-        notes.append(f"Units from the names of the columns: {parts}.")
+        text = f"units from the names of the columns: {parts}"
+        notices.append(Notice("units-from-names", "note", "", text, from_header))
     if overruled:
         parts = "; ".join(f"{name} in {text}" for name, text in overruled.items())
-        notes.append(f"The names of the columns say otherwise than the units given: {parts}.")
-    return notes
+        text = f"the names of the columns contradict the units given: {parts}"
+        notices.append(Notice("units-contradicted", "note", "", text, overruled))
+    return notices

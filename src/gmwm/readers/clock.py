@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.jumps import Jumps, find_jumps
 
 _UNITS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
-_AGREEMENT = 0.01
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
-_SHORTEST_USUAL = 0.499  # of the median; rounded stamps come to one half, give or take a hair
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
 
 def agree(rate: float, other: float) -> bool:
     """Whether two rates are the same within 1 %."""
-    return abs(rate / other - 1.0) <= _AGREEMENT
+    return abs(rate / other - 1.0) <= tuning.RATES_AGREE
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,15 @@ class Timing:
         In Hz; not rounded to what was expected.
     jumps : Jumps
         Where rows are missing.
-    notes : tuple of str
-        On the clock: its rate, its unit, its jitter, its jumps; one sentence each.
+    notices : tuple of Notice
+        On the clock: its rate, its unit, its jitter, its jumps.
     jitter : float
         Standard deviation of the steps, as a share of a step.
     """
 
     rate: float
     jumps: Jumps
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
     jitter: float
 
 
@@ -104,29 +104,34 @@ class Clock:
             jitter = float(np.std(np.delete(steps, jumps.rows - 1)))
         step = jumps.interval
         if not _SHORTEST_STEP < step < 1.0 / _SHORTEST_STEP:
-            raise InputError(f"{self.place}: steps of {step:g} are no clock's: {_WAY_OUT}")
+            raise InputError(
+                f"{self.place}: steps of {step:g} are not those of a clock: {_WAY_OUT}", "clock"
+            )
         self._check_jumps(jumps)
         seconds, guessed = self._unit(step, expected)
         rate = 1.0 / (step * seconds)
         if expected is not None and not agree(rate, expected):
             raise InputError(
                 f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated: "
-                "leave out the rate to take that of the stamps, or give time=False to ignore them"
+                "leave out the rate to use that of the stamps, or give time=False to ignore them"
             )
-        note = (
-            f"Time stamps (column {self.column}, {_UNITS[seconds]}"
-            f"{' as far as the steps tell' if guessed else ''}) give {rate:.6g} Hz; their steps "
-            f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)."
+        text = (
+            f"time stamps (column {self.column}, {_UNITS[seconds]}"
+            f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
+            f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)"
         )
-        return Timing(rate, jumps, (note, *self._notes_of_jumps(jumps, seconds)), jitter / step)
+        values = {"rate": rate, "unit": seconds, "jitter": jitter / step}
+        notice = Notice("time-stamps", "note", "", text, values)
+        return Timing(rate, jumps, (notice, *self._notices_of_jumps(jumps, seconds)), jitter / step)
 
     def _check_complete(self) -> None:
         bad = np.flatnonzero(np.isnan(self.stamps))
         if bad.size:
             others = f", and {bad.size - 1:,} more such" if bad.size > 1 else ""
             raise InputError(
-                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: take such lines "
-                f"out, or, {_WAY_OUT}"
+                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: remove such "
+                f"lines, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_increasing(self, steps: FloatArray) -> None:
@@ -136,17 +141,19 @@ class Clock:
             what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
             raise InputError(
                 f"{self.place}, {self.where(row)}: time stamp {self.stamps[row]:.15g} {what}: "
-                f"take such lines out, or, {_WAY_OUT}"
+                f"remove such lines, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_not_short(self, steps: FloatArray) -> None:
         median = float(np.median(steps))
-        bad = np.flatnonzero(~(steps >= _SHORTEST_USUAL * median))
+        bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median))
         if bad.size:
             row = int(bad[0]) + 1
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of {steps[row - 1]:.6g} where "
-                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}"
+                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}",
+                "clock",
             )
 
     def _check_jumps(self, jumps: Jumps) -> None:
@@ -155,7 +162,8 @@ class Clock:
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of two intervals, and "
                 f"{jumps.rows.size - 1:,} more such at even distances, as if the stamps were "
-                f"rounded too coarsely: {_WAY_OUT}"
+                f"rounded too coarsely: {_WAY_OUT}",
+                "clock",
             )
         n = self.stamps.size
         if jumps.total > n:
@@ -164,10 +172,11 @@ class Clock:
                 f"{self.place}, {self.where(row)}: the clock jumps by "
                 f"{jumps.missing[jumps.longest]:,.6g} sampling intervals, and in all "
                 f"{jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
-                f"the recording: use the part before or after, or, {_WAY_OUT}"
+                f"the recording: use the part before or after, or, {_WAY_OUT}",
+                "clock",
             )
 
-    def _notes_of_jumps(self, jumps: Jumps, seconds: float) -> list[str]:
+    def _notices_of_jumps(self, jumps: Jumps, seconds: float) -> list[Notice]:
         """When the clock jumps, how far, and how many samples that costs."""
         if not jumps.rows.size:
             return []
@@ -179,16 +188,20 @@ class Clock:
         total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
         place = f"by {length:.12g} s, {when:.12g} s after the start"
         if count == 1:
-            notes, which = [f"The clock jumps {place}: {total}."], "The jump is"
+            text, which = f"the clock jumps {place}: {total}", "the jump is"
         else:
-            notes = [f"The clock jumps {count:,} times, farthest {place}: in all {total}."]
+            text = f"the clock jumps {count:,} times, farthest {place}: in all {total}"
             which = f"{jumps.off_grid:,} of these jumps {'are' if jumps.off_grid > 1 else 'is'}"
+        values = {"count": count, "missing": jumps.total, "longest": length, "time": when}
+        notices = [Notice("clock-jumps", "note", "", text, values)]
         if jumps.off_grid:
-            notes.append(
+            text = (
                 f"{which} not near a whole number of sampling intervals: the samples after it "
-                "were placed at the nearest."
+                "were placed at the nearest"
             )
-        return notes
+            values = {"count": jumps.off_grid}
+            notices.append(Notice("clock-off-grid", "note", "", text, values))
+        return notices
 
     def _unit(self, step: float, expected: float | None) -> tuple[float, bool]:
         """The unit in seconds, and whether it is a guess."""

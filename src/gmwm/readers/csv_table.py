@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.cells import BLANKS, number, split_line
@@ -69,9 +70,9 @@ class CsvTable:
         return None
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Notice, ...]:
         """What was noticed in the header."""
-        return self.layout.notes
+        return self.layout.notices
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns.
@@ -123,7 +124,7 @@ class _Infinite:
     count: int = 0
 
     def add(self, place: str, cell: str) -> None:
-        """Take note of one."""
+        """Count one."""
         self.count += 1
         self.first = self.first or f"{place}: {_excerpt(cell)}"
 
@@ -223,7 +224,7 @@ def _cells(table: CsvTable, place: str, text: str) -> list[str]:
     if len(cells) != width:
         raise InputError(
             f"{table.source}, {place}: {len(cells)} fields where {width} were expected: mend the "
-            "line or take it out"
+            "line or remove it"
         )
     return cells
 

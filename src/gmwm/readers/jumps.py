@@ -8,14 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
+from gmwm.readers import tuning
 
 _Rows = npt.NDArray[np.int64]
-
-_ONE = 1.75  # median steps; up to here steps make the usual one: 2 and 3 ms of a clock of 400 Hz
-_LONGEST = 1.5  # usual steps; beyond it a step may be a jump
-_NEIGHBOURS = 5  # rows on either side of a jump that say where the clock stands
-_OFF_GRID = 0.25  # steps
-_FEWEST_IN_RHYTHM = 4
 
 
 @dataclass(frozen=True)
@@ -61,7 +56,7 @@ class Jumps:
         A clock of 700 Hz that is written in whole milliseconds steps by 1 and now and then by 2,
         in a rhythm; rows are lost without one.
         """
-        if self.rows.size < _FEWEST_IN_RHYTHM or np.any(self.missing > 1.0):
+        if self.rows.size < tuning.FEWEST_IN_RHYTHM or np.any(self.missing > 1.0):
             return False
         distance = np.diff(self.rows)
         return bool(np.std(distance) <= 0.5 + 0.1 * np.mean(distance))
@@ -109,8 +104,8 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     so that one stamp that comes late, and is followed by a short step, makes no gap.
     """
     steps = np.diff(stamps)
-    usual = np.mean(steps[steps <= _ONE * np.median(steps)])
-    candidates = np.flatnonzero(steps > _LONGEST * usual) + 1
+    usual = np.mean(steps[steps <= tuning.USUAL_STEP * np.median(steps)])
+    candidates = np.flatnonzero(steps > tuning.LONGEST_STEP * usual) + 1
     rest = stamps[-1] - stamps[0] - np.sum(steps[candidates - 1])
     interval = float(rest / (steps.size - candidates.size))
     if not (0.0 < interval < np.inf):
@@ -126,12 +121,12 @@ def find_jumps(stamps: FloatArray) -> Jumps:
 
 
 def _off_grid(steps: FloatArray, missing: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray(np.abs(steps - 1.0 - missing) > _OFF_GRID)
+    return np.asarray(np.abs(steps - 1.0 - missing) > tuning.OFF_GRID)
 
 
 def _advance(stamps: FloatArray, rows: _Rows, interval: float) -> FloatArray:
     """How far the clock goes at each of these rows, in intervals, with jitter averaged out."""
-    offsets = np.arange(_NEIGHBOURS)
+    offsets = np.arange(tuning.NEIGHBOURS)
     before = rows[:, None] - 1 - offsets
     after = rows[:, None] + offsets
     previous = np.concatenate([[0], rows[:-1]])[:, None]

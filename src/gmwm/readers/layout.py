@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import mode
 
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, number, split_header, split_line
 from gmwm.readers.names import meaning
 from gmwm.readers.table import FORMATS
 
 _COMMENT_MARKS = ("#", "%")
-_SAMPLE = 100  # lines looked at
 _DELIMITERS = (";", "\t", ",", BLANKS)  # of two that explain the lines equally well, the first
 _UTF8_MARK = b"\xef\xbb\xbf"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -40,7 +41,7 @@ class Layout:
         Bytes before the first line of data.
     line : int
         Number of that line, counted from 1.
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     delimiter: str
@@ -50,7 +51,7 @@ class Layout:
     trailing: bool
     offset: int
     line: int
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def width(self) -> int:
@@ -117,10 +118,13 @@ def find_layout(source: str, head: bytes) -> Layout:
         trailing=trailing,
         offset=data[0].offset,
         line=data[0].number,
-        notes=(f"Line {first.number} was taken for column numbers and left out.",)
-        if data is following and not has_header
-        else (),
+        notices=(_numbering(first.number),) if data is following and not has_header else (),
     )
+
+
+def _numbering(line: int) -> Notice:
+    text = f"line {line} was read as column numbers and left out"
+    return Notice("column-numbers", "note", "", text, {"line": line})
 
 
 def _check_is_text(source: str, head: bytes) -> None:
@@ -144,7 +148,7 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
             if not lines:
                 _check_utf8(source, i, raw)
             lines.append(_Line(i, found.start(), text))
-            if len(lines) == _SAMPLE:
+            if len(lines) == tuning.LINES_OF_LAYOUT:
                 break
         else:
             comments.append(_Line(i, found.start(), text))

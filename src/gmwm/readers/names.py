@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from gmwm._core.units import quantity_of
+from gmwm._core.units import auxiliary_unit, quantity_of
 from gmwm.errors import InputError
 
 AXES = ("x", "y", "z")
@@ -43,6 +43,21 @@ _OTHER_MEANINGS = frozenset(
     | {"delta", "mag"}
 )
 
+_AUXILIARY_WORDS = {
+    word: quantity
+    for quantity, words in {
+        "temperature": "temp temperature temperatures thermometer",
+        "voltage": "voltage volt volts vbat vdd vcc",
+    }.items()
+    for word in words.split()
+}
+# Columns about such a quantity other than its samples.
+_OTHER_AUXILIARY = frozenset(
+    {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
+    | {"cmd", "desired", "setpoint", "delta", "limit", "alarm", "flag", "status", "valid"}
+    | {"t", "ts", "time", "timestamp", "stamp"}
+)
+
 _UNIT_WORDS = {
     word: unit
     for unit, words in {
@@ -57,6 +72,8 @@ _UNIT_WORDS = {
     }.items()
     for word in words.split()
 }
+
+_BY_UNIT = ("temperature", "voltage")
 
 _TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
 _BEFORE_TIME = frozenset(
@@ -91,9 +108,9 @@ class Meaning:
     Attributes
     ----------
     role : str or None
-        One of `CANONICAL`, `TIME`, or ``None`` for anything else.
+        One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
     unit : str or None
-        Unit of an angular rate or a specific force, if the name has one that is understood.
+        Its unit, if the name has one that is understood.
     seconds : float or None
         For a time column, its unit in seconds.
     """
@@ -115,7 +132,12 @@ def meaning(name: str) -> Meaning:
     plain = unicodedata.normalize("NFKC", name.replace("²", "^2")).replace("μ", "u")
     base, bracket = _split_brackets(plain)
     words = [word.lower() for word in re.findall(r"[A-Za-z0-9]+", _CAMEL_HUMP.sub("_", base))]
-    return _as_time(words, bracket) or _as_channel(words, bracket) or Meaning(None, _unit(bracket))
+    return (
+        _as_time(words, bracket)
+        or _as_channel(words, bracket)
+        or _as_auxiliary(words, bracket)
+        or Meaning(None, _unit(bracket))
+    )
 
 
 def bare(name: str) -> str:
@@ -168,8 +190,27 @@ def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:
     return None
 
 
+def _as_auxiliary(words: Sequence[str], bracket: str) -> Meaning | None:
+    """Temperature and voltage, by a word of the name (``imu_temp1``) or by the unit."""
+    if not _OTHER_AUXILIARY.isdisjoint({*words[:1]} - {"t"} | {*words[1:]}):
+        return None  # "T [degC]" is one, "time of temp" is not
+    found = auxiliary_unit(bracket)
+    if found is not None:
+        return Meaning(found.quantity, bracket) if found.quantity in _BY_UNIT else None
+    quantities = [_AUXILIARY_WORDS.get(word.rstrip("0123456789")) for word in words]
+    quantity = next((quantity for quantity in quantities if quantity), None)
+    if quantity is None:
+        return None
+    for size in (2, 1):  # temp deg c, temp_c
+        unit = " ".join(words[-size:])
+        found = auxiliary_unit(unit)
+        if len(words) > size and found is not None and found.quantity == quantity:
+            return Meaning(quantity, unit)
+    return Meaning(quantity)
+
+
 def _split_unit(words: Sequence[str]) -> tuple[list[str], str | None]:
-    """Take a unit of up to three words off the end: ``gyro x rad s``."""
+    """Split a unit of up to three words from the end: ``gyro x rad s``."""
     for size in (3, 2, 1):
         unit = _UNIT_WORDS.get("".join(words[-size:]))
         if unit and len(words) > size:

@@ -12,16 +12,18 @@ from typing import Literal
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import meaning
-from gmwm.readers.recording import Recording
-from gmwm.readers.roles import Columns, Reference, Roles, assign_roles
-from gmwm.readers.table import FEWEST, Table, label
+from gmwm.readers.recording import Channel, Recording, auxiliary_channel
+from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
+from gmwm.readers.table import Table, label
 
 
 def read(
@@ -46,7 +48,8 @@ def read(
     channels : mapping of str to (str or int), optional
         Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``. Only
         these are read. A name that begins with ``gyro`` or ``accel`` says what the column
-        measures; for any other its unit does. By default columns are known by their names; without
+        measures; for any other its unit does (``"temp": "T1"`` in degC or K is auxiliary). By
+        default columns are known by their names; without
         names, six are gyro and accelerometer x, y, z, seven have time before them, one or three
         (with time: four) belong to the only sensor in ``units``.
     time : str, int or False, optional
@@ -58,8 +61,9 @@ def read(
     -------
     Recording
         In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
-        the time stamps jump forward, as many as fit on the grid of the sampling interval. Its
-        ``notes`` tell what was assumed, which columns were not used and what is missing.
+        the time stamps jump forward, as many as fit on the grid of the sampling interval. Columns
+        of temperatures, voltages and further clocks are its auxiliary channels. Its
+        ``notices`` say what was assumed, which columns were not used and what is missing.
 
     Raises
     ------
@@ -77,11 +81,11 @@ def read(
     roles = assign_roles(columns, table.tentative, units, channels, time)
     if roles.time is None:
         _required_rate(table, stated)  # complain before a long file is read, not after
-    unit_of, unit_notes = channel_units(table, roles, units)
+    unit_of, unit_notices = channel_units(table, roles, units)
 
-    arrays = table.load(roles.columns)
+    arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
-    used_rate, timing, clock_notes = _timing(table, roles.time, arrays, stated)
+    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -90,9 +94,14 @@ def read(
         rate=used_rate,
         units=unit_of,
         source=table.source,
-        notes=(*table.notes, *roles.notes, *unit_notes, *clock_notes),
+        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices),
     )
-    return replace(recording, jitter=timing.jitter) if timing is not None else recording
+    further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
+    return replace(
+        recording,
+        channels=(*recording.channels, *further),
+        jitter=timing.jitter if timing is not None else None,
+    )
 
 
 def _open(path: Path) -> Table:
@@ -113,11 +122,11 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
         return table.rate
     rate = float(rate)
     if not (0.0 < rate < math.inf and 1.0 / rate < math.inf):
-        raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz, e.g. --rate 100")
+        raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz", "rate")
     if table.rate is not None and not agree(rate, table.rate):
         raise InputError(
             f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
-            "the rate to take that of the file"
+            "the rate to use that of the file"
         )
     return rate
 
@@ -125,26 +134,58 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
 def _required_rate(table: Table, stated: float | None) -> float:
     if stated is None:
         raise InputError(
-            f"{table.source} has no time column and no rate was given: give it in Hz, e.g. "
-            "rate=100 (on the command line --rate 100)"
+            f"{table.source} has no time column and no rate was given: give it in Hz, rate=100",
+            "rate",
         )
     return stated
+
+
+def _load(
+    table: Table, roles: Roles
+) -> tuple[dict[int, FloatArray], list[AuxiliaryColumn], list[Notice]]:
+    """Columns; an auxiliary one that cannot be read, or has another length, is left out."""
+    wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
+    try:
+        return table.load(sorted(wanted)), list(roles.auxiliary), []
+    except InputError:
+        if not roles.auxiliary:
+            raise
+    arrays = table.load(roles.columns)
+    n = arrays[roles.columns[0]].size
+    kept = []
+    for column in roles.auxiliary:
+        try:
+            values = table.load([column.index])[column.index]
+        except InputError:
+            continue
+        if values.size == n:
+            arrays[column.index] = values
+            kept.append(column)
+    names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
+    text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
+    return arrays, kept, [Notice("columns-unreadable", "note", "", text)]
+
+
+def _auxiliary(column: AuxiliaryColumn, values: FloatArray, dt: float) -> Channel:
+    if column.unit is None:
+        return Channel(column.name, values, dt, column.quantity)
+    return auxiliary_channel(column.name, values, dt, column.unit)
 
 
 def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
-    if most < FEWEST:
+    if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
         raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least {FEWEST} are needed: "
-            "record longer"
+            f"{table.source} has {most} samples{of_any} where at least {tuning.FEWEST_SAMPLES} are "
+            "needed: record longer"
         )
 
 
 def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
-) -> tuple[float, Timing | None, tuple[str, ...]]:
+) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return _required_rate(table, stated), None, ()
@@ -157,6 +198,7 @@ def _timing(
     )
     timing = clock.timing(stated)
     if stated is None:
-        return timing.rate, timing, timing.notes
-    used = f"The rate stated, {stated:g} Hz, is used."
-    return stated, timing, (*timing.notes, used)
+        return timing.rate, timing, timing.notices
+    text = f"the rate stated, {stated:g} Hz, is used"
+    used = Notice("rate-stated", "note", "", text, {"rate": stated})
+    return stated, timing, (*timing.notices, used)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import SI_UNIT, factor, quantity_of
-from gmwm.errors import InputError
+from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
+from gmwm.errors import InputError, MissingNameError
+from gmwm.readers import tuning
 
-_SLOWEST, _FASTEST = 1e-6, 1e9  # Hz
+READING = frozenset(
+    {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
+    | {"time-column", "units-from-names", "units-contradicted"}
+    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-stated", "missing-samples"}
+)
+"""Codes of the notices about how a file was read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +34,11 @@ class Channel:
         Samples in the SI unit of the quantity, mean not removed; NaN where one is missing.
     dt : float
         Sampling interval, s.
-    quantity : {"gyro", "accel", None}
-        Angular rate (rad/s), specific force (m/s^2) or, if ``None``, something else in its own
-        unit.
+    quantity : {"gyro", "accel", "temperature", "voltage", "clock", None}
+        Angular rate (rad/s), specific force (m/s^2), an auxiliary quantity (degC, V, s) or, if
+        ``None``, something else in its own unit.
     unit : str
-        The unit of ``values``.
+        The unit of ``values``; empty if it is not known.
     """
 
     name: str
@@ -38,6 +46,11 @@ class Channel:
     dt: float
     quantity: str | None = None
     unit: str = ""
+
+    @property
+    def is_auxiliary(self) -> bool:
+        """Whether it is kept for what it explains, and no error model is fitted to it."""
+        return self.quantity in AUXILIARY
 
     @property
     def n(self) -> int:
@@ -77,17 +90,17 @@ class Channel:
         return f"{size}, mean {self.mean:.6g} {self.unit}{gone}"
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Named channels with one sampling rate.
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Mapping[str, Channel]):
+    """Channels with one sampling rate: a mapping of their names to `Channel`.
 
     Attributes
     ----------
     channels : tuple of Channel
     source : str
         Where it came from, for messages and reports.
-    notes : tuple of str
-        What the reader noticed, one sentence each.
+    notices : tuple of Notice
+        What the reader noticed; see `READING`.
     jitter : float or None
         Standard deviation of the steps of its time stamps, as a share of the sampling interval;
         None if it has none.
@@ -95,7 +108,7 @@ class Recording:
 
     channels: tuple[Channel, ...]
     source: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notices: tuple[Notice, ...] = ()
     jitter: float | None = None
 
     @classmethod
@@ -105,7 +118,7 @@ class Recording:
         rate: float,
         units: Mapping[str, str],
         source: str = "",
-        notes: tuple[str, ...] = (),
+        notices: Sequence[Notice] = (),
     ) -> Recording:
         """Build a recording from arrays in any unit.
 
@@ -116,10 +129,11 @@ class Recording:
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
-            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
+            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``. A
+            channel in degC, K, V, mV or s is auxiliary.
         source : str, optional
-        notes : tuple of str, optional
-            What else is to be known; one sentence on missing samples is added.
+        notices : sequence of Notice, optional
+            What else there is to know; what is missing is added.
 
         Raises
         ------
@@ -127,28 +141,36 @@ class Recording:
             If the rate is not positive, a unit is missing or unknown, or the channels are not
             series of numbers of one length, none infinite.
         """
-        if not _SLOWEST <= rate <= _FASTEST:
-            limits = f"{_SLOWEST:g} to {_FASTEST:g}"
+        if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
+            limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
             raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
         channels = []
         for name, values in arrays.items():
             unit = units.get(name) or units.get(name.partition("_")[0])
             if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
+            series, auxiliary = _series(name, values), auxiliary_unit(unit)
+            if auxiliary is not None:
+                channels.append(auxiliary_channel(name, series, 1.0 / rate, auxiliary))
+                continue
             quantity = quantity_of(unit)
             si = SI_UNIT[quantity]
-            scaled = _series(name, values) * factor(unit, si)
-            channels.append(Channel(name, scaled, 1.0 / rate, quantity, si))
+            channels.append(Channel(name, series * factor(unit, si), 1.0 / rate, quantity, si))
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
             raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
-        return cls(tuple(channels), source, (*notes, *_notes_of_gaps(channels)))
+        return cls(tuple(channels), source, (*notices, *_notices_of_gaps(channels)))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
+
+    @property
+    def inertial(self) -> tuple[Channel, ...]:
+        """Channels that can be calibrated: all but the auxiliary ones."""
+        return tuple(channel for channel in self.channels if not channel.is_auxiliary)
 
     @property
     def dt(self) -> float:
@@ -174,17 +196,33 @@ class Recording:
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        raise InputError(f"the recording has no channel {name!r}: it has {', '.join(self.names)}")
+        raise MissingNameError(
+            f"the recording has no channel {name!r}: it has {', '.join(self.names)}"
+        )
 
-    def __iter__(self) -> Iterator[Channel]:
-        return iter(self.channels)
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
 
     def __len__(self) -> int:
         return len(self.channels)
 
+    def __repr__(self) -> str:
+        size = f"{self.rate:g} Hz, {self.duration:.6g} s"
+        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
     def __str__(self) -> str:
         head = f"{self.source or 'recording'}: {self.rate:g} Hz, {self.duration:.6g} s"
-        return "\n".join([head, *(f"  {channel}" for channel in self.channels), *self.notes])
+        return "\n".join(
+            [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
+        )
+
+
+def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryUnit) -> Channel:
+    """A channel of an auxiliary quantity in its usual unit."""
+    return Channel(name, values * unit.scale + unit.offset, dt, unit.quantity, unit.unit)
 
 
 def _series(name: str, values: FloatArray) -> FloatArray:
@@ -203,26 +241,28 @@ def _series(name: str, values: FloatArray) -> FloatArray:
     return series
 
 
-def _notes_of_gaps(channels: Iterable[Channel]) -> list[str]:
-    """One sentence for all channels that miss equally many samples in equally many gaps."""
-    names: dict[str, list[str]] = {}
+def _notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
+    """One for all channels that miss equally many samples in equally many gaps."""
+    alike: dict[tuple[int, int, int], list[Channel]] = {}
     for channel in channels:
         gone = np.isnan(channel.values)
-        if not np.any(gone):
-            continue
-        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
-        lengths = edges[1::2] - edges[::2]
-        text = f"{channel.missing:,} of {channel.n:,} samples missing"
-        if channel.missing == channel.n:
-            text = f"all {channel.n:,} samples missing"
-        elif lengths.size == 1:
-            text += ", in one gap"
-        else:
-            longest = int(np.max(lengths))
-            plural = "s" if longest > 1 else ""
-            text += f", in {lengths.size:,} gaps, the longest {longest:,} sample{plural}"
-        names.setdefault(text, []).append(channel.name)
-    return [
-        f"{', '.join(alike)}: {'each ' if len(alike) > 1 else ''}{text}."
-        for text, alike in names.items()
-    ]
+        if np.any(gone):
+            edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+            lengths = edges[1::2] - edges[::2]
+            key = (channel.missing, lengths.size, int(np.max(lengths)))
+            alike.setdefault(key, []).append(channel)
+    return [_notice_of_gaps(found, *key) for key, found in alike.items()]
+
+
+def _notice_of_gaps(channels: Sequence[Channel], missing: int, gaps: int, longest: int) -> Notice:
+    n = channels[0].n
+    text = f"all {n:,} samples missing" if missing == n else f"{missing:,} of {n:,} samples missing"
+    if gaps > 1:
+        plural = "s" if longest > 1 else ""
+        text += f", in {gaps:,} gaps, the longest {longest:,} sample{plural}"
+    elif missing < n:
+        text += ", in one gap"
+    names = ", ".join(channel.name for channel in channels)
+    values = {"missing": missing, "gaps": gaps, "longest": longest}
+    each = "each " if len(channels) > 1 else ""
+    return Notice("missing-samples", "note", names, f"{each}{text}", values)

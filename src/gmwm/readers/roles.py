@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gmwm._core.units import SI_UNIT
+from gmwm._core.notices import Notice
+from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import label
@@ -24,22 +25,49 @@ class Roles:
     Attributes
     ----------
     channels : dict of str to int
-        Channel name -> index of its column.
+        Name of a gyro's or accelerometer's channel -> index of its column.
+    auxiliary : tuple of AuxiliaryColumn
+        Other channels that are kept.
     time : int or None
         Index of the column of time stamps.
-    notes : tuple of str
-        Which columns are not used.
+    notices : tuple of Notice
+        Which columns are auxiliary, and which are not used.
     """
 
     channels: dict[str, int]
+    auxiliary: tuple[AuxiliaryColumn, ...]
     time: int | None
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """Indices of all columns that are needed, each once, in the order of the file."""
+        """Indices of the columns that are needed, each once, in the order of the file."""
         time = () if self.time is None else (self.time,)
         return tuple(sorted({*self.channels.values(), *time}))
+
+
+@dataclass(frozen=True)
+class AuxiliaryColumn:
+    """A column of temperatures, voltages or time stamps of another clock.
+
+    Attributes
+    ----------
+    name : str
+        Of its channel.
+    index : int
+    quantity : str
+        One of `AUXILIARY`.
+    unit : AuxiliaryUnit or None
+        That of the file, if it is known.
+    """
+
+    name: str
+    index: int
+    quantity: str
+    unit: AuxiliaryUnit | None
+
+    def __str__(self) -> str:
+        return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
 
 
 @dataclass(frozen=True)
@@ -65,7 +93,7 @@ class Columns:
         """
         if isinstance(reference, bool) or not isinstance(reference, str | int):
             raise InputError(
-                f"{what} = {reference!r} is no column: give its name or its index counted from 0"
+                f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
             )
         if isinstance(reference, int):
             return self._checked(reference, what)
@@ -119,7 +147,7 @@ def assign_roles(
     tentative : bool
         Whether names that mean nothing may be overlooked.
     units : mapping of str to str
-        Those that the caller gave; they tell what one or three columns without names are.
+        Those that the caller gave; they decide what one or three columns without names are.
     channels, time
         As in `gmwm.read`.
 
@@ -129,7 +157,7 @@ def assign_roles(
         If it cannot be decided.
     """
     given_time = None if time is None or time is False else columns.find(time, "time")
-    notes: list[str] = []
+    notices: list[Notice] = []
     if channels is not None:
         chosen = _given_channels(columns, channels)
         stamps = [i for i in _time_columns(columns) if i not in chosen.values()]
@@ -137,22 +165,74 @@ def assign_roles(
         chosen = _named_channels(columns)
         stamps = _time_columns(columns)
         if not chosen:
-            taken = {given_time, *stamps}
-            rest = [i for i in range(len(columns.names)) if i not in taken]
+            known = {given_time, *stamps}
+            rest = [i for i in range(len(columns.names)) if i not in known]
             if not rest or (any(columns.names[i] for i in rest) and not tentative):
                 raise InputError(
                     f"{columns.source}: no column is known as a gyro's or an accelerometer's, "
-                    f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}"
+                    f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}",
+                    "channel-unknown",
                 )
-            chosen, stamp = _by_number(columns, rest, bool(taken - {None}), units)
+            chosen, stamp = _by_number(columns, rest, bool(known - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
-    chosen_time = _choose_time(columns, given_time, stamps, time, notes)
-    used = {*chosen.values(), chosen_time}
+    chosen_time = _choose_time(columns, given_time, stamps, time, notices)
+    auxiliary = _given_auxiliary(columns, chosen, units)
+    chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
+    if channels is None:
+        left = {*chosen.values(), chosen_time, *(() if time is not False else stamps)}
+        auxiliary += _found_auxiliary(columns, left, chosen, units)
+    if auxiliary:
+        text = f"auxiliary channels: {', '.join(map(str, auxiliary))}"
+        values = {column.name: column.quantity for column in auxiliary}
+        notices.append(Notice("columns-auxiliary", "note", "", text, values))
+    used = {*chosen.values(), chosen_time, *(column.index for column in auxiliary)}
     ignored = [label(columns.names, i) for i in range(len(columns.names)) if i not in used]
     if ignored:
         plural = "s" if len(ignored) > 1 else ""
-        notes.append(f"Column{plural} not used: {', '.join(ignored)}.")
-    return Roles(chosen, chosen_time, tuple(notes))
+        text = f"column{plural} not used: {', '.join(ignored)}"
+        notices.append(Notice("columns-not-used", "note", "", text, {"count": len(ignored)}))
+    return Roles(chosen, tuple(auxiliary), chosen_time, tuple(notices))
+
+
+def _given_auxiliary(
+    columns: Columns, chosen: Mapping[str, int], units: Mapping[str, str]
+) -> list[AuxiliaryColumn]:
+    """Those of the chosen channels that are auxiliary by unit, by name, or by the column's name."""
+    found = []
+    for name, index in chosen.items():
+        unit = auxiliary_unit(units.get(name, ""))
+        column = meaning(columns.names[index])
+        if unit is not None:
+            found.append(AuxiliaryColumn(name, index, unit.quantity, unit))
+        elif (role := meaning(name).role) in AUXILIARY or (
+            role is None and column.role in AUXILIARY and name not in units
+        ):
+            unit = auxiliary_unit(column.unit or "")
+            found.append(AuxiliaryColumn(name, index, role or str(column.role), unit))
+    return found
+
+
+def _found_auxiliary(
+    columns: Columns,
+    used: Collection[int | None],
+    chosen: Mapping[str, int],
+    units: Mapping[str, str],
+) -> list[AuxiliaryColumn]:
+    """Columns that are not used otherwise and are auxiliary by their names."""
+    found: list[AuxiliaryColumn] = []
+    for index, column in enumerate(columns.names):
+        role = meaning(column)
+        quantity = "clock" if role.role == TIME else role.role
+        if index in used or quantity not in AUXILIARY:
+            continue
+        name = bare(column)
+        if name in chosen or name in {other.name for other in found}:
+            name = f"{name}_{index}"
+        unit = auxiliary_unit(units.get(name, role.unit or ""))
+        if quantity == "clock" and role.seconds is not None:
+            unit = AuxiliaryUnit("clock", "s", role.seconds)
+        found.append(AuxiliaryColumn(name, index, quantity, unit))
+    return found
 
 
 def _given_channels(columns: Columns, channels: Mapping[str, Reference]) -> dict[str, int]:
@@ -170,7 +250,8 @@ def _named_channels(columns: Columns) -> dict[str, int]:
             names = " and ".join(label(columns.names, i) for i in indices[:2])
             raise InputError(
                 f"{columns.source}: columns {names} may both be {channel}: say which to use, "
-                f'e.g. channels={{"{channel}": {indices[0]}}}'
+                f'e.g. channels={{"{channel}": {indices[0]}}}',
+                "channel-unknown",
             )
         if indices:
             found[channel] = indices[0]
@@ -193,14 +274,16 @@ def _by_number(
     if len(rest) not in (1, len(AXES)):
         raise InputError(
             f"{columns.source} has {len(columns.names)} columns without names that are known: say "
-            f"which is which, e.g. {_EXAMPLE}"
+            f"which is which, e.g. {_EXAMPLE}",
+            "channel-unknown",
         )
     sensors = [sensor for sensor in SI_UNIT if sensor in units]
     if len(sensors) != 1:
         raise InputError(
-            f"{columns.source}: column names do not tell whether this is a gyro or an "
+            f"{columns.source}: column names do not show whether this is a gyro or an "
             f'accelerometer: say it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
-            "only one of them"
+            "only one of them",
+            "channel-unknown",
         )
     names = [f"{sensors[0]}_{axis}" for axis in AXES]
     return dict(zip(names, rest, strict=False)), stamp
@@ -211,11 +294,12 @@ def _choose_time(
     given: int | None,
     stamps: Sequence[int],
     time: Reference | Literal[False] | None,
-    notes: list[str],
+    notices: list[Notice],
 ) -> int | None:
     if time is False or given is not None:
         return given
     if len(stamps) > 1:
         others = ", ".join(label(columns.names, i) for i in stamps[1:])
-        notes.append(f"Time is column {label(columns.names, stamps[0])}; time= takes {others}.")
+        text = f"time is column {label(columns.names, stamps[0])}; time= selects {others}"
+        notices.append(Notice("time-column", "note", "", text, {"column": stamps[0]}))
     return stamps[0] if stamps else None

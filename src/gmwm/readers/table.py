@@ -7,13 +7,12 @@ from typing import Protocol
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 
 FORMATS = "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ"
 """For messages about files of another kind."""
 
-FEWEST = 64
-"""Samples below which no variance is worth computing."""
 
 LARGEST = 1e150
 """Magnitudes from here on are refused like infinities: their squares overflow."""
@@ -32,7 +31,7 @@ class Table(Protocol):
         Whether the names come from a comment and may be something else.
     rate : float or None
         Sampling rate that the file itself states, Hz.
-    notes : tuple of str
+    notices : tuple of Notice
         What was noticed while opening it.
     """
 
@@ -45,7 +44,7 @@ class Table(Protocol):
     @property
     def rate(self) -> float | None: ...
     @property
-    def notes(self) -> tuple[str, ...]: ...
+    def notices(self) -> tuple[Notice, ...]: ...
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns: finite values, NaN where a sample is missing."""

@@ -105,7 +105,7 @@ def _open(path: Path) -> BinaryIO:
         stream.close()
         raise InputError(
             f"{path.name} is not a gzip file although its name ends in .gz: "
-            "compress it with gzip, or take .gz off its name"
+            "compress it with gzip, or remove .gz from its name"
         )
     return stream
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,10 @@ from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
 from gmwm.report.budget import navigation
 from gmwm.report.figure import deviation_figure, residual_figure
-from gmwm.report.findings import choice, health
+from gmwm.report.health import ambiguity, health
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
-_DAYS, _YEARS = 5.0, 2.0  # from which on durations are told so
+_DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
 _AIM = 0.1  # relative standard error
 _MANY_YEARS = 100.0
 
@@ -103,7 +102,7 @@ def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
         "floor": _in_field_unit(low.deviation, "u", fit),
         "floor_tau": number(low.tau),
         "sentence": sentence(fit),
-        "choice": [str(replace(found, channel="")) for found in choice(calibration, name)],
+        "ambiguity": ambiguity(calibration, name),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
         "figure": _script(deviation_figure(fit)),
         "residuals": _script(residual_figure(fit)),
@@ -120,13 +119,15 @@ def _fitness(fit: Fit) -> str:
     text = f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom"
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value:.2g}"
+        if fit.discrepancy > 0.0:
+            text += f" ({fit.p_value_allowed:.2g} with the discrepancy)"
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
 def needed(seconds: float | None, duration: float) -> str:
-    """Length of record that a parameter needs, in words; empty if nothing is to be said."""
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
     if seconds is None:
         return ""
     if seconds <= duration:

@@ -17,8 +17,8 @@ from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DOUBT = 0.01  # probability below which a filter is said to misjudge itself
-_TELLING = 2.0  # width of a band of NEES beyond which it tells nothing
+_CONTRADICTED = 0.01  # probability below which a filter is reported to misjudge itself
+_WIDEST_BAND = 2.0  # width of a band of NEES beyond which it decides nothing
 _GROUPS = ("position", "velocity", "attitude", "sensors")
 
 
@@ -145,10 +145,10 @@ def _compared(validation: Validation, name: str, first: str) -> str:
 def _judged(found: Sequence[Ratio]) -> str:
     """Whether a filter knows how good its position is, from its NEES at some times."""
     worst = max(found, key=lambda ratio: abs(np.log(ratio.value)))
-    if any(ratio.p_value < _DOUBT / len(found) for ratio in found):
+    if any(ratio.p_value < _CONTRADICTED / len(found) for ratio in found):
         better = "better" if worst.value > 1.0 else "worse"
         verdict = f"believes its position to be {better} than it is"
-    elif not all(ratio.upper - ratio.lower < _TELLING for ratio in found):
+    elif not all(ratio.upper - ratio.lower < _WIDEST_BAND for ratio in found):
         verdict = "cannot be judged by so few runs"
     else:
         verdict = "shows no contradiction between its position errors and what it predicts"

@@ -20,6 +20,7 @@ from gmwm.estimate.problem import (
     bias_of_detrending,
     chi_square,
     gls_slope,
+    slope_p_value,
     weight_root,
 )
 from gmwm.estimate.result import Fit
@@ -154,6 +155,8 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     ramped: list[Candidate] = []
     if without > tuning.RAMP_PLAUSIBLE:
         target, drift_free = _drift_free(wv, slope, choices)
+        if slope_p_value(wv, drift_free.mixture.psd) > tuning.RAMP_P:
+            return [candidate for candidate, _ in plain]
         if drift_free.discrepancy < allowed:
             # Both kinds must be compared under the same allowance.
             allowed = drift_free.discrepancy
@@ -223,7 +226,7 @@ def candidate_of(fitted: Fit) -> Candidate:
     Candidates of such fits are less comparable than those of `rank`, whose weights are common.
     """
     p, dof = len(fitted.keys), fitted.dof
-    statistic = fitted.chi_square if dof > 0 else 0.0
+    statistic = fitted.chi_square_allowed if dof > 0 else 0.0
     criterion = statistic + _penalty(fitted.wv.n) * p
     return Candidate(fitted.model.opened(), criterion, fitted.objective, statistic, p, dof)
 

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from typing import Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
+from gmwm._core.frames import frame
 from gmwm._core.text import wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
@@ -25,6 +26,9 @@ from gmwm.selection.ranking import (
 )
 from gmwm.selection.ties import ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
+
+if TYPE_CHECKING:
+    import pandas
 
 RULES = ("criterion", "merge")
 _SHOWN = 12
@@ -103,6 +107,18 @@ class Selection(Document):
 
     def __getitem__(self, index: int) -> Candidate:
         return self.ranking[index]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the candidates, best first; needs pandas."""
+        names = ("criterion", "objective", "chi_square", "n_parameters", "dof", "p_value")
+        ties = self.ties
+        rows = [
+            {"model": item.model.title()}
+            | {name: getattr(item, name) for name in names}
+            | {"chosen": item is self.chosen, "tie": item in ties}
+            for item in self.ranking
+        ]
+        return frame(rows, ("model", *names, "chosen", "tie"))
 
     def content(self) -> dict[str, Any]:
         """What it cannot be rebuilt without, in JSON types."""
@@ -192,8 +208,9 @@ def select(
     on cube roots (see `gmwm.estimate.problem.whitening.chi_square`) with the penalty ``2 c p ln ln
     n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
     (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
-    without one pays the squared slope over its variance; it must win by a margin of 6, for a
-    straight line passes through any slow drift that is seen only once. Terms that come out as zero
+    without one pays the squared slope over its variance; it must win by a margin of 6, and its
+    slope must be no accident of a walk that the record does not resolve
+    (`gmwm.estimate.problem.ramp.slope_p_value`). Terms that come out as zero
     make a model equal to a smaller one, and it is left out of the ranking. Models within 2 of the
     best are a tie, in which the smaller one wins. Of the best candidates the first one is chosen
     whose own fit finds all of its terms identifiable and misses no averaging time by far
@@ -276,7 +293,7 @@ def _simplest_by_own_fit(
 
 def _own_criterion(candidate: Candidate, fitted: Fit) -> float:
     """The criterion with the chi-square of the candidate's own fit."""
-    statistic = fitted.chi_square if fitted.dof > 0 else 0.0
+    statistic = fitted.chi_square_allowed if fitted.dof > 0 else 0.0
     return candidate.criterion - candidate.chi_square + statistic
 
 

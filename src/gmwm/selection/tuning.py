@@ -15,6 +15,9 @@ RAMP_MARGIN = 6.0
 """Of the criterion, by which a rate ramp must win: a straight line passes through any slow drift
 that is seen only once."""
 
+RAMP_P = 0.002
+"""Level at which a slope is no accident of a walk that the record does not resolve."""
+
 RAMP_PLAUSIBLE = 2.0
 """Squared slope over its variance, below which no ramp is tried."""
 

@@ -1,9 +1,9 @@
 """Relatives of the Allan deviation, computed by allantools, with intervals of their own.
 
-They see the same noise through other filters: the modified deviation tells quantization from
-white noise, the Hadamard deviation does not see a drift, the total deviation reads long averaging
-times off a short record. Fits go by the wavelet variance, which is half the overlapping Allan
-variance; these serve those who compare with figures given in such terms.
+They see the same noise through other filters: the modified deviation distinguishes quantization
+from white noise, the Hadamard deviation does not see a drift, the total deviation reads long
+averaging times off a short record. Fits go by the wavelet variance, which is half the overlapping
+Allan variance; these serve those who compare with figures given in such terms.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import Channel
+from gmwm.variance import tuning
 from gmwm.variance.analysis import as_channel, checked_samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEAST_FOR_SLOPE = 100  # averages of which the kind of noise is told
-_LEAST_DOF = 0.5
 # Of the total variance, by the power law of the spectrum: degrees of freedom b T/tau - c, and bias
 # 1 - a tau/T (Greenhall, Howe & Percival 1999, IEEE Trans. UFFC 46, 1183-1191).
 _TOTAL = {0: (1.5, 0.0, 0.0), -1: (1.17, 0.22, 1.0 / (3.0 * np.log(2.0))), -2: (0.93, 0.36, 0.75)}
@@ -209,7 +208,7 @@ def deviations(
     noise dominates and 21 % where a random walk does; its intervals allow for that.
 
     Every averaging time costs a pass over the data, for the total deviation over three times as
-    many: a million samples take some two seconds for all four kinds.
+    many: a million samples need some two seconds for all four kinds.
     """
     allantools = _allantools()
     channel, values = _checked(data, dt)
@@ -269,20 +268,20 @@ def _checked(data: Channel | FloatArray, dt: float | None) -> tuple[Channel, Flo
     if missing:
         raise InputError(
             f"{where} has {missing:,} missing samples: cut it to a part without any, or "
-            "take gmwm.wavelet_variance, whose Allan deviation copes with gaps"
+            "use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
         )
     return channel, checked_samples(channel)[0]
 
 
 def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
     if not isinstance(kinds, Iterable):
-        raise InputError(f"kinds = {kinds!r}: take some of {', '.join(_KINDS)}")
+        raise InputError(f"kinds = {kinds!r}: choose from {', '.join(_KINDS)}")
     names = [kinds] if isinstance(kinds, str) else list(kinds)
     for name in names:
         if not isinstance(name, str) or name not in _KINDS:
-            raise InputError(f"kind {name!r} is not known: take some of {', '.join(_KINDS)}")
+            raise InputError(f"kind {name!r} is not known: choose from {', '.join(_KINDS)}")
     if not names:
-        raise InputError(f"no kind of deviation is given: take some of {', '.join(_KINDS)}")
+        raise InputError(f"no kind of deviation is given: choose from {', '.join(_KINDS)}")
     return {name: _KINDS[name] for name in names}
 
 
@@ -322,7 +321,7 @@ def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:
     slopes: list[int] = []
     for m in averaging.astype(int):
         count = values.size // m
-        if count >= _LEAST_FOR_SLOPE or not slopes:
+        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
             slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
         else:
             slopes.append(slopes[-1])
@@ -364,7 +363,7 @@ def _distribution(
             if size > n / 8:  # at shorter averaging times it is the Allan variance all but exactly
                 dof[i] = max(dof[i], b * n / size - c)
             bias[i] -= a * size / n
-    return np.maximum(dof, _LEAST_DOF), bias
+    return np.maximum(dof, tuning.LEAST_DOF_OF_FAMILY), bias
 
 
 def _greenhall(allantools: ModuleType, kind: _Kind, n: int, m: int, slope: int) -> float:

@@ -12,8 +12,8 @@ from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.gaps import Runs
 from gmwm.variance.levels import Levels
-from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow

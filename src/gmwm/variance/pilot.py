@@ -9,11 +9,7 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, quadrature
-
-_ITERATIONS = 12
-_STEP = 0.8
-_MAX_SLOPE = 2.5
-_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
+from gmwm.variance import tuning
 
 
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
@@ -34,13 +30,13 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
         ``psd(f, dt)``.
     """
     grid = quadrature(tuple(averaging.tolist()))
-    knots = np.log(_PEAK / averaging)[::-1]  # rising frequency
+    knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
     node = np.log(grid.frequency)
     level = np.log(2.0 * variance * averaging)
-    for _ in range(_ITERATIONS):
+    for _ in range(tuning.PILOT_ITERATIONS):
         density = np.exp(_interpolate(node, knots, level[::-1]))
         implied = 2.0 * (grid.gain @ (grid.weight * density))
-        level = level + np.clip(_STEP * np.log(variance / implied), -1.0, 1.0)
+        level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
         level = _limit_slopes(level)
 
     def psd(f: FloatArray, sampling: float) -> FloatArray:
@@ -62,7 +58,7 @@ def _interpolate(x: FloatArray, knots: FloatArray, level: FloatArray) -> FloatAr
 
 def _limit_slopes(level: FloatArray) -> FloatArray:
     """Keep the density within f^-2.5 .. f^2.5 from one level (an octave) to the next."""
-    largest = _MAX_SLOPE * np.log(2.0)
+    largest = tuning.PILOT_STEEPEST * np.log(2.0)
     limited = level.copy()
     for j in range(1, level.size):
         limited[j] = np.clip(limited[j], limited[j - 1] - largest, limited[j - 1] + largest)

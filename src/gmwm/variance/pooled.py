@@ -14,7 +14,7 @@ from gmwm.process import PSD
 from gmwm.variance.wavelet import WaveletVariance
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PooledVariance(WaveletVariance):
     """Mean wavelet variance of several recordings, level by level.
 

@@ -36,7 +36,7 @@ from gmwm.process import legendre
 from gmwm.variance.robust_kernels import biweight_means, middle_bin
 
 EFFICIENCY = 0.6
-"""Efficiency at Gaussian data unless told otherwise."""
+"""Efficiency at Gaussian data by default."""
 
 _QUARTILE = 0.6744897501960817  # median of |Z|
 _TAIL = 13.0  # the normal density beyond is below double precision

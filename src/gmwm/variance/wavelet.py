@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
 
+from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD
@@ -18,6 +20,7 @@ from gmwm.variance.gaps import GapEffects
 from gmwm.variance.pilot import pilot_psd
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
 
 _LEAST_DOF, _LEAST_QUANTILE = 0.01, 1e-9  # keep intervals that say nothing in numbers
@@ -32,7 +35,7 @@ def _complete_levels(n: int, wavelet: str) -> int:
     return known_wavelet(wavelet).levels(n)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class WaveletVariance:
     """Haar MODWT wavelet variance of a series, level by level, with what a fit needs to know.
 
@@ -244,6 +247,15 @@ class WaveletVariance:
         step = slope * self.drift_response
         return self.variance - 2.0 * step * self.mean + step**2
 
+    def __repr__(self) -> str:
+        size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
+        return (
+            f"<{type(self).__name__} of {self.name or 'a series'}: {size}, {self.tau.size} levels>"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
     def __str__(self) -> str:
         head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz{self._how()}"
         unit = self.unit or "u"
@@ -257,14 +269,14 @@ class WaveletVariance:
 
     def _how(self) -> str:
         """What differs from the usual, for the head of a table."""
-        said = []
+        parts = []
         if self.gaps is not None:
-            said.append(f"{self.gaps.missing:,} of them missing")
+            parts.append(f"{self.gaps.missing:,} of them missing")
         if self.wavelet != "haar":
-            said.append(self.wavelet)
+            parts.append(self.wavelet)
         if self.efficiency < 1.0:
-            said.append(f"robust, efficiency {self.efficiency:g}")
-        return "".join(f", {part}" for part in said)
+            parts.append(f"robust, efficiency {self.efficiency:g}")
+        return "".join(f", {part}" for part in parts)
 
     def to_dict(self) -> dict[str, Any]:
         """All that is needed to make the object again, in JSON types; see `from_dict`."""
@@ -303,6 +315,13 @@ class WaveletVariance:
             if content.get(name) is not None:
                 found[name] = np.array(content[name], dtype=float)
         return cls(**found)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the levels, one a row, in SI units; needs pandas."""
+        names = ("tau", "variance", "lower", "upper", "allan_deviation", "dof")
+        columns = [getattr(self, name) for name in names]
+        rows = (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
+        return frame(rows, names)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes."""

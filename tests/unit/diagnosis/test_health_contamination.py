@@ -1,4 +1,4 @@
-"""Outliers all over the record, told apart from knocks, rounding and noise."""
+"""Outliers all over the record, told apart from shocks, rounding and noise."""
 
 import numpy as np
 import pytest
@@ -29,10 +29,10 @@ def test_the_share_is_that_of_the_outliers_that_can_be_told(share, size):
     found = gmwm.health(recording(x))
     told = found.outliers("gyro_x")
     assert 1e-3 < told < 1.5 * share
-    (finding,) = found.of(kind="outliers")
-    assert finding.severity == "warning"
-    assert finding.values == {"share": told}
-    assert f"{100 * told:.2g} % of the samples" in finding.sentence
+    (notice,) = found.of(code="outliers")
+    assert notice.severity == "warning"
+    assert notice.values == {"share": told}
+    assert f"{100 * told:.2g} % of the samples" in notice.text
     assert found.to_dict()["channels"]["gyro_x"]["outliers"] == told
 
 
@@ -43,7 +43,7 @@ def test_gaussian_noise_has_none(n):
     assert alarms == 0
 
 
-def test_knocks_are_no_outliers():
+def test_shocks_are_no_outliers():
     x = noise(50_000, 2)
     for start in (4000, 20_000, 33_000):
         x[start : start + 300] += 50.0 * np.exp(-np.arange(300) / 60.0)
@@ -97,10 +97,10 @@ def test_an_uneven_clock_is_told(jitter, severity):
     from dataclasses import replace
 
     rec = replace(recording(noise(2000, 1)), jitter=jitter)
-    found = gmwm.health(rec).of(kind="clock")
+    found = gmwm.health(rec).of(code="clock")
     assert [one.severity for one in found] == ([severity] if severity else [])
     if found:
-        assert f"{100 * jitter:.2g} % rms" in found[0].sentence
+        assert f"{100 * jitter:.2g} % rms" in found[0].text
 
 
 def test_the_reader_carries_the_jitter(tmp_path):

@@ -6,7 +6,7 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import Channel, RandomWalk, Recording, WhiteNoise
-from gmwm.diagnosis.drift import FALSE_ALARM
+from gmwm.diagnosis.tuning import FALSE_ALARM
 
 DT = 0.01
 
@@ -27,10 +27,10 @@ def test_white_noise_does_not_drift(record):
 
 def test_a_ramp_is_told_with_its_size(record):
     x = white(20_000, 1) + np.linspace(-5.0, 5.0, 20_000)
-    (finding,) = of_kind(record, x, "drift")
-    assert finding.severity == "warning"
+    (notice,) = of_kind(record, x, "drift")
+    assert notice.severity == "warning"
     # Standard error of the change: sigma (12/n)^(1/2) = 0.024.
-    assert finding.values["change"] == pytest.approx(10.0, abs=0.12)
+    assert notice.values["change"] == pytest.approx(10.0, abs=0.12)
 
 
 def test_a_random_walk_wanders_and_does_not_drift(record):
@@ -38,8 +38,8 @@ def test_a_random_walk_wanders_and_does_not_drift(record):
     ramps = 0
     for seed in range(runs):
         x = gmwm.simulate(WhiteNoise(0.1) + RandomWalk(0.2), n=10_000, dt=DT, seed=seed)
-        (finding,) = of_kind(record, x, "drift")
-        ramps += finding.severity == "warning"
+        (notice,) = of_kind(record, x, "drift")
+        ramps += notice.severity == "warning"
     assert ramps <= binom.isf(1e-6, runs, FALSE_ALARM)
 
 
@@ -47,9 +47,9 @@ def test_size_of_the_wander(record):
     # Means of parts of length T/64 of white noise plus a slow sine of amplitude 0.5.
     n = 64_000
     x = white(n, 2) + 0.5 * np.sin(2 * np.pi * 5.3 * np.arange(n) / n)
-    (finding,) = of_kind(record, x, "drift")
-    assert finding.values["wander"] == pytest.approx(0.5 / np.sqrt(2.0), rel=0.1)
-    assert finding.values["white"] == pytest.approx(1.0 / np.sqrt(1000.0), rel=0.15)
+    (notice,) = of_kind(record, x, "drift")
+    assert notice.values["wander"] == pytest.approx(0.5 / np.sqrt(2.0), rel=0.1)
+    assert notice.values["white"] == pytest.approx(1.0 / np.sqrt(1000.0), rel=0.15)
 
 
 @pytest.mark.parametrize("model", [WhiteNoise(0.1), RandomWalk(1.0)])
@@ -67,18 +67,18 @@ def test_noise_of_one_size_does_not_change(record, model):
 def test_noise_that_grows(record, factor, severity):
     x = white(100_000, 3)
     x[50_000:] *= factor
-    (finding,) = of_kind(record, x, "variance")
-    assert finding.severity == severity
-    ratio = finding.values["second_half"] / finding.values["first_half"]
+    (notice,) = of_kind(record, x, "variance")
+    assert notice.severity == severity
+    ratio = notice.values["second_half"] / notice.values["first_half"]
     assert ratio == pytest.approx(factor, rel=0.03)
 
 
 def test_a_loud_tenth_is_placed(record):
     x = white(100_000, 4)
     x[42_000:48_000] *= 1.6
-    (finding,) = of_kind(record, x, "variance")
-    assert finding.values["loudest_tenth"] == 4
-    assert "begins at 400 s" in finding.sentence
+    (notice,) = of_kind(record, x, "variance")
+    assert notice.values["loudest_tenth"] == 4
+    assert "begins at 400 s" in notice.text
 
 
 def test_crosstalk_is_found_whatever_the_slow_noise(record):
@@ -87,16 +87,16 @@ def test_crosstalk_is_found_whatever_the_slow_noise(record):
     x = white(n, 7) + 0.5 * common + 0.05 * walks[0]
     y = white(n, 8) + 0.5 * common + 0.05 * walks[1]
     found = gmwm.health(record(gyro_x=x, gyro_y=y, gyro_z=white(n, 9)))
-    (finding,) = found.of(kind="crosstalk")
-    assert "gyro_x and gyro_y" in finding.sentence
-    assert finding.values["correlation"] == pytest.approx(0.2, abs=0.02)  # 0.25 / 1.25
+    (notice,) = found.of(code="crosstalk")
+    assert "gyro_x and gyro_y" in notice.text
+    assert notice.values["correlation"] == pytest.approx(0.2, abs=0.02)  # 0.25 / 1.25
 
 
 def test_random_walks_are_not_correlated(record):
     walks = np.random.default_rng(10).normal(size=(6, 20_000)).cumsum(axis=1)
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
     found = gmwm.health(record(**dict(zip(names, walks, strict=True))))
-    assert not found.of(kind="crosstalk")
+    assert not found.of(code="crosstalk")
 
 
 def test_temperature_that_a_channel_follows():
@@ -106,9 +106,9 @@ def test_temperature_that_a_channel_follows():
     channels = (
         Channel("gyro_x", rng.normal(size=n) + 0.5 * warm, DT, "gyro", "rad/s"),
         Channel("gyro_y", rng.normal(size=n), DT, "gyro", "rad/s"),
-        Channel("temp", warm, DT, None, "K"),
+        Channel("temp", warm, DT, "temperature", "degC"),
     )
     found = gmwm.health(Recording(channels))
-    (finding,) = found.of(kind="temperature")
-    assert finding.channel == "gyro_x"
-    assert finding.values["slope"] == pytest.approx(0.5, rel=0.1)
+    (notice,) = found.of(code="temperature")
+    assert notice.where == "gyro_x"
+    assert notice.values["slope"] == pytest.approx(0.5, rel=0.1)

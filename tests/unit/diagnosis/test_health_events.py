@@ -1,4 +1,4 @@
-"""Spikes and knocks: found where they are, and not in noise."""
+"""Spikes and shocks: found where they are, and not in noise."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,9 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, Resonance, WhiteNoise
-from gmwm.diagnosis.events import FALSE_ALARM, find_events
+from gmwm.diagnosis.events import find_events
 from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 
 DT = 0.01
@@ -39,7 +40,7 @@ def test_a_spike_is_found_anywhere(name, place):
     assert found[0][0] <= place < found[0][1]
 
 
-def test_a_knock_is_covered_from_beginning_to_end():
+def test_a_shock_is_covered_from_beginning_to_end():
     x = noise("white", 20_000, 2)
     t = np.arange(60)
     x[7000:7060] += 30.0 * np.exp(-t / 15.0) * np.sin(0.9 * t + 0.5)
@@ -114,11 +115,11 @@ def test_finding_tells_when_and_how_large(record):
     x = 0.01 * noise("white", 30_000, 9)
     x[12_345:12_348] -= np.radians(17.0)
     found = gmwm.health(record(gyro_x=x))
-    (finding,) = found.of("gyro_x", "event")
-    assert finding.severity == "warning"
-    assert finding.values["height"] == pytest.approx(-np.radians(17.0), abs=0.05)
-    assert finding.values["time"] == pytest.approx(123.45, abs=0.5)
-    assert "deg/s at 123." in finding.sentence
+    (notice,) = found.of("gyro_x", "event")
+    assert notice.severity == "warning"
+    assert notice.values["height"] == pytest.approx(-np.radians(17.0), abs=0.05)
+    assert notice.values["time"] == pytest.approx(123.45, abs=0.5)
+    assert "deg/s at 123." in notice.text
     assert found.worst == "warning"
 
 
@@ -135,7 +136,8 @@ def test_masking_takes_the_events_and_nothing_else(record):
     )
     assert masked["gyro_y"] is recording["gyro_y"]
     assert recording["gyro_x"].is_complete  # the recording given stays as it was
-    assert any(note.startswith("gyro_x: ") for note in masked.notes)
+    assert masked.notices[:-1] == recording.notices
+    assert (masked.notices[-1].code, masked.notices[-1].where) == ("events-left-out", "gyro_x")
     again = gmwm.health(masked)
     assert not again.of("gyro_x", "event")
     clean = gmwm.wavelet_variance(masked["gyro_x"]).variance[0]

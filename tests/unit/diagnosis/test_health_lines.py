@@ -16,8 +16,9 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.diagnosis.lines import FALSE_ALARM, find_lines, line_findings
+from gmwm.diagnosis.lines import find_lines, line_notices
 from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 
 DT = 0.01
@@ -127,10 +128,10 @@ def test_harmonics_belong_to_their_line():
     frequencies = sorted(line.frequency for line in found)
     for expected in (1.7, 5.1, 8.5, 11.3, 11.9):
         assert min(abs(f - expected) for f in frequencies) < 0.002
-    findings = line_findings("accel_x", "m/s^2", found)
-    assert [round(f.values["frequency"], 2) for f in findings] == [1.7, 11.3]
-    assert findings[0].values["harmonics"] >= 3
-    assert "harmonics at 5.1" in findings[0].sentence
+    notices = line_notices("accel_x", "m/s^2", found)
+    assert [round(f.values["frequency"], 2) for f in notices] == [1.7, 11.3]
+    assert notices[0].values["harmonics"] >= 3
+    assert "harmonics at 5.1" in notices[0].text
 
 
 def test_many_lines_are_summed_up():
@@ -139,9 +140,9 @@ def test_many_lines_are_summed_up():
     x = np.random.default_rng(4).normal(size=n)
     for frequency in (3.1, 4.37, 7.71, 13.3, 19.9, 31.1, 43.0):
         x += 0.3 * np.sin(2 * np.pi * frequency * t)
-    findings = line_findings("accel_x", "m/s^2", lines(x))
-    assert [f.severity for f in findings] == ["warning"] * 4 + ["note"]
-    assert findings[-1].values["count"] == 3
+    notices = line_notices("accel_x", "m/s^2", lines(x))
+    assert [f.severity for f in notices] == ["warning"] * 4 + ["note"]
+    assert notices[-1].values["count"] == 3
 
 
 def test_a_line_on_a_resonance():
@@ -181,5 +182,5 @@ def test_health_gives_lines_to_programs(record):
     ((frequency, amplitude),) = found.lines("accel_x")
     assert frequency == pytest.approx(0.565, abs=0.001)
     assert amplitude == pytest.approx(0.01, rel=0.1)
-    (finding,) = found.of("accel_x", "line")
-    assert "a periodic line at 0.565 Hz, amplitude 1." in finding.sentence  # mg
+    (notice,) = found.of("accel_x", "line")
+    assert "a periodic line at 0.565 Hz, amplitude 1." in notice.text  # mg

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm.diagnosis.resolution import rounding_finding, step_size
+from gmwm.diagnosis.resolution import rounding_notice, step_size
 
 
 @settings(max_examples=60, deadline=None)
@@ -64,7 +64,7 @@ def test_constant_has_no_step():
 def test_severity_rises_with_the_step():
     def severity(ratio):
         scatter = np.sqrt(1.0 + ratio**2 / 12.0)
-        return rounding_finding("accel_x", "m/s^2", ratio, scatter).severity
+        return rounding_notice("accel_x", "m/s^2", ratio, scatter).severity
 
     assert [severity(r) for r in (0.1, 0.8, 1.5, 5.0)] == ["good", "note", "warning", "bad"]
 
@@ -72,9 +72,9 @@ def test_severity_rises_with_the_step():
 def test_noise_before_rounding_is_told(record):
     rng = np.random.default_rng(6)
     x = np.rint(rng.normal(size=50_000) * 0.1 / 0.08) * 0.08
-    (finding,) = gmwm.health(record(accel_x=x)).of("accel_x", "rounding")
-    assert finding.values["lsb"] == pytest.approx(0.08)
+    (notice,) = gmwm.health(record(accel_x=x)).of("accel_x", "rounding")
+    assert notice.values["lsb"] == pytest.approx(0.08)
     # Predicted from 16 differences, white noise has 18/17 of its variance; the standard error of
     # a standard deviation from 50,000 samples is 0.3 %.
-    assert finding.values["noise"] == pytest.approx(0.1 * np.sqrt(18.0 / 17.0), rel=0.015)
-    assert "8.16 mg" in finding.sentence  # 0.08 m/s^2
+    assert notice.values["noise"] == pytest.approx(0.1 * np.sqrt(18.0 / 17.0), rel=0.015)
+    assert "8.16 mg" in notice.text  # 0.08 m/s^2

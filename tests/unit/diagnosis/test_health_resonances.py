@@ -16,7 +16,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.diagnosis.resonances import FALSE_ALARM
+from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 
 DT = 0.01
@@ -53,8 +53,8 @@ def test_frequency_and_damping(record, frequency, damping, sigma, background):
     # The Fisher information of Whittle's likelihood for n dt = 2000 s gives 0.2 % and 3 %.
     assert at == pytest.approx(frequency, rel=0.01)
     assert ratio == pytest.approx(damping, rel=0.15)
-    (finding,) = health.of("gyro_z", "resonance")
-    assert finding.values["sigma"] == pytest.approx(sigma, rel=0.1)
+    (notice,) = health.of("gyro_z", "resonance")
+    assert notice.values["sigma"] == pytest.approx(sigma, rel=0.1)
     assert not health.lines("gyro_z")
 
 
@@ -86,6 +86,6 @@ def test_two_resonances_highest_first(record):
     x = simulated(model, 200_000, 4)
     health = found(record, x)
     at = [frequency for frequency, _ in health.resonances("gyro_z")]
-    heights = [finding.values["ratio"] for finding in health.of("gyro_z", "resonance")]
+    heights = [notice.values["ratio"] for notice in health.of("gyro_z", "resonance")]
     assert sorted(at) == [pytest.approx(4.0, rel=0.03), pytest.approx(30.0, rel=0.02)]
     assert heights == sorted(heights, reverse=True)

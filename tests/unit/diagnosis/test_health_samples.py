@@ -14,22 +14,22 @@ def white(n, seed):
 
 
 def kinds(found, channel):
-    return {finding.kind for finding in found.of(channel)}
+    return {notice.code for notice in found.of(channel)}
 
 
 def test_a_stuck_value_is_found_and_placed(record):
     x = white(20_000, 1)
     x[5000:5040] = x[4999]
-    (finding,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
-    assert finding.values["longest"] == 41
-    assert finding.values["time"] == pytest.approx(49.99)
+    (notice,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
+    assert notice.values["longest"] == 41
+    assert notice.values["time"] == pytest.approx(49.99)
 
 
 def test_a_sensor_that_is_stuck_most_of_the_time_is_bad(record):
     x = np.round(white(20_000, 2), 2)
     x[5000:16_000] = x[4999]
-    (finding,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
-    assert finding.severity == "bad"
+    (notice,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "stuck")
+    assert notice.severity == "bad"
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0, 5.0, 20.0])
@@ -47,8 +47,8 @@ def test_rounded_noise_of_low_bandwidth_is_not_stuck(record):
 
 def test_a_dead_channel_is_bad(record):
     found = gmwm.health(record(gyro_x=np.full(1000, 0.5), gyro_y=white(1000, 4)))
-    (finding,) = found.of("gyro_x")
-    assert (finding.kind, finding.severity) == ("dead", "bad")
+    (notice,) = found.of("gyro_x")
+    assert (notice.code, notice.severity) == ("dead", "bad")
     assert found.worst == "bad"
     assert found.events("gyro_x") == found.lines("gyro_x") == found.resonances("gyro_x") == ()
 
@@ -62,9 +62,9 @@ def test_saturation_is_found(record, ends, step):
     x = np.clip(white(20_000, 5), *ends)
     if step:
         x = np.rint(x / step) * step
-    (finding,) = gmwm.health(record(accel_x=x)).of("accel_x", "saturation")
-    assert finding.values["highest"] == pytest.approx(ends[1], abs=0.51 * step)
-    assert finding.severity == "bad"
+    (notice,) = gmwm.health(record(accel_x=x)).of("accel_x", "saturation")
+    assert notice.values["highest"] == pytest.approx(ends[1], abs=0.51 * step)
+    assert notice.severity == "bad"
 
 
 @pytest.mark.parametrize("step", [0.0, 0.01, 0.3, 1.0, 2.0])
@@ -92,8 +92,8 @@ def test_gaps_of_all_channels_are_told_once(record):
     x, y = white(2000, 7), white(2000, 8)
     x[100:110] = y[100:110] = np.nan
     found = gmwm.health(record(gyro_x=x, gyro_y=y))
-    (gap,) = found.of(kind="gap")
-    assert gap.channel == ""
+    (gap,) = found.of(code="gap")
+    assert gap.where == ""
     assert gap.values["longest"] == pytest.approx(0.1)
     assert str(found).count("missing") == 1
 

@@ -250,3 +250,27 @@ def test_a_redundant_term_is_found_under_all_weights(weights):
         redundant += not rich.valid
     assert sound >= 5
     assert redundant >= 5
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [gmwm.AR([1.2, -0.5], 1.0), gmwm.ARMA([0.6], [0.4], 1.0), Resonance(1.0, 0.1, 0.1)],
+    ids=repr,
+)
+def test_a_right_model_that_no_mixture_follows_is_allowed_no_discrepancy(truth):
+    # The mixture's own lack was granted to the model: 6 of 20 autoregressions had a discrepancy.
+    model = truth + GaussMarkov(0.5, 100.0) if isinstance(truth, Resonance) else truth
+    model = gmwm.process.as_model(model)
+    for seed in range(6):
+        fit = gmwm.fit(model.opened(), model.simulate(50_000, 1.0, seed), 1.0)
+        assert fit.discrepancy == 0.0
+
+
+def test_the_p_value_is_that_of_statistical_errors_alone():
+    truth = WhiteNoise(1.0) + Resonance(0.4, 0.02, 0.05)
+    fit = gmwm.fit(WhiteNoise(), truth.simulate(100_000, 1.0, 1), 1.0)
+    assert fit.discrepancy > 0.01
+    assert fit.p_value < 1e-18
+    assert fit.p_value_allowed > 0.01
+    good = gmwm.fit(truth.opened(), truth.simulate(100_000, 1.0, 1), 1.0)
+    assert good.p_value == good.p_value_allowed > 0.001

@@ -136,13 +136,13 @@ def check(outcome, path):
     assert len(outcome) > 0
     assert 0.0 < outcome.dt < np.inf
     assert outcome.n >= 64
-    for channel in outcome:
+    for channel in outcome.values():
         assert channel.values.shape == (outcome.n,)
         assert channel.values.dtype == np.float64
         assert not np.any(np.isinf(channel.values))
         assert channel.quantity == channel.name[: len(channel.quantity)]
-    assert max(outcome.n - channel.missing for channel in outcome) >= 64
-    assert all(note.endswith(".") and note.isprintable() for note in outcome.notes)
+    assert max(outcome.n - channel.missing for channel in outcome.values()) >= 64
+    assert all(str(notice).isprintable() for notice in outcome.notices)
 
 
 @thorough
@@ -210,7 +210,7 @@ def test_what_is_accepted_is_what_the_file_says(folder, data):
     check(outcome, path)
     if isinstance(outcome, str):
         return
-    found = np.column_stack([channel.values for channel in outcome])
+    found = np.column_stack([channel.values for channel in outcome.values()])
     said = [naive(data, mark) for mark in (";", "\t", ",", None)]
     assert any(rows is not None and np.array_equal(found, rows, equal_nan=True) for rows in said)
 

@@ -1,10 +1,15 @@
 """Recordings made from arrays: units, names, looks, and what is refused."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
 from gmwm import Channel, InputError, Recording
+from gmwm._core.notices import Notice
 from places import GOLDEN
+
+UNUSED = Notice("columns-not-used", "note", "", "column not used: 'temp'")
 
 
 @pytest.fixture
@@ -15,7 +20,7 @@ def recording():
         rate=50.0,
         units={"gyro_x": "deg/s", "accel_z": "g", "gyro_y": "deg/h"},
         source="bench.csv",
-        notes=("Column 'temp' was not used.",),
+        notices=[UNUSED],
     )
 
 
@@ -24,7 +29,7 @@ def test_arrays_are_brought_to_si(recording):
     np.testing.assert_allclose(recording["gyro_x"].values, np.radians(10.0 + np.sin(t)), rtol=1e-14)
     np.testing.assert_allclose(recording["gyro_y"].values, np.radians(t), rtol=1e-14)
     np.testing.assert_allclose(recording["accel_z"].values, 9.80665, rtol=1e-14)
-    assert [(c.quantity, c.unit) for c in recording] == [
+    assert [(c.quantity, c.unit) for c in recording.values()] == [
         ("gyro", "rad/s"),
         ("accel", "m/s^2"),
         ("gyro", "rad/s"),
@@ -39,7 +44,20 @@ def test_size_and_time(recording):
     assert recording.rate == pytest.approx(50.0)
     assert recording.duration == pytest.approx(4.0)
     assert recording["gyro_x"].n == 200
-    assert recording.notes == ("Column 'temp' was not used.",)
+    assert recording.notices == (UNUSED,)
+
+
+def test_a_recording_is_a_mapping(recording):
+    assert isinstance(recording, Mapping)
+    assert list(recording) == list(recording.keys()) == ["gyro_x", "accel_z", "gyro_y"]
+    assert [name for name, channel in recording.items() if channel.name == name] == list(recording)
+    assert "gyro_x" in recording
+    assert "gyro_z" not in recording
+    assert recording.get("gyro_z") is None
+    for kind in (KeyError, InputError):
+        with pytest.raises(kind, match="no channel 'gyro_z': it has gyro_x, accel_z, gyro_y"):
+            recording["gyro_z"]
+    assert repr(recording) == "<Recording of bench.csv: gyro_x, accel_z, gyro_y; 50 Hz, 4 s>"
 
 
 def test_printed(recording):
@@ -52,7 +70,7 @@ def test_integers_are_taken():
 
 
 def test_constant_channels_are_known(recording):
-    assert [c.is_constant for c in recording] == [False, True, False]
+    assert [c.is_constant for c in recording.values()] == [False, True, False]
     almost = np.ones(100)
     almost[-1] = np.nextafter(1.0, 2.0)
     assert not Channel("gyro_x", almost, 0.01).is_constant
@@ -141,15 +159,17 @@ def test_integers_and_nothing_at_all_have_the_same_properties():
     assert Channel("", np.empty(0), 1.0).is_constant
 
 
-def test_channels_with_the_same_gaps_share_a_note():
+def test_channels_with_the_same_gaps_share_a_notice():
     arrays = {name: gapped(3, 4, 5, 60).values for name in ("gyro_x", "gyro_y")}
     arrays |= {"gyro_z": gapped(8, 9, n=100).values, "accel_x": np.ones(100)}
     units = {"gyro": "deg/s", "accel": "g"}
-    assert Recording.from_arrays(arrays, 100.0, units, notes=("Before.",)).notes == (
-        "Before.",
-        "gyro_x, gyro_y: each 4 of 100 samples missing, in 2 gaps, the longest 3 samples.",
-        "gyro_z: 2 of 100 samples missing, in one gap.",
-    )
+    before, *found = Recording.from_arrays(arrays, 100.0, units, notices=[UNUSED]).notices
+    assert before == UNUSED
+    assert {notice.code for notice in found} == {"missing-samples"}
+    assert [str(notice) for notice in found] == [
+        "gyro_x, gyro_y: each 4 of 100 samples missing, in 2 gaps, the longest 3 samples",
+        "gyro_z: 2 of 100 samples missing, in one gap",
+    ]
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf])

@@ -22,7 +22,6 @@ from gmwm import (
     parameter,
 )
 from gmwm._core.notices import Notice
-from gmwm.diagnosis import Finding
 from gmwm.report import write_report
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import duration_text, needed, number, page
@@ -125,7 +124,7 @@ def calibration():
             channel("voltage", white.simulate(n, DT, rng), None),
         ),
         source="bench.csv",
-        notes=("Column 'temp' was not used.",),
+        notices=(Notice("columns-not-used", "note", "", "column not used: 'temp'"),),
     )
     models = {
         "gyro_x": walk.opened(),
@@ -192,7 +191,7 @@ def test_head_line(parsed):
 
 
 def test_notes_and_skipped_channels(parsed):
-    assert "Column 'temp' was not used" in parsed.text
+    assert "Column not used: 'temp'" in parsed.text
     assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
 
 
@@ -400,50 +399,53 @@ def test_residual_figures(parsed, calibration):
 # -- health and length ----------------------------------------------------------------------------
 
 
-def finding(severity, sentence, channel="gyro_x", **more):
-    return Finding(channel, "drift", severity, sentence, f"done about {sentence}", **more)
+LENGTH = Notice("length", "good", "", "an hour")  # which every examined recording has
+
+
+def issue(severity, text, where="gyro_x", **more):
+    return Notice("drift", severity, where, text, action=f"done about {text}", **more)
 
 
 def test_health_is_first_and_worst_first(calibration):
-    findings = (
-        finding("good", "fine", ""),
-        finding("bad", "broken", "accel_x"),
-        finding("warning", "shaken"),
-        finding("note", "seen"),
+    notices = (
+        LENGTH,
+        issue("good", "fine", ""),
+        issue("bad", "broken", "accel_x"),
+        issue("warning", "shaken"),
+        issue("note", "seen"),
     )
-    shown = Page(page(replace(calibration, findings=findings)))
+    shown = Page(page(replace(calibration, notices=notices)))
     headings = [a.get("id") for t, a in shown.elements if t == "h2"]
     assert headings[0] == "health"
-    assert "1 bad finding, 1 warning and 1 note." in shown.text
+    assert "1 severe issue, 1 warning and 1 note." in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)
     folded = shown.text.index("What was looked at and is fine")
     assert order[2] < folded < order[3]
     assert ["warning", "Shaken", "Done about shaken"] in shown.cells
-    assert "Column 'temp'" not in shown.text  # an examined recording tells it as a finding
 
 
-def test_findings_of_several_recordings_say_which(calibration):
-    findings = tuple(
-        finding("warning", f"moved {k} times", recording=f"run{k}.csv") for k in (1, 2)
-    )
-    shown = Page(page(replace(calibration, findings=findings)))
+def test_notices_of_several_recordings_say_which(calibration):
+    found = [issue("warning", f"moved {k} times", source=f"run{k}.csv") for k in (1, 2)]
+    notices = (LENGTH, *found)
+    shown = Page(page(replace(calibration, notices=notices)))
     assert ["gyro_x, run1.csv"] in shown.cells
     assert ["gyro_x, run2.csv"] in shown.cells
     assert "2 warnings." in shown.text
 
 
 def test_what_was_not_examined_says_so(calibration):
-    shown = Page(page(replace(calibration, findings=())))
+    notices = tuple(n for n in calibration.notices if n.code == "columns-not-used")
+    shown = Page(page(replace(calibration, notices=notices)))
     assert "was not examined" in shown.text
-    assert "Column 'temp' was not used." in shown.text
-    harmless = Page(page(replace(calibration, findings=(finding("good", "fine"),))))
+    assert "column not used: 'temp'" in shown.text
+    harmless = Page(page(replace(calibration, notices=(LENGTH, issue("good", "fine")))))
     assert "Nothing was found that spoils the estimates." in harmless.text
 
 
-def test_a_choice_in_doubt_is_told_with_the_channel(calibration):
-    tie = Finding("gyro_x", "choice", "note", "2 models describe the data equally well")
-    shown = Page(page(replace(calibration, findings=(tie,))))
+def test_an_ambiguous_choice_is_reported_with_the_channel(calibration):
+    tie = Notice("ambiguity", "note", "gyro_x", "2 models describe the data equally well")
+    shown = Page(page(replace(calibration, notices=(tie,))))
     assert shown.text.index("gyro_x: white noise") < shown.text.index("2 models describe")
     assert shown.text.index("2 models describe") < shown.text.index("accel_x: white noise")
 
@@ -485,14 +487,15 @@ def test_names_are_text_not_markup(calibration):
         calibration,
         source=HOSTILE,
         fits={HOSTILE: replace(gyro, notices=(Notice("a", "bad", "", f"a {HOSTILE}"),))},
-        skipped={f"skip {HOSTILE}": f"why {HOSTILE}"},
-        notes=(f"note {HOSTILE}",),
-        findings=(
-            Finding(HOSTILE, "line", "bad", f"found {HOSTILE}", f"done {HOSTILE}"),
-            Finding(HOSTILE, "choice", "note", f"tie {HOSTILE}"),
+        skipped={f"skip {HOSTILE}": Notice("constant", "bad", "", f"why {HOSTILE}")},
+        notices=(
+            LENGTH,
+            Notice("line", "bad", HOSTILE, f"found {HOSTILE}", action=f"done {HOSTILE}"),
+            Notice("ambiguity", "note", HOSTILE, f"tie {HOSTILE}"),
         ),
     )
-    shown = Page(page(replace(hostile, findings=())))
+    unread = (Notice("columns-not-used", "note", "", f"note {HOSTILE}"),)
+    shown = Page(page(replace(hostile, notices=unread)))
     assert f"note {HOSTILE}" in shown.text
     shown = Page(page(hostile))
     assert len(shown.scripts) == 4

@@ -158,3 +158,27 @@ def test_bias_instability_as_a_candidate():
     truth = WhiteNoise(1.0) + gmwm.BiasInstability(0.5)
     selection = gmwm.select(truth.simulate(100_000, 1.0, 2), dt=1.0, extra=[gmwm.BiasInstability()])
     assert "bias instability" in selection.ranking[0].model.title()
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        WhiteNoise(1e-3) + RandomWalk(5e-6),
+        WhiteNoise(1e-3) + GaussMarkov(3e-4, 2000.0),
+        WhiteNoise(1e-3) + GaussMarkov(1e-3, 10_000.0),
+    ],
+    ids=repr,
+)
+def test_a_slow_process_that_is_seen_once_is_no_ramp(truth):
+    # An hour: with the slope priced under what the line leaves, 12 of 60 of these were ramps.
+    for seed in range(1000, 1006):
+        selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
+        assert "R" not in selection.fit.params, seed
+
+
+def test_a_ramp_that_no_walk_explains_is_chosen():
+    sigma = np.sqrt(12.0 * 1e-6 / 3600.0**3)
+    truth = WhiteNoise(1e-3) + RateRamp(40.0 * sigma)
+    for seed in range(4):
+        selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
+        assert selection.model.title() == "white noise + rate ramp"

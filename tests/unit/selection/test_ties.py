@@ -160,10 +160,10 @@ def test_calibrate_tells_what_ties():
     for seed in range(30):
         x = HARD.simulate(3000, 0.01, seed)
         rec = gmwm.Recording.from_arrays({"gyro_x": x}, 100.0, {"gyro": "rad/s"})
-        found = [f for f in gmwm.calibrate(rec).findings if f.kind == "choice"]
+        found = [f for f in gmwm.calibrate(rec).notices if f.code == "ambiguity"]
         if found:
             break
     (told,) = found
-    assert (told.channel, told.severity) == ("gyro_x", "note")
-    assert "models describe the data equally well: " in told.sentence
-    assert "rad/s" not in told.sentence  # in the units of the field
+    assert (told.where, told.severity) == ("gyro_x", "note")
+    assert "models describe the data equally well: " in told.text
+    assert "rad/s" not in told.text  # in the units of the field

@@ -43,7 +43,7 @@ def test_simulated_recording():
     assert recording.n == 100 * RATE
     assert "seed 3" in recording.source
     models = table_six()
-    for channel in recording:
+    for channel in recording.values():
         model = models[channel.quantity]
         assert channel.name.startswith(channel.quantity)
         assert channel.unit == {"gyro": "rad/s", "accel": "m/s^2"}[channel.quantity]

@@ -21,12 +21,12 @@ from gmwm.variance.filling import Filling
 from gmwm.variance.gap_kernels import pairs_at_lag
 from gmwm.variance.gaps import (
     Gaps,
+    Runs,
     common_share,
     pair_factor,
     window_centres,
     window_count,
 )
-from gmwm.variance.runs import Runs
 
 
 def with_gaps(x, gaps):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def conclude_likelihood(
     """
     comparison, misfits = _compared(series, found)
     if series.is_bridged:
-        comparison = Comparison(comparison.objective, float("nan"), comparison.dof)
+        untested = float("nan")
+        comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
         misfits = [no_test_notice()]
     return conclude(
         found, comparison, series.wv, method=method, notices=(*notices, *misfits),

@@ -66,7 +66,7 @@ def conclude_moments(
         },
         slope=moments.slope if moments.slope_is_free else None,
     )
-    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1])
+    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1], discrepancy)
     notices = [
         *limit_notices(design, point.shapes, point.x),
         *redundant_notices(

@@ -21,7 +21,7 @@ from gmwm.estimate.moments.conclusion import conclude_moments
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.discrepancy import Discrepancy
 from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.moments.start import dictionary_fit, search
+from gmwm.estimate.moments.start import DICTIONARY, Reference, dictionary_fit, search
 from gmwm.estimate.moments.weights import WEIGHTS, Weights
 from gmwm.estimate.problem import Moments, Scales, Simulation
 from gmwm.estimate.result import Fit
@@ -75,15 +75,20 @@ class GMWM:
         extra = design.coordinates.noise
         reference = dictionary_fit(wv, moments.target, extra)
         level = Discrepancy(self.discrepancy, wv.tau.size - design.n_free)
-        if not any(process.is_line for process in extra):
-            # What no sum of processes without lines can follow is discrepancy from the start.
-            level.start_at(reference.discrepancy)
-        covariance = level.added_to(reference.covariance, moments.target)
-        point = search(Profile(design, moments.target, weights.root(covariance)))
-        state = State(moments, covariance, point, reference.curve)
-        settled = _iterate(design, state, level, weights)
-        if settled is None:
-            settled = _under_reference(design, state, level, weights, extra)
+        settled = None
+        if not all(isinstance(process, DICTIONARY) for process in extra):
+            # Such a process may follow what no mixture of the dictionary does.
+            state = _begun(design, moments, reference, level, weights)
+            settled = _iterate(design, state, level, weights)
+        if settled is None or level.value > 0.0:
+            level.restart()
+            if not any(process.is_line for process in extra):
+                # What no sum of processes without lines can follow is discrepancy from the start.
+                level.start_at(reference.discrepancy)
+            state = _begun(design, moments, reference, level, weights)
+            settled = _iterate(design, state, level, weights)
+            if settled is None:
+                settled = _under_reference(design, state, level, weights, extra)
         return conclude_moments(
             design, settled.moments, settled.covariance, settled.point, settled.basis, weights,
             self.name, level.value,
@@ -146,6 +151,15 @@ class State:
     covariance: FloatArray
     point: Point
     basis: FloatArray
+
+
+def _begun(
+    design: Design, moments: Moments, reference: Reference, level: Discrepancy, weights: Weights
+) -> State:
+    """The minimum under the weights of the reference mixture."""
+    covariance = level.added_to(reference.covariance, moments.target)
+    point = search(Profile(design, moments.target, weights.root(covariance)))
+    return State(moments, covariance, point, reference.curve)
 
 
 def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights) -> State | None:

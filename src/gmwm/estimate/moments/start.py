@@ -28,6 +28,9 @@ from gmwm.variance import WaveletVariance
 
 _BISECTIONS = 14
 
+DICTIONARY = (WhiteNoise, QuantizationNoise, RandomWalk, GaussMarkov)
+"""Kinds of which a mixture is made that follows almost any wavelet variance."""
+
 
 def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
     """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
@@ -161,12 +164,7 @@ def dictionary_fit(
     # Simulated processes are too: they take their time, and the mixture does without them.
     kinds = {type(p): p for p in extra if not p.is_line and p.has_spectrum()}
     kinds.pop(GaussMarkov, None)
-    processes: tuple[Process, ...] = (
-        WhiteNoise(),
-        QuantizationNoise(),
-        RandomWalk(),
-        GaussMarkov(),
-    )
+    processes: tuple[Process, ...] = tuple(kind() for kind in DICTIONARY)
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
     processes += tuple(line.with_values(amplitude=None) for line in lines)
     design = Design(Model(processes), Scales.of(wv))

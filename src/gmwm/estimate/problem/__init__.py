@@ -21,6 +21,7 @@ from gmwm.estimate.problem.ramp import (
     detrended_covariance,
     gls_slope,
     ols_slope,
+    slope_p_value,
 )
 from gmwm.estimate.problem.scales import Scales
 from gmwm.estimate.problem.simulation import Simulation
@@ -48,6 +49,7 @@ __all__ = [
     "ols_slope",
     "shape_of",
     "slope_dof",
+    "slope_p_value",
     "solve_nonnegative",
     "spectral_information",
     "weight_root",

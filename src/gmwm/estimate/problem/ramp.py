@@ -13,14 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.linalg import solve, solve_toeplitz, toeplitz
+from scipy.linalg import cho_factor, cho_solve, solve, solve_toeplitz, toeplitz
+from scipy.stats import norm
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.process import PSD
+from gmwm.process import PSD, RandomWalk
 from gmwm.variance import WaveletVariance
 from gmwm.variance.covariance import block_density
+
+_MERGED = 128  # block means of which dense matrices are made
+_WALKS = 40
 
 
 @dataclass(frozen=True)
@@ -62,13 +66,7 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     index = _existing(wv)
     first = index[:-1][np.diff(index) == 1]
     difference = wv.blocks[first + 1] - wv.blocks[first]
-    size = fft.next_fast_len(4 * wv.blocks.size, real=True)
-    size += size % 2
-    frequency = np.arange(size // 2 + 1) / size
-    frequency[0] = 1e-2 / size
-    density = block_density(psd, wv.dt, frequency, wv.block)
-    density *= 4.0 * np.sin(np.pi * frequency) ** 2
-    column = fft.irfft(density, size)[: wv.blocks.size - 1]
+    column = _difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
     one = np.ones(first.size)
     solved = _solve(column, first, np.column_stack([one, difference]))
     information = float(one @ solved[:, 0])
@@ -76,6 +74,81 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     # Means of samples of which some were filled vary by as much more as the coarsest level does.
     growth = 1.0 if wv.gaps is None else 1.0 + max(float(wv.gaps.change[-1]), 0.0)
     return Slope(float(one @ solved[:, 1]) / information / step, growth / information / step**2)
+
+
+def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
+    """Probability of a slope as steep without a ramp, whatever walk the record does not resolve.
+
+    A random walk that is seen once looks like a ramp, and a noise fitted to what a line leaves of
+    it holds little of it. So the two-sided p-value of the slope is taken under the noise plus a
+    random walk, and averaged over the size of the walk with the restricted likelihood of the block
+    means, in which the slope has no part (Harville 1974, *Biometrika* 61, 383-385), as weight. Its
+    prior is even in the logarithm over all sizes that matter beside the noise.
+
+    Parameters
+    ----------
+    wv : WaveletVariance
+    psd : callable
+        Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
+
+    Returns
+    -------
+    float
+        1 where too few blocks exist to tell.
+    """
+    blocks, block = _coarser(wv)
+    first = np.flatnonzero(~np.isnan(np.diff(blocks)))
+    if first.size + 1 < tuning.FEWEST_BLOCKS:
+        return 1.0
+    step = block * wv.dt
+    noise, walk = (
+        _between(_difference_covariance(each, wv.dt, block, blocks.size), first)
+        for each in (psd, RandomWalk(1.0).psd)
+    )
+    apart, difference = np.full(first.size, step), np.diff(blocks)[first]
+    alone = _restricted(noise, apart, difference)
+    unit = alone[1] * float(np.sum(apart))  # K^2 of a walk whose slope is as uncertain
+    found = np.array(
+        [
+            _restricted(noise + ratio * unit * walk, apart, difference)
+            for ratio in np.geomspace(*tuning.WALK_RATIOS, _WALKS)
+        ]
+    )
+    weight = np.exp(found[:, 2] - np.max(found[:, 2]))
+    chance = 2.0 * norm.sf(np.abs(found[:, 0]) / np.sqrt(found[:, 1]))
+    return float(weight @ chance / np.sum(weight))
+
+
+def _coarser(wv: WaveletVariance) -> tuple[FloatArray, int]:
+    """At most so many block means that dense matrices of them are quick, and their samples."""
+    merged = -(-wv.blocks.size // _MERGED)
+    whole = wv.blocks.size // merged * merged
+    return wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
+
+
+def _restricted(
+    covariance: FloatArray, apart: FloatArray, difference: FloatArray
+) -> tuple[float, float, float]:
+    """Slope, its variance, and the restricted log-likelihood but for a constant."""
+    factor = cho_factor(covariance, lower=True)
+    solved = cho_solve(factor, np.column_stack([apart, difference]))
+    information = float(apart @ solved[:, 0])
+    slope = float(apart @ solved[:, 1]) / information
+    squares = float(difference @ solved[:, 1]) - slope**2 * information
+    half_log_determinant = float(np.sum(np.log(np.diag(factor[0]))))
+    likelihood = -half_log_determinant - 0.5 * np.log(information) - 0.5 * squares
+    return slope, 1.0 / information, float(likelihood)
+
+
+def _difference_covariance(psd: PSD, dt: float, block: int, count: int) -> FloatArray:
+    """Autocovariance of differences of neighbouring block means, (count - 1,), u^2."""
+    size = fft.next_fast_len(4 * count, real=True)
+    size += size % 2
+    frequency = np.arange(size // 2 + 1) / size
+    frequency[0] = 1e-2 / size
+    density = block_density(psd, dt, frequency, block)
+    density *= 4.0 * np.sin(np.pi * frequency) ** 2
+    return np.asarray(fft.irfft(density, size)[: count - 1])
 
 
 def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
@@ -97,7 +170,12 @@ def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> Fl
     """
     if first.size == column.size:
         return np.asarray(solve_toeplitz(column, right))
-    return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
+    return np.asarray(solve(_between(column, first), right, assume_a="pos"))
+
+
+def _between(column: FloatArray, first: NDArray[np.intp]) -> FloatArray:
+    """Covariance of differences of neighbouring blocks, at these places of all."""
+    return np.asarray(toeplitz(column)[np.ix_(first, first)])
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:

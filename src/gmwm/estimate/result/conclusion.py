@@ -72,13 +72,16 @@ class Comparison:
     objective : float
         Weighted sum of squares.
     chi_square : float
-        The same on cube roots; NaN where it has no meaning.
+        The same on cube roots under statistical errors; NaN where it has no meaning.
+    chi_square_allowed : float
+        With the discrepancy.
     dof : int
         Levels less parameters.
     """
 
     objective: float
     chi_square: float
+    chi_square_allowed: float
     dof: int
 
     @classmethod
@@ -89,14 +92,21 @@ class Comparison:
         covariance: FloatArray,
         basis: FloatArray,
         n_free: int,
+        discrepancy: float = 0.0,
     ) -> Comparison:
-        """Compare under a covariance that belongs to the wavelet variances ``basis``."""
+        """Compare under a covariance that belongs to the wavelet variances ``basis``.
+
+        ``covariance`` holds the relative ``discrepancy`` of the target.
+        """
         whitened = weight_root(covariance) @ (target - implied)
         dof = target.size - n_free
-        statistic = float("nan")
+        plain = allowed = float("nan")
         if dof > 0 and np.all(basis > 0.0):
-            statistic = chi_square(target, implied, covariance, basis)[1]
-        return cls(float(whitened @ whitened), statistic, dof)
+            plain = allowed = chi_square(target, implied, covariance, basis)[1]
+            if discrepancy > 0.0:
+                statistical = covariance - np.diag((discrepancy * target) ** 2)
+                plain = chi_square(target, implied, statistical, basis)[1]
+        return cls(float(whitened @ whitened), plain, allowed, dof)
 
 
 def conclude(
@@ -146,6 +156,7 @@ def conclude(
         upper_bounds=upper,
         objective=comparison.objective,
         chi_square=comparison.chi_square,
+        chi_square_allowed=comparison.chi_square_allowed,
         dof=comparison.dof,
         discrepancy=discrepancy,
         method=method,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.process import Model
@@ -55,6 +55,8 @@ class Estimate:
         The same in the units of the field, the usual one first; empty where SI is usual.
     """
 
+    COLUMNS: ClassVar = ("key", "kind", "value", "stderr", "lower", "upper", "unit", "meaning")
+
     key: str
     kind: Kind
     value: float
@@ -91,8 +93,7 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, a column each."""
-        names = ("key", "kind", "value", "stderr", "lower", "upper", "unit", "meaning")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in self.COLUMNS}
 
 
 def estimates_of(

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
+from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
@@ -29,6 +30,7 @@ from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
 
 METHOD_NAMES = {
@@ -66,6 +68,8 @@ class Fit(Document):
         The same on the cube roots of the wavelet variances, which are close to normal at coarse
         levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN where
         there are none, or the method does not minimise it.
+    chi_square_allowed : float
+        The same with the discrepancy in the errors; equal where there is none.
     dof : int
         Levels less estimated parameters.
     discrepancy : float
@@ -97,6 +101,7 @@ class Fit(Document):
     upper_bounds: Mapping[str, float]
     objective: float
     chi_square: float
+    chi_square_allowed: float
     dof: int
     discrepancy: float
     method: str
@@ -135,10 +140,18 @@ class Fit(Document):
 
     @property
     def p_value(self) -> float:
-        """Of the chi-square test; NaN where there is none."""
-        if np.isnan(self.chi_square) or self.dof <= 0:
+        """Of the chi-square test under statistical errors alone; NaN where there is none."""
+        return self._p_of(self.chi_square)
+
+    @property
+    def p_value_allowed(self) -> float:
+        """The same with the discrepancy allowed for, which is made so that it is about 0.5."""
+        return self._p_of(self.chi_square_allowed)
+
+    def _p_of(self, statistic: float) -> float:
+        if np.isnan(statistic) or self.dof <= 0:
             return float("nan")
-        return float(chi2.sf(self.chi_square, self.dof))
+        return float(chi2.sf(statistic, self.dof))
 
     # -- numbers ----------------------------------------------------------------------------------
 
@@ -313,6 +326,8 @@ class Fit(Document):
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"
+            if self.discrepancy > 0.0:
+                fitness += f" ({self.p_value_allowed:.2g} with the discrepancy)"
         if np.isfinite(self.log_likelihood):
             lines.append(f"log-likelihood {self.log_likelihood:.8g}")
             fitness = f"of the wavelet variances: {fitness}"
@@ -385,12 +400,17 @@ class Fit(Document):
 
     # -- tables and files -------------------------------------------------------------------------
 
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the parameters, one a row, in SI units; needs pandas."""
+        return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
+
     def content(self) -> dict[str, Any]:
         """What it cannot be rebuilt without, and what readers of the file want, in JSON types."""
         return fit_content(self) | {
             "params": self.params,
             "stderr": self.stderr,
             "p_value": plain(self.p_value),
+            "p_value_allowed": plain(self.p_value_allowed),
             "valid": self.valid,
             "units": {estimate.key: estimate.unit for estimate in self.estimates},
         }

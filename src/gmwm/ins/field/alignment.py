@@ -125,8 +125,9 @@ def align(
         if not known:
             raise InputError(
                 "the heading cannot be known: GNSS shows no motion fast enough in the first "
-                f"{_SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: give it "
-                "(--heading DEG, or heading: in the file)"
+                f"{_SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: give "
+                "the heading",
+                "heading-unknown",
             )
         yaw, yaw_sd, how = min(known, key=lambda each: each[1])
     C = matrix_from_rpy(np.array([0.0, 0.0, yaw])) @ matrix_from_rpy(

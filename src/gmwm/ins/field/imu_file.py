@@ -104,7 +104,7 @@ def read_imu_log(
     start, notes = _clock(Path(path), recording, time)
     if np.mean(samples[:, 5]) > 0.0:
         notes = (*notes, "accel_z is positive: its axis points up, and roll is near 180 deg")
-    return ImuLog(imu, start, recording.source, (*recording.notes, *notes))
+    return ImuLog(imu, start, recording.source, (*map(str, recording.notices), *notes))
 
 
 def _clock(

@@ -24,10 +24,8 @@ import numpy.typing as npt
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import PSD, ComplexArray, Wavelet, evaluated, pair_weights, unit_legendre, wavelet
+from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import LagGrid, block_of
-
-_LEAST_LAGS = 2048  # memory may be longer than a short record
-_FOLDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +57,8 @@ def _lag_sums(name: str, n: int, levels: int) -> _LagSums:
     filters = wavelet(name)
     block, first = block_of(n)
     coarse = range(min(first, levels) + 1, levels + 1)
-    grid = LagGrid.holding(max(3 * n / block, _LEAST_LAGS), block)
-    folds = np.arange(max(-_FOLDS, -(block // 2)), min(_FOLDS, (block - 1) // 2) + 1)
+    grid = LagGrid.holding(max(3 * n / block, tuning.LEAST_LAGS), block)
+    folds = np.arange(max(-tuning.FOLDS, -(block // 2)), min(tuning.FOLDS, (block - 1) // 2) + 1)
     signed = (grid.frequency + folds[:, None]) / block
     transfer = np.empty((len(coarse), *signed.shape), dtype=complex)
     for row, level in enumerate(coarse):

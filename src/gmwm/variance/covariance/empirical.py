@@ -16,9 +16,9 @@ from scipy import fft
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.variance import tuning
 
 WINDOWS = ("none", "octave")
-_BINS_PER_OCTAVE = 8
 _SLICE = 1 << 16
 
 
@@ -80,7 +80,7 @@ def _edges(count: int, window: str) -> NDArray[np.int64]:
     """First frequency of each bin."""
     if window == "none":
         return np.arange(count, dtype=np.int64)
-    bins = int(np.ceil(np.log2(count) * _BINS_PER_OCTAVE)) + 1
+    bins = int(np.ceil(np.log2(count) * tuning.BINS_PER_OCTAVE)) + 1
     edges = np.unique(np.floor(np.geomspace(1.0, count, bins)).astype(int)) - 1
     return edges[edges < count]
 

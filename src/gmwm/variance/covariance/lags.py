@@ -11,13 +11,8 @@ from scipy import fft
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, legendre
+from gmwm.variance import tuning
 
-EXACT_SAMPLES = 2048
-"""Longest record whose lags are single samples; longer ones are taken in blocks."""
-
-_BLOCKS = 1024
-_BLOCKS_PER_AVERAGE = 8  # averaging times of fewer blocks are left to the spectral integral
-_FOLDS = 2
 _ZERO = 1e-4  # of a bin: the frequency that stands for zero
 
 
@@ -73,10 +68,10 @@ class LagGrid:
 
 def block_of(n: int) -> tuple[int, int]:
     """Samples per block in a record of ``n``, and the first level that lags are summed for."""
-    if n <= EXACT_SAMPLES:
+    if n <= tuning.EXACT_SAMPLES:
         return 1, 0
-    block = 2 ** int(np.floor(np.log2(n / _BLOCKS)))
-    return block, int(np.log2(block * _BLOCKS_PER_AVERAGE))
+    block = 2 ** int(np.floor(np.log2(n / tuning.BLOCKS)))
+    return block, int(np.log2(block * tuning.BLOCKS_PER_AVERAGE))
 
 
 def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> FloatArray:
@@ -89,7 +84,7 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
     if block == 1:
         return np.asarray(psd(frequency / dt, dt)) / dt
     total = np.zeros_like(frequency)
-    folds = min(_FOLDS, block // 2)
+    folds = min(tuning.FOLDS, block // 2)
     for fold in range(-folds, folds + 1):
         f = np.abs(frequency + fold) / block
         smoothing = (np.sin(np.pi * block * f) / (block * np.sin(np.pi * f))) ** 2

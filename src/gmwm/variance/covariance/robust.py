@@ -36,18 +36,13 @@ from scipy import fft
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, quadrature
+from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_counts
 from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.robust import biweight_square, half_normal, tuning_constant
 from gmwm.variance.robust_kernels import weighted_series
 
-_REACH = 4
-_LAGS = 2048
-_FIRST_LEVELS = 7  # of 1 to 64 samples, on the samples themselves
-_LEVELS_PER_GRID = 3
-_BLOCKS_PER_AVERAGE = 16  # of the finest level of the other grids
 _MAX_TERMS = 40
-_NEGLIGIBLE = 1e-5
 
 
 @lru_cache(maxsize=64)
@@ -64,7 +59,7 @@ def excess_series(efficiency: float) -> FloatArray:
     rest = 2.0 / efficiency - 2.0
     terms: list[float] = []
     order = 2
-    while len(terms) < _MAX_TERMS and rest > _NEGLIGIBLE:
+    while len(terms) < _MAX_TERMS and rest > tuning.NEGLIGIBLE_POWER:
         for q in (order, order + 1):
             before, hermite = hermite, (r * hermite - np.sqrt(q) * before) / np.sqrt(q + 1.0)
         order += 2
@@ -90,7 +85,7 @@ class _Grid:
         Cycles per block.
     amplitude : (size, L) ndarray
         Gain of each level over its phase, on means of blocks.
-    weight : (own, _REACH + 1, L) ndarray
+    weight : (own, tuning.ROBUST_REACH + 1, L) ndarray
         Share of the pairs of coefficients at each lag, both signs together, for each level and
         the ones from itself on.
     """
@@ -117,14 +112,14 @@ def pair_shares(n: int, m_j: float, m_k: float, block: int, lags: int) -> FloatA
 
 def _grid(n: int, m: FloatArray, first: int, own: int, block: int) -> _Grid:
     """The grid whose ``own`` levels start at number ``first``."""
-    size = min(own + _REACH, m.size - first)
-    frequency = (np.arange(_LAGS) + 0.5) / (2 * _LAGS)
+    size = min(own + tuning.ROBUST_REACH, m.size - first)
+    frequency = (np.arange(tuning.ROBUST_LAGS) + 0.5) / (2 * tuning.ROBUST_LAGS)
     coarse = m[first : first + size, None] / block
     amplitude = np.sin(np.pi * coarse * frequency) ** 2 / (coarse * np.sin(np.pi * frequency))
-    weight = np.zeros((own, _REACH + 1, _LAGS))
+    weight = np.zeros((own, tuning.ROBUST_REACH + 1, tuning.ROBUST_LAGS))
     for j in range(own):
-        for k in range(j, min(j + _REACH + 1, size)):
-            weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, _LAGS)
+        for k in range(j, min(j + tuning.ROBUST_REACH + 1, size)):
+            weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, tuning.ROBUST_LAGS)
     return _Grid(block, first, own, size, frequency, amplitude, weight)
 
 
@@ -132,11 +127,11 @@ def _grid(n: int, m: FloatArray, first: int, own: int, block: int) -> _Grid:
 def _grids(n: int, levels: int) -> tuple[_Grid, ...]:
     """Everything about the sums over lags that does not depend on the spectrum."""
     m = dyadic_levels(n)[:levels]
-    grids = [_grid(n, m, 0, min(_FIRST_LEVELS, m.size), 1)]
-    first = _FIRST_LEVELS
+    grids = [_grid(n, m, 0, min(tuning.ROBUST_FIRST_LEVELS, m.size), 1)]
+    first = tuning.ROBUST_FIRST_LEVELS
     while first < m.size:
-        own = min(_LEVELS_PER_GRID, m.size - first)
-        grids.append(_grid(n, m, first, own, int(m[first]) // _BLOCKS_PER_AVERAGE))
+        own = min(tuning.ROBUST_LEVELS_PER_GRID, m.size - first)
+        grids.append(_grid(n, m, first, own, int(m[first]) // tuning.ROBUST_BLOCKS_PER_AVERAGE))
         first += own
     return tuple(grids)
 
@@ -180,7 +175,7 @@ def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> Flo
         density = block_density(psd, dt, grid.frequency, grid.block)
         excess = excess_correlation(grid.amplitude, density, grid.weight, series)
         for j in range(grid.own):
-            for d in range(min(_REACH + 1, grid.size - j)):
+            for d in range(min(tuning.ROBUST_REACH + 1, grid.size - j)):
                 row, column = grid.first + j, grid.first + j + d
                 result[row, column] = result[column, row] = excess[j, d]
     return result
@@ -253,7 +248,7 @@ def robust_covariance(
     # The cube falls with the distance of two levels about as the sums of fourth powers do, and
     # is exact where one narrow resonance makes all levels.
     number = np.arange(levels)
-    far = np.abs(np.subtract.outer(number, number)) > _REACH
+    far = np.abs(np.subtract.outer(number, number)) > tuning.ROBUST_REACH
     correlation[far] = classical_correlation[far] ** 3
     deviation *= variance
     if counts is not None:

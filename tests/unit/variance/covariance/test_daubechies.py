@@ -6,7 +6,8 @@ from scipy.linalg import toeplitz
 
 import gmwm
 from gmwm.process.wavelets import wavelet
-from gmwm.variance.covariance import daubechies as module, lags
+from gmwm.variance import tuning
+from gmwm.variance.covariance import daubechies as module
 from gmwm.variance.covariance.daubechies import wavelet_covariance
 from gmwm.variance.covariance.haar import haar_covariance
 from gmwm.variance.modwt import coefficients
@@ -78,10 +79,10 @@ def test_twice_integrated_noise_under_two_vanishing_moments():
 def test_lags_that_are_multiples_of_a_block_give_the_same_as_all_lags(process, name, monkeypatch):
     n = 6000
     try:
-        monkeypatch.setattr(lags, "EXACT_SAMPLES", n)
+        monkeypatch.setattr(tuning, "EXACT_SAMPLES", n)
         module._lag_sums.cache_clear()
         exact = of(process, n, name)
-        monkeypatch.setattr(lags, "EXACT_SAMPLES", 2048)
+        monkeypatch.setattr(tuning, "EXACT_SAMPLES", 2048)
         module._lag_sums.cache_clear()
         assert module._lag_sums(name, n, wavelet(name).levels(n)).grid.block > 1
         assert distance(of(process, n, name), exact) < 0.01

@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import toeplitz
 
 import gmwm
-from gmwm.variance.covariance import haar as module, lags
+from gmwm.variance import tuning
+from gmwm.variance.covariance import haar as module
 from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance, mean_covariance
 
 PROCESSES = [
@@ -71,8 +72,8 @@ def test_covariance_equals_the_sum_over_all_pairs_of_coefficients(process, n):
 def test_means_of_blocks_give_the_same_as_all_samples(process, monkeypatch):
     n = 1500
     exact = haar_covariance(process.psd, n, 1.0)
-    monkeypatch.setattr(lags, "EXACT_SAMPLES", 256)
-    monkeypatch.setattr(lags, "_BLOCKS", 128)
+    monkeypatch.setattr(tuning, "EXACT_SAMPLES", 256)
+    monkeypatch.setattr(tuning, "BLOCKS", 128)
     module._lag_sums.cache_clear()
     blocks = haar_covariance(process.psd, n, 1.0)
     module._lag_sums.cache_clear()

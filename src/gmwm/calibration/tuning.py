@@ -1,0 +1,22 @@
+"""Thresholds of the calibration, each with its source or its reason."""
+
+SAME_RATE = 1e-3
+"""Relative difference of the rates of recordings of one sensor: its averaging times are then the
+same to 0.1 %, less than the width of any level."""
+
+TORN = 32
+"""Times that masks may shorten the longest run: five octaves of averaging times."""
+
+MOST_TERMS = 2
+"""Lines and resonances offered to the model of a channel; each doubles the candidate models."""
+
+SAME_FREQUENCY = 0.02
+"""Relative difference of the frequency of one line in several recordings: lines of engines and
+fans wander by about as much (docs/real-data.md)."""
+
+REFERENCE_TIME = 1.0
+"""s, the averaging time at which white noise is read from an Allan plot (IEEE Std 952)."""
+
+WHITE_RATIO = 0.6
+"""Of the wavelet variances at twice the reference time and at it, below which a term acts as white
+noise, which has 0.5."""

@@ -1,0 +1,176 @@
+"""Thresholds of the diagnosis, each with its source or its reason."""
+
+FALSE_ALARM = 1e-3
+"""Chance of each kind of notice in a channel of clean Gaussian noise, however long."""
+
+# -- the whole recording --------------------------------------------------------------------------
+
+LONG_RECORD = 3600.0
+"""s: slow errors of inertial sensors have correlation times of minutes."""
+
+JITTER, LARGE_JITTER = 0.1, 0.3
+"""Root mean square of the steps of time stamps, in sampling intervals, for a note and a warning."""
+
+# -- missing, stuck and saturated samples ---------------------------------------------------------
+
+MUCH_MISSING, TOO_MUCH_MISSING = 0.1, 0.5
+"""Fraction of samples missing (or stuck) for a warning, and above which a channel is of no use."""
+
+DITHERED = 0.05
+"""Fraction of differences of two steps and more at which noise distinguishes samples."""
+
+LONG_RUN = 32
+"""Equal samples in a row that are left out of that fraction."""
+
+FEWEST_AT_END = 8
+"""Samples at the end of the scale from which saturation is looked for."""
+
+# -- prediction errors ----------------------------------------------------------------------------
+
+FEWEST_KNOWN = 64
+"""Samples in a row from which prediction errors are made: four coefficients."""
+
+ORDER = 16
+"""Of the autoregression; enough to whiten resonances and first differences."""
+
+SAMPLES_PER_COEFFICIENT = 16
+"""Fewest: a coefficient then has an error of a quarter."""
+
+SCALE_BLOCK = 2048
+"""Samples from which the scale is estimated: 2 % of error."""
+
+CLIP = 4.0
+"""Standard deviations beyond which an error counts as one of four: Gaussian noise loses 0.1 % of
+its variance."""
+
+# -- shocks and outliers --------------------------------------------------------------------------
+
+RINGING = 4.0
+"""Standard deviations of what belongs to a shock, once there is one: 1 of 16,000 samples of
+noise."""
+
+JOINED = 24
+"""Samples between large errors of one event: a little more than the order of the prediction."""
+
+GUARD = 8
+"""Samples before, and at least as many after, that are left out with an event."""
+
+BESIDE_EVENT = 200
+"""Samples on both sides that give the level without the event, to 7 % of the noise."""
+
+FAR = 4.0
+"""Standard deviations beyond which a sample is an outlier."""
+
+HARMFUL_OUTLIERS = 1e-3
+"""Fraction of outliers; they add 16 times as much to the variance, or more."""
+
+# -- drift and changes of the noise ---------------------------------------------------------------
+
+PARTS = 64
+"""Parts of the record whose means show the wander."""
+
+SHORT_MEAN = 64
+"""Samples whose means give the fast noise."""
+
+RAMP = 20.0
+"""Change over the record, in rms of the wander: 1 of 1000 random walks has more (200,000
+simulated)."""
+
+TENTHS = 10
+"""Parts of the record among which the loudest is looked for."""
+
+CHANGE, LARGE_CHANGE = 0.05, 0.2
+"""Relative change of the standard deviation between halves for a note and a warning."""
+
+# -- two channels ---------------------------------------------------------------------------------
+
+CORRELATED, STRONGLY_CORRELATED = 0.05, 0.3
+"""Correlation of prediction errors for a note and a warning: a filter that takes the channels as
+independent is wrong by as much."""
+
+FEWEST_PARTS = 16
+"""Changes from part to part from which a correlation with the temperature is computed."""
+
+SHORTEST_PART = 32
+"""Samples of a part for that."""
+
+# -- the step of the samples ----------------------------------------------------------------------
+
+LEVELS_SAMPLED = 65_536
+"""Samples in which a lattice shows; more are not looked at."""
+
+ONE_STEP = 1.5
+"""Times the smallest difference up to which a difference counts as one step."""
+
+DIVISORS = range(1, 7)
+"""The smallest difference seen may be so many steps."""
+
+OFF_LATTICE = 0.1
+"""Root mean square distance from the lattice, in steps; numbers at random have 0.29."""
+
+FEWEST_LEVELS = 8
+"""Levels that prove a lattice by their places alone."""
+
+# -- the spectrum ---------------------------------------------------------------------------------
+
+FEWEST_OF_SPECTRUM = 512
+"""Samples below which there is no useful spectrum."""
+
+FIRST_BIN = 20
+"""First bin that is looked at: slower than a twentieth of the record is drift, not a line."""
+
+BANDS_PER_OCTAVE = 24
+"""Bands of the smooth background, narrower than the narrowest resonance that is looked for."""
+
+FEWEST_IN_BAND = 8
+"""Bins of a band: its level then has an error of a third."""
+
+# -- lines ----------------------------------------------------------------------------------------
+
+NARROW = 0.01
+"""Of its frequency: what is wider is a resonance."""
+
+UNRESOLVED = 6
+"""Bins that a pure line takes under the Hann window, its foot included."""
+
+BESIDE_LINE, BESIDE_LINE_FRACTION = 64, 0.015
+"""Bins on both sides that give the local background, or this part of the frequency."""
+
+MOST_LINES = 40
+"""Lines of one channel."""
+
+NAMED_LINES = 4
+"""Lines with a notice of their own."""
+
+FOOT_RATIO = 1.5
+"""Ratio to the background that ends the foot of a line."""
+
+FOOT = 0.05
+"""Of the frequency: no foot reaches farther."""
+
+# -- resonances -----------------------------------------------------------------------------------
+
+FEWEST_BANDS = 24
+"""Bands of a spectrum in which a resonance can be seen: an octave."""
+
+LEAST_PEAK = 1.5
+"""Ratio to the background from which a peak matters to a filter: 22 % of the amplitude."""
+
+SLOWEST_BIN = 64
+"""Bin below which bands are wider than a peak."""
+
+FITTED_OCTAVES = 2.0
+"""Frequencies from f/2 to 2 f are fitted."""
+
+FITTED_POINTS = 300
+"""Means of the periodogram in that range."""
+
+NARROWEST, WIDEST = 0.005, 0.3
+"""Damping ratios: what is narrower than a hundredth of its frequency is a line, what is wider has
+no peak above a smooth background."""
+
+MOST_RESONANCES = 4
+"""Resonances of one channel."""
+
+DAMPING_STARTS = (0.01, 0.05, 0.15)
+"""Damping ratios from which the fit starts."""

@@ -1,0 +1,35 @@
+"""Thresholds of the readers that decide what a file means, each with its source or its reason."""
+
+FEWEST_SAMPLES = 64
+"""Samples below which no variance is worth computing: four levels of sixteen coefficients."""
+
+SLOWEST_RATE, FASTEST_RATE = 1e-6, 1e9
+"""Hz: beyond, a rate is in another unit or a slip."""
+
+LINES_OF_LAYOUT = 100
+"""Lines from which the delimiter, the decimal mark and the header are inferred."""
+
+# -- the clock ------------------------------------------------------------------------------------
+
+RATES_AGREE = 0.01
+"""Relative difference of two rates that are meant to be the same: sensors' clocks are off by less
+than one per cent, and stated rates are rounded."""
+
+SHORTEST_STEP = 0.499
+"""Shortest usual step, of the median: rounded stamps come to one half, but for rounding errors."""
+
+USUAL_STEP = 1.75
+"""Median steps up to which a step makes the usual one: 2 and 3 ms of a clock of 400 Hz."""
+
+LONGEST_STEP = 1.5
+"""Usual steps beyond which a step may be a jump: half way to a missing row."""
+
+NEIGHBOURS = 5
+"""Rows on either side of a jump whose median says where the clock stands: two late ones do no
+harm."""
+
+OFF_GRID = 0.25
+"""Sampling intervals from the grid beyond which a jump is reported as off it."""
+
+FEWEST_IN_RHYTHM = 4
+"""Jumps from which a rhythm shows that stamps were rounded."""

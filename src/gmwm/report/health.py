@@ -1,0 +1,78 @@
+"""What was found in the recording, in the order in which people want to read it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gmwm._core.notices import Notice, worst_first
+from gmwm.calibration import AMBIGUITY, Calibration
+
+_COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
+_COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
+"""Of an examined recording, notices of gaps and events have the same numbers."""
+
+
+def health(calibration: Calibration) -> dict[str, Any]:
+    """Content of the section: notices by channel, worst first, and the good ones apart."""
+    examined = calibration.is_examined
+    notices = [
+        notice
+        for notice in calibration.notices
+        if notice.code != AMBIGUITY and not (examined and notice.code in _COUNTED_ELSEWHERE)
+    ]
+    return {
+        "examined": examined,
+        "unexamined": () if examined else list(map(str, notices)),
+        "summary": _summary(notices),
+        "groups": _groups([notice for notice in notices if notice.severity != "good"]),
+        "good": _groups([notice for notice in notices if notice.severity == "good"]),
+    }
+
+
+def ambiguity(calibration: Calibration, channel: str) -> list[str]:
+    """Which models describe a channel equally well."""
+    return [
+        f"{notice.text} ({notice.action})"
+        for notice in calibration.notices
+        if notice.code == AMBIGUITY and notice.where == channel
+    ]
+
+
+def _groups(notices: list[Notice]) -> list[dict[str, Any]]:
+    """Notices by recording and channel, those of the whole recording first."""
+    by_place: dict[tuple[str, str], list[Notice]] = {}
+    for notice in sorted(notices, key=lambda notice: bool(notice.where)):
+        by_place.setdefault((notice.where, notice.source), []).append(notice)
+    order = list(dict.fromkeys(where for where, _ in by_place))
+    return [
+        {
+            "name": ", ".join(part for part in (where or "whole recording", source) if part),
+            "rows": [
+                {
+                    "severity": notice.severity,
+                    "text": _begun(notice.text),
+                    "action": _begun(notice.action),
+                }
+                for notice in worst_first(group)
+            ],
+        }
+        for (where, source), group in sorted(
+            by_place.items(), key=lambda item: order.index(item[0][0])
+        )
+    ]
+
+
+def _summary(notices: list[Notice]) -> str:
+    counts = {
+        words: sum(notice.severity == severity for notice in notices)
+        for severity, words in _COUNTED
+    }
+    parts = [f"{n} {words}{'s' if n > 1 else ''}" for words, n in counts.items() if n]
+    if counts["severe issue"] or counts["warning"]:
+        return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
+    return "Nothing was found that spoils the estimates."
+
+
+def _begun(text: str) -> str:
+    """With a capital at the beginning; units and names keep theirs."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,110 @@
+"""Constants of the variances and their covariances, each with its source or its reason."""
+
+# -- the Allan family -----------------------------------------------------------------------------
+
+LEAST_FOR_SLOPE = 100
+"""Averages from which the kind of noise is identified; with fewer, that of the level before."""
+
+LEAST_DOF_OF_FAMILY = 0.5
+"""Degrees of freedom of an interval that says nothing."""
+
+# -- the spectrum that wavelet variances imply ----------------------------------------------------
+
+PILOT_ITERATIONS = 12
+"""Rounds of scaling; the last changes no level by as much as its error."""
+
+PILOT_STEP = 0.8
+"""Part of the way, in logarithms: neighbouring levels share frequencies, and whole steps
+oscillate."""
+
+PILOT_STEEPEST = 2.5
+"""Power of the frequency from level to level; the steepest process (a random walk) has 2."""
+
+HAAR_PEAK = 0.37
+"""The Haar gain of averaging time tau peaks at f = 0.37/tau."""
+
+# -- gaps -----------------------------------------------------------------------------------------
+
+AVERAGES_OF_GAP = 4
+"""Lengths of a gap in the shortest averaging time for which it is filled: the Haar autocorrelation
+is a straight line there, and its error is small beside the coefficient."""
+
+FILLING_REACH = 32
+"""Blocks on either side that a filling looks at, at least; four lengths of the gap if that is
+more. Farther ones take little from the error of a random walk or of white noise."""
+
+GAP_BLOCKS = 64
+"""Blocks in a gap, at most; longer gaps are taken in blocks of several samples."""
+
+ISLAND = 32
+"""A run of less than this part of a gap beside it is lost with the gap: there is no block of it."""
+
+PASSED_OCTAVES = 3
+"""By which a gap is shorter than another that looks across it."""
+
+NEIGHBOURHOOD = 128
+"""Half samples: gaps so near have correlated errors."""
+
+PAIRED_KINDS = 24
+"""Kinds of gaps, the most frequent, whose pairs are counted; twice as many change no expected
+variance by 1 % where half of the samples are missing."""
+
+LARGEST_CHANGE = 1.5
+"""Of an expected variance by filling: half of white noise missing singly has 1.35, and a bias of
+2 %."""
+
+PILOT_WINDOWS = 8.0
+"""Windows that do not overlap, from which a level tells the spectrum that gaps are filled under."""
+
+DECIDING_WINDOWS = 32.0
+"""The same, from which a level tells whether it can be filled; coarser ones follow it."""
+
+LAGS_PER_AVERAGE = 8
+"""Lags at which pairs of coefficients are counted."""
+
+MOST_BLOCKS = 2048
+"""Means of blocks that a drift is estimated from."""
+
+MOST_BLOCKS_WITH_GAPS = 512
+"""The same where some are missing, which makes a dense matrix of them."""
+
+# -- covariances by lags --------------------------------------------------------------------------
+
+EXACT_SAMPLES = 2048
+"""Longest record whose lags are single samples; longer ones are taken in blocks."""
+
+BLOCKS = 1024
+"""Blocks of a longer record; its coarse levels are computed from their means."""
+
+BLOCKS_PER_AVERAGE = 8
+"""Blocks of the shortest averaging time that is computed so; shorter ones have the spectral
+integral."""
+
+FOLDS = 2
+"""Aliases on either side of a block's spectrum; the block mean suppresses farther ones."""
+
+LEAST_LAGS = 2048
+"""Lags for other wavelets: memory may be longer than a short record."""
+
+BINS_PER_OCTAVE = 8
+"""Of the smoothed empirical covariance."""
+
+# -- covariances of the robust variances ----------------------------------------------------------
+
+ROBUST_REACH = 4
+"""Levels apart that are summed by lags: farther ones add 2^(-3d/2) or less."""
+
+ROBUST_LAGS = 2048
+"""Lags of a grid."""
+
+ROBUST_FIRST_LEVELS = 7
+"""Levels of 1 to 64 samples, on the samples themselves."""
+
+ROBUST_LEVELS_PER_GRID = 3
+"""Levels that share a coarser grid."""
+
+ROBUST_BLOCKS_PER_AVERAGE = 16
+"""Blocks of the finest level of a coarser grid."""
+
+NEGLIGIBLE_POWER = 1e-5
+"""Part of the excess below which powers of the correlation are left out."""

@@ -1,0 +1,35 @@
+"""Options that the command line adds to the library's messages."""
+
+import ast
+import re
+
+import pytest
+
+from gmwm.cli.hints import HINTS, with_hint
+from gmwm.cli.main import cli
+from gmwm.errors import InputError
+from places import REPOSITORY
+
+ROOT = REPOSITORY / "src" / "gmwm"
+
+
+def test_a_hint_follows_the_message():
+    error = InputError("the rate is missing: give rate=100", "rate")
+    assert with_hint(error) == f"{error} (on the command line: --rate 100)"
+    assert with_hint(InputError("the rate is missing")) == "the rate is missing"
+
+
+@pytest.mark.parametrize("code", HINTS)
+def test_every_option_that_is_named_exists(code):
+    options = {name for command in cli.commands.values() for p in command.params for name in p.opts}
+    named = [word for word in HINTS[code].replace(",", " ").split() if word.startswith("-")]
+    assert named
+    assert options.issuperset(named)
+
+
+@pytest.mark.parametrize("room", ["readers", "diagnosis", "calibration", "export", "report"])
+def test_messages_of_the_library_name_no_option(room):
+    for path in (ROOT / room).glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            text = node.value if isinstance(node, ast.Constant) else None
+            assert not (isinstance(text, str) and re.search(r"(?<![-\w])--[a-z]", text)), path

@@ -1,0 +1,56 @@
+"""The slope of a drift, and whether it is one."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.problem import slope_p_value
+from gmwm.process import as_model
+
+
+class TestSlopeOfAWalk:
+    """`slope_p_value`: slopes of walks that the record does not resolve are accidents."""
+
+    N, DT = 20_000, 1.0
+
+    def p_values(self, truth, noise, seeds):
+        series = [as_model(truth).simulate(self.N, self.DT, seed) for seed in seeds]
+        return np.array(
+            [slope_p_value(gmwm.wavelet_variance(x, self.DT), noise.psd) for x in series]
+        )
+
+    @pytest.mark.parametrize("walk", [0.0, 1e-4, 1e-3])
+    def test_it_is_no_smaller_than_chance(self, walk):
+        # Under the white noise alone, which is all that the reference holds of the walk.
+        truth = WhiteNoise(1.0) + RandomWalk(walk) if walk else WhiteNoise(1.0)
+        p = self.p_values(truth, WhiteNoise(1.0), range(60))
+        # Binomial: 0.05 of 60 is exceeded ninefold by one in 10^3; the prior makes it rarer.
+        assert np.sum(p < 0.05) <= 9
+        assert np.sum(p < 0.002) <= 1
+
+    def test_a_ramp_far_above_the_noise_is_none(self):
+        sigma = np.sqrt(12.0 / (self.N * self.DT) ** 3)
+        for sign in (1.0, -1.0):
+            truth = WhiteNoise(1.0) + RateRamp(sign * 25.0 * sigma)
+            assert np.all(self.p_values(truth, WhiteNoise(1.0), range(5)) < 0.002)
+
+    def test_scale_and_sampling_do_not_matter(self):
+        x = (WhiteNoise(1.0) + RandomWalk(1e-3)).simulate(self.N, 1.0, 3)
+        first = slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd)
+        other = slope_p_value(gmwm.wavelet_variance(1e-6 * x, 0.01), WhiteNoise(1e-7).psd)
+        assert other == pytest.approx(first, rel=1e-6)
+        back = slope_p_value(gmwm.wavelet_variance(x[::-1].copy(), 1.0), WhiteNoise(1.0).psd)
+        assert back == pytest.approx(first, rel=0.05)
+
+    def test_gaps_leave_it_as_it_is(self):
+        x = (WhiteNoise(1.0) + RateRamp(1e-5)).simulate(self.N, 1.0, 3)
+        whole = slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd)
+        x[5000:6000] = np.nan
+        with_gap = slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd)
+        assert np.log(with_gap) == pytest.approx(np.log(whole), abs=3.0)
+
+    def test_few_blocks_tell_nothing(self):
+        x = 1e-3 * np.arange(4096.0) + WhiteNoise(1.0).simulate(4096, 1.0, 1)
+        x[100:] = np.nan
+        assert slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd) == 1.0
