@@ -1,4 +1,4 @@
-"""The paper's scenarios without starting values, against bounds computed elsewhere.
+"""The paper's studies without starting values, against bounds computed elsewhere.
 
 Relative Cramer-Rao bounds: exact Fisher information of the differences for n = 6000, Whittle
 integral for n = 1e6. The runs are those of ``gmwm reproduce``; `pytest -m slow` makes as many as
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from gmwm.study.runs import run_scenario
-from gmwm.study.scenario import FIVE, TABLE_2, TABLE_3, TABLE_4
+from gmwm.study.runs import run_study
+from gmwm.study.studies import FIVE, TABLE_2, TABLE_3, TABLE_4
 from gmwm.study.summary import summarise
 
 BOUNDS = {
@@ -26,7 +26,7 @@ BOUNDS = {
     "beta_3": {"table4": 0.00473},
     "sigma2_3": {"table4": 0.00185},
 }
-STUDIES = {
+RUN = {
     "table2": (TABLE_2, ["GMWM", "EM*", "AV"], 40),
     "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 40),
     "table4": (TABLE_4, ["GMWM"], 8),
@@ -40,14 +40,14 @@ REACHED = [case for case in CASES if case not in (("table3", "beta"), ("table3",
 def tables(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     return {
-        name: run_scenario(scenario, folder, runs=runs, methods=methods, jobs=2)
-        for name, (scenario, methods, runs) in STUDIES.items()
+        name: run_study(study, folder, runs=runs, methods=methods, jobs=2)
+        for name, (study, methods, runs) in RUN.items()
     }
 
 
 @pytest.fixture(scope="module")
 def summaries(tables):
-    return {name: summarise(STUDIES[name][0], table, 0) for name, table in tables.items()}
+    return {name: summarise(RUN[name][0], table, 0) for name, table in tables.items()}
 
 
 def column(table, method, name):
@@ -96,13 +96,13 @@ def test_classical_methods_fail_as_the_paper_says(summaries):
     assert scores["sigma2_RW", "GMWM"].relative < 0.2
 
 
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("study", RUN)
 def test_no_run_fails(tables, summaries, study):
     # A chi-square test at one in a thousand may fire once in a hundred runs by chance.
     assert summaries[study].invalid["GMWM"] <= 1
-    for quantity in STUDIES[study][0].quantities:
+    for quantity in RUN[study][0].quantities:
         ratio = column(tables[study], "GMWM", quantity.name)
-        ratio = ratio / STUDIES[study][0].true_value(quantity)
+        ratio = ratio / RUN[study][0].true_value(quantity)
         assert np.all((ratio > 0.04) & (ratio < 25.0))
 
 
@@ -116,28 +116,28 @@ def test_intervals_cover(summaries, study, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scenario", "runs"), [(TABLE_2, 1000), (TABLE_3, 1000), (TABLE_4, 200), (FIVE, 100)]
+    ("study", "runs"), [(TABLE_2, 1000), (TABLE_3, 1000), (TABLE_4, 200), (FIVE, 100)]
 )
-def test_study_at_full_length(tmp_path, scenario, runs):
-    efficient = "Whittle" if "Whittle" in scenario.methods else "MLE"
-    table = run_scenario(scenario, tmp_path, runs=runs, methods=["GMWM", efficient], jobs=2)
-    summary = summarise(scenario, table, 0)
+def test_study_at_full_length(tmp_path, study, runs):
+    efficient = "Whittle" if "Whittle" in study.methods else "MLE"
+    table = run_study(study, tmp_path, runs=runs, methods=["GMWM", efficient], jobs=2)
+    summary = summarise(study, table, 0)
     print(summary)
     # Of five Gauss-Markov terms, one is not significant in some records, which the fit says.
-    assert summary.invalid["GMWM"] <= (runs // 10 if scenario is FIVE else 1 + runs // 200)
-    for quantity in scenario.quantities:
+    assert summary.invalid["GMWM"] <= (runs // 10 if study is FIVE else 1 + runs // 200)
+    for quantity in study.quantities:
         moments = summary.scores[quantity.name, "GMWM"]
         best = summary.scores[quantity.name, efficient]
         assert moments.missing == best.missing == 0
-        truth = scenario.true_value(quantity)
+        truth = study.true_value(quantity)
         chance = [
             1.0 + 2.0 * relative_error_of_rmse(column(table, method, quantity.name) / truth - 1.0)
             for method in ("GMWM", efficient)
         ]
-        if scenario is FIVE:
+        if study is FIVE:
             assert moments.moment_ratio <= 1.1 * chance[0]
             assert best.ratio <= 1.1 * chance[1]
-        elif scenario is TABLE_3:
+        elif study is TABLE_3:
             # At long averaging times coefficients free of end effects are fewer than samples.
             assert moments.relative <= 1.08 * best.relative
         else:

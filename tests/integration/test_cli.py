@@ -827,4 +827,4 @@ def test_reproduce_does_not_touch_earlier_runs(run):
     run(*arguments)
     code, _, told = run(*arguments)
     assert code == 2
-    assert "add --resume" in told
+    assert "resume it, or give another folder (on the command line: --resume" in told

@@ -177,53 +177,53 @@ BAD = {
     "unknown key": ({"filter": {}}, "'filter' is unknown: there are trajectory"),
     "filters: number": ({"filters": 5}, "filters: 5: write NAME"),
     "filters: list": ({"filters": ["truth"]}, "write NAME: calibration.json"),
-    "filter: number": ({"filters": {"a": 5}}, "filter a: 5: give a calibration.json"),
+    "filter: number": ({"filters": {"a": 5}}, "filters, a: 5: write a calibration.json, models"),
     "filter: missing file": ({"filters": {"a": "no.json"}}, "no.json: cannot be read"),
     "filter: folder": ({"filters": {"a": "."}}, "cannot be read"),
     "filter: no JSON": ({"filters": {"a": "study.yaml"}}, "is not JSON"),
-    "filter: blank name": ({"filters": {" ": "truth"}}, "is no name"),
-    "filter: control": ({"filters": {"a\tb": "truth"}}, "is no name"),
-    "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "is no name"),
-    "filter: reduced form": ({"filters": {"a": {"reduce": "N+X"}}}, "known are N+K, N+GM"),
+    "filter: blank name": ({"filters": {" ": "truth"}}, "cannot be a name"),
+    "filter: control": ({"filters": {"a\tb": "truth"}}, "cannot be a name"),
+    "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "cannot be a name"),
+    "filter: reduced form": ({"filters": {"a": {"reduce": "N+X"}}}, "reduce: 'N+X': write N+K"),
     "filter: reduced key": ({"filters": {"a": {"reduce": "N+K", "to": 1}}}, "'to' is unknown"),
     "filter: flicker": (
         {"filters": {"a": {"gyro": {"B": "1 deg/h"}, "accel": {"N": 1}}}},
-        "filter a, gyro_x: BiasInstability.*approximate it by Gauss-Markov",
+        "filters, a, gyro_x: BiasInstability.*approximate it by Gauss-Markov",
     ),
-    "truth: list": ({"truth": [1]}, "truth: [1]: give"),
+    "truth: list": ({"truth": [1]}, "truth: [1]: write a calibration.json"),
     "truth: lacks axis": ({"truth": {"gyro": {"N": 1}}}, "accel_x has none"),
     "truth: empty sensor": ({"truth": MODELS | {"gyro": {"bias": 1}}}, "there is no noise"),
-    "truth: sensor": ({"truth": MODELS | {"mag": {"N": 1}}}, "'mag' is no sensor"),
-    "truth: letter": ({"truth": MODELS | {"gyro": {"Z": 1}}}, "'Z' is no term"),
+    "truth: sensor": ({"truth": MODELS | {"mag": {"N": 1}}}, "truth: 'mag' is unknown: there are"),
+    "truth: letter": ({"truth": MODELS | {"gyro": {"Z": 1}}}, "truth, gyro: 'Z' is unknown"),
     "truth: unit": ({"truth": MODELS | {"gyro": {"N": "1 deg/h"}}}, "does not measure the same"),
     "truth: negative": ({"truth": MODELS | {"gyro": {"N": -1}}}, "truth, gyro, N"),
-    "truth: NaN": ({"truth": MODELS | {"gyro": {"N": float("nan")}}}, "is no number"),
+    "truth: NaN": ({"truth": MODELS | {"gyro": {"N": float("nan")}}}, "is not a number"),
     "truth: huge": ({"truth": MODELS | {"gyro": {"N": "1e999"}}}, "is too large"),
-    "truth: yes": ({"truth": MODELS | {"gyro": {"N": True}}}, "is no number"),
+    "truth: yes": ({"truth": MODELS | {"gyro": {"N": True}}}, "is not a number"),
     "truth: flat GM": ({"truth": MODELS | {"gyro": {"GM": [1, 2]}}}, "write [[sigma, tau], ...]"),
     "truth: tau unit": ({"truth": MODELS | {"gyro": {"GM": [[1, "3 m"]]}}}, "same as s"),
     "recordings: number": ({"truth": {"recordings": 5}}, "write [file, ...]"),
-    "recordings: none": ({"truth": {"recordings": []}}, "there is none"),
+    "recordings: none": ({"truth": {"recordings": []}}, "recordings: there is none"),
     "recordings: missing": ({"truth": {"recordings": "x.csv"}}, "x.csv does not exist"),
     "recordings: key": ({"truth": {"recordings": "x.csv", "unit": 1}}, "'unit' is unknown"),
     "recordings: units": ({"truth": {"recordings": "x.csv", "units": 5}}, "write {gyro: deg/s"),
-    "recordings: unit": ({"truth": {"recordings": "x", "units": {"gyro": 1}}}, "write deg/s"),
+    "recordings: unit": ({"truth": {"recordings": "x", "units": {"gyro": 1}}}, "write {gyro: "),
     "recordings: channels": ({"truth": {"recordings": "x", "channels": 1}}, "write {gyro_x"),
     "recordings: channel": ({"truth": {"recordings": "x", "channels": {"gyro_x": 1.5}}}, "column"),
     "recordings: time": ({"truth": {"recordings": "x", "time": 1.5}}, "write a column, or none"),
-    "recordings: rate": ({"truth": {"recordings": "x", "rate": "fast"}}, "is no number"),
+    "recordings: rate": ({"truth": {"recordings": "x", "rate": "fast"}}, "is not a number"),
     "trajectory: number": ({"trajectory": 5}, "trajectory: 5: write helicopter"),
-    "trajectory: missing": ({"trajectory": "no.csv"}, "'no.csv' is no file, and none of"),
+    "trajectory: missing": ({"trajectory": "no.csv"}, "'no.csv' is not a file, and none of"),
     "trajectory: folder": ({"trajectory": ".", "rate": None}, "is a directory"),
     "trajectory: rate": ({"trajectory": "study.yaml"}, "leave it out"),
     "trajectory: YAML": ({"trajectory": "study.yaml", "rate": None}, "study.yaml"),
-    "duration: text": ({"duration": "long"}, "duration: 'long' is no number"),
+    "duration: text": ({"duration": "long"}, "study.yaml: duration: 'long' is not a number"),
     "duration: unit": ({"duration": "30 m"}, "same as s"),
-    "duration: zero": ({"duration": 0}, "give a positive number"),
+    "duration: zero": ({"duration": 0}, "duration: 0: input should be greater than 0"),
     "duration: endless": ({"duration": 1e12}, "steps"),
-    "rate: zero": ({"rate": 0}, "give a positive number"),
+    "rate: zero": ({"rate": 0}, "rate: 0: input should be greater than 0"),
     "outages: number": ({"outages": 5}, "write [[start, length], ...]"),
-    "outages: flat": ({"outages": [18, 6]}, "write [start, length] in seconds"),
+    "outages: flat": ({"outages": [18, 6]}, "outages[0]: 18: write [start, length] in seconds"),
     "outages: beyond": ({"outages": [[18, 60]]}, "goes beyond the end"),
     "outages: negative": ({"outages": [[18, -1]]}, "give seconds above zero"),
     "outages: early": ({"outages": [[-1, 5]]}, "seconds since the first epoch"),
@@ -237,17 +237,17 @@ BAD = {
     "gnss: none": ({"gnss": {"position_sd": "none"}}, "there is no fix"),
     "gnss: seldom": ({"gnss": {"interval": 60}}, "there is no fix"),
     "gnss: odd interval": ({"gnss": {"interval": 0.07}}, "give a multiple"),
-    "gnss: text": ({"gnss": {"position_sd": "fine"}}, "is no number"),
-    "gnss: negative": ({"gnss": {"velocity_sd": -1}}, "gnss, velocity_sd = -1.0"),
-    "gnss: mapping": ({"gnss": {"position_sd": {"north": 1}}}, "is no number"),
-    "gnss: two": ({"gnss": {"lever_arm": [1, 2]}}, "give three numbers"),
+    "gnss: text": ({"gnss": {"position_sd": "fine"}}, "is not a number"),
+    "gnss: negative": ({"gnss": {"velocity_sd": -1}}, "gnss, velocity_sd[0]: -1: input should"),
+    "gnss: mapping": ({"gnss": {"position_sd": {"north": 1}}}, "is not a number"),
+    "gnss: two": ({"gnss": {"lever_arm": [1, 2]}}, "write three values"),
     "gnss: unit": ({"gnss": {"lever_arm": ["1 s", 0, 0]}}, "same as m"),
     "initial_sd: number": ({"initial_sd": 5}, "initial_sd: 5: write KEY: VALUE"),
     "initial_sd: key": ({"initial_sd": {"roll": 1}}, "'roll' is unknown"),
     "initial_sd: unit": ({"initial_sd": {"tilt": "1 m"}}, "same as rad"),
-    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "give a positive number"),
-    "runs: part": ({"runs": 1.5}, "give a whole number"),
-    "seed: negative": ({"seed": -1}, "give a whole number"),
+    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "initial_sd, tilt: 0: input should be"),
+    "runs: part": ({"runs": 1.5}, "runs: 1.5: input should be a valid integer"),
+    "seed: negative": ({"seed": -1}, "seed: -1: input should be greater"),
 }  # fmt: skip
 
 
@@ -273,17 +273,17 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_sentence(run, case):
     ("text", "message"),
     [
         ("", "is empty"),
-        ("hello", "is no mapping"),
-        ("- 1\n- 2", "is no mapping"),
-        ("a: [1", "is no YAML (line 1"),
+        ("hello", "is not a mapping"),
+        ("- 1\n- 2", "is not a mapping"),
+        ("a: [1", "is not YAML (line 1"),
         ("a:\n\t- 1", "line 2, column 1"),
         ("a: *b", "undefined alias"),
-        ("a: !!python/object:os.system 1", "is no YAML"),
+        ("a: !!python/object:os.system 1", "is not YAML"),
         ("truth: x\ntrajectory: car\ntruth: y", "line 3: 'truth' is there twice"),
         ("filters:\n  A: x\n  B: y\n  A: z", "line 4: 'A' is there twice"),
         ("filters: {1: x, '1': y}", "'1' is there twice"),
-        ("a\0: 1", "is no YAML"),
-        ("\xff\xfe", "is no"),
+        ("a\0: 1", "is not YAML"),
+        ("\xff\xfe", "is not"),
     ],
 )  # fmt: skip
 def test_what_is_no_study_file(run, text, message):
@@ -301,8 +301,8 @@ def test_what_is_no_study_file(run, text, message):
         (("study.yaml", "--filter", "A="), "write NAME=FILE"),
         (("study.yaml", "--filter", "A=x", "--filter", "A=y"), "--filter A=... is given twice"),
         (("study.yaml", "--outage", "5"), "--outage 5: write START:LENGTH"),
-        (("study.yaml", "--outage", "nan:5"), "outages: nan is no number"),
-        (("study.yaml", "--duration", "-5"), "give a positive number"),
+        (("study.yaml", "--outage", "nan:5"), "gmwm: outages[0][0]: nan is not a number"),
+        (("study.yaml", "--duration", "-5"), "duration: -5.0: input should be greater than 0"),
         (("study.yaml", "--truth", "no.json"), "no.json: cannot be read"),
         (("--trajectory", "car"), "no truth, no filters"),
     ],
@@ -315,7 +315,9 @@ def test_options_that_cannot_be_used(run, arguments, message):
 def test_a_calibration_that_lacks_an_axis(run):
     calibration(Path("five.json"), AXES[:5])
     refused(run(written(truth="five.json")), "truth, five.json: sensor models: accel_z has none")
-    refused(run(written(filters={"A": "five.json"})), "filter A, five.json: sensor models: accel_z")
+    refused(
+        run(written(filters={"A": "five.json"})), "filters, A, five.json: sensor models: accel_z"
+    )
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
@@ -327,7 +329,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
     Path("taken").mkdir()
     Path("taken/runs").write_text("mine")
     code, _, told = run("study.yaml", "-o", "taken", "--jobs", 1)
-    assert (code, "in the way" in told) == (2, True)
+    assert (code, "cannot be written" in told) == (2, True)
     assert Path("taken/runs").read_text() == "mine"
     code, _, told = run("study.yaml", "-o", "study.yaml", "--jobs", 1)
     assert (code, "cannot be written" in told) == (2, True)

@@ -1,17 +1,20 @@
-"""What tests of several rooms share: validations of made-up errors, without any filter."""
+"""What tests of several rooms fraction: validations of made-up errors, without any filter."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gmwm.ins import MonteCarlo, Outage, Runs, car_drive
+from gmwm._core.notices import Notice
+from gmwm.ins import FilterErrors, MonteCarlo, Outage, car_drive
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.geometry.rotation import matrix_from_rpy
 from gmwm.ins.montecarlo.validation import Validation
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}
 """Name -> true errors in units of the predicted ones."""
+
+NOTE = Notice("made-up", "note", "", "a note")
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +35,7 @@ def _made_up(factors=None, outages=((20, 10), (40, 15)), runs=40, seed=1, durati
     experiment = SimpleNamespace(title="made up", seed=seed, filters={
         name: SimpleNamespace(models={"gyro_x": f"model of {name}"}) for name in factors
     })  # fmt: skip
-    return Validation(experiment, MonteCarlo(filters, spans, example, truth, ("a note",)))
+    return Validation(experiment, MonteCarlo(filters, spans, example, truth, (NOTE,)))
 
 
 def _runs(factor, spans, draws, rng, dead):
@@ -57,7 +60,7 @@ def _runs(factor, spans, draws, rng, dead):
     nees = np.stack([np.sum(each, axis=-1) for each in groups], axis=-1)
     sensor = factor * rng.standard_normal((count, time.size, 6))
     white = rng.standard_normal((count, 300)) * factor
-    return Runs(
+    return FilterErrors(
         time=time, before=early, error=error, sd=sd, nees=nees, log_det=np.zeros_like(nees),
         sensor_error=sensor, sensor_sd=np.ones_like(sensor),
         sensor_nees=np.sum(sensor**2, axis=-1),

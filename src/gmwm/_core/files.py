@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -49,6 +50,24 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """
     with moved_into_place(path) as name, open(name, "w", encoding="utf-8") as stream:
         yield stream
+
+
+def existing_file(path: str | os.PathLike[str]) -> Path:
+    """The path, if a file is there.
+
+    Raises
+    ------
+    InputError
+        If nothing is there, or a directory.
+    """
+    found = Path(path)
+    try:
+        mode = found.stat().st_mode
+    except (OSError, ValueError):  # ValueError: a null character in the name
+        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path} is a directory: name a file in it")
+    return found
 
 
 def replaceable(path: Path) -> Path:

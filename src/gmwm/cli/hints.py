@@ -8,10 +8,13 @@ HINTS = {
     "accel-unit-missing": "--accel-unit g",
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
-    "earlier-runs": "--resume to go on with them, or another folder with -o",
+    "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
     "heading-unknown": "--heading DEG, or heading: in the file",
+    "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
+    "other-runs": "-o FOLDER",
     "rate": "--rate 100",
+    "runs-in-use": "-o FOLDER",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
 }
 

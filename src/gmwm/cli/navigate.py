@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,8 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-navigate"),
               show_default=True, help="Folder for the report, the table and the runs.")  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
+@click.option("--cluster", metavar="ADDRESS",
+              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
 @click.option("--imu", metavar="FILE", help="Your own data: IMU samples, with a header as for gmwm "
                                             "calibrate; axes forward, right, down.")  # fmt: skip
 @click.option("--gnss", "gnss_fixes", metavar="FILE",
@@ -69,6 +73,7 @@ def navigate(
     jobs: int | None,
     output: Path,
     resume: bool,
+    cluster: str | None,
     imu: str | None,
     gnss_fixes: str | None,
     sensors: str | None,
@@ -109,6 +114,8 @@ def navigate(
     content: dict[str, Any] = {} if file is None else read_document(file)
     content |= options | data
     folder = Path() if file is None else file.parent
+    # Where options were given too, what is wrong may be theirs.
+    place = None if options or data else file
     reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
     if _OF_DATA.isdisjoint(content):
         # The rate is also that of a ready-made trajectory.
@@ -119,27 +126,47 @@ def navigate(
                 f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
                 "it out"
             )
-        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume)
+        _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster, place)
     else:
         content["imu"] = _with_reading(content.get("imu"), reading)
-        _filter(content, folder, output)
+        _filter(content, folder, output, place)
 
 
-def _validate(content: dict[str, Any], base: Path, output: Path, jobs: int, resume: bool) -> None:
+@contextmanager
+def _named_in_messages(file: Path | None) -> Iterator[None]:
+    """The file of a study before what is wrong with it."""
+    try:
+        yield
+    except InputError as error:
+        where = "" if file is None else f"{file}: "
+        raise InputError(f"{where}{error}", error.code) from None
+
+
+def _validate(
+    content: dict[str, Any],
+    base: Path,
+    output: Path,
+    jobs: int,
+    resume: bool,
+    cluster: str | None,
+    place: Path | None,
+) -> None:
     """Do the runs of a study."""
     from gmwm._core.files import folder_to_fill, replaceable, written
     from gmwm.ins.montecarlo import Validation
     from gmwm.ins.spec import experiment_from
     from gmwm.report import write_validation_report
 
-    experiment = experiment_from(content, base)
+    with _named_in_messages(place):
+        experiment = experiment_from(content, base)
     with folder_to_fill(output) as folder:
         store = folder / "runs"
         table, page = (replaceable(folder / f"validation.{end}") for end in ("txt", "html"))
-        if not resume:
-            _cleared(store)
         with progress_bar("navigating", "runs") as bar:
-            validation = Validation.of(experiment, jobs=jobs, folder=store, progress=bar)
+            validation = Validation.of(
+                experiment, jobs=jobs, cluster=cluster, folder=store,
+                earlier="resume" if resume else "replace", progress=bar,
+            )  # fmt: skip
         text = str(validation)
         with written(table) as stream:
             stream.write(text + "\n")
@@ -148,13 +175,14 @@ def _validate(content: dict[str, Any], base: Path, output: Path, jobs: int, resu
     click.echo(f"\nwrote {table}\nwrote {report}")
 
 
-def _filter(content: dict[str, Any], base: Path, output: Path) -> None:
+def _filter(content: dict[str, Any], base: Path, output: Path, place: Path | None) -> None:
     """Filter real data."""
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.ins.field import Measured, Navigated
     from gmwm.report import write_navigated_report
 
-    measured = Measured.of(content, base)
+    with _named_in_messages(place):
+        measured = Measured.of(content, base)
     with folder_to_fill(output) as folder:
         paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
         navigated = Navigated.of(measured)
@@ -271,16 +299,3 @@ def _span(text: str) -> list[float]:
     except ValueError:
         raise InputError(f"--outage {text}: write START:LENGTH in seconds, e.g. 600:60") from None
     return [start, length]
-
-
-def _cleared(store: Path) -> None:
-    """Forget the runs of an earlier study."""
-    if store.exists() and not store.is_dir():
-        raise InputError(f"{store}: a file of that name is in the way, move it")
-    try:
-        for path in [*store.glob("runs-*.npz"), store / "study.json"]:
-            path.unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{store}: cannot be cleared ({error.strerror}): choose another place with -o"
-        ) from None

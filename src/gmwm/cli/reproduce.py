@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from gmwm.readers import Recording
-    from gmwm.study import Scenario
+    from gmwm.study import Study
 
 EXPERIMENTS = (
     "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
@@ -98,14 +98,14 @@ def reproduce(
         with folder_to_fill(output) as folder:
             _alone(experiment, folder, runs, seed, processes)
         return
-    from gmwm.study import FIGURES, SCENARIOS, run_scenario
+    from gmwm.study import FIGURES, STUDIES, run_study
 
-    scenario = FIGURES.get(experiment) or SCENARIOS[experiment]
+    study = FIGURES.get(experiment) or STUDIES[experiment]
     with folder_to_fill(output) as folder:
         try:
-            with progress_bar(scenario.name, "runs") as bar:
-                table = run_scenario(
-                    scenario, folder, runs=runs or scenario.runs, seed=seed,
+            with progress_bar(study.name, "runs") as bar:
+                table = run_study(
+                    study, folder, runs=runs or study.runs, seed=seed,
                     methods=methods or None, jobs=processes, resume=resume, cluster=cluster,
                     progress=bar,
                 )  # fmt: skip
@@ -116,9 +116,9 @@ def reproduce(
         if experiment in FIGURES:
             from gmwm.study import boxplots
 
-            written += boxplots(scenario, table, folder / experiment)
+            written += boxplots(study, table, folder / experiment)
         else:
-            written += _tables(scenario, table, seed, folder)
+            written += _tables(study, table, seed, folder)
     click.echo("\n".join(f"wrote {path}" for path in written))
 
 
@@ -139,12 +139,12 @@ def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:
     return target
 
 
-def _tables(scenario: Scenario, table: pa.Table, seed: int, folder: Path) -> list[Path]:
+def _tables(study: Study, table: pa.Table, seed: int, folder: Path) -> list[Path]:
     from gmwm._core.files import written
     from gmwm.study import summarise
 
-    summary = summarise(scenario, table, seed)
-    targets = [folder / f"{scenario.name}.txt", folder / f"{scenario.name}.md"]
+    summary = summarise(study, table, seed)
+    targets = [folder / f"{study.name}.txt", folder / f"{study.name}.md"]
     for target, text in zip(targets, (str(summary), summary.markdown()), strict=True):
         with written(target) as stream:
             stream.write(text + "\n")

@@ -14,7 +14,7 @@ from .filter.aiding import (
 )
 from .filter.filter import InitialSd as InitialSd, navigate as navigate
 from .filter.mechanization import integrate as integrate
-from .filter.solution import Innovations as Innovations, Solution as Solution
+from .filter.solution import FilterInnovations as FilterInnovations, Solution as Solution
 from .imu.emulation import Imu as Imu, emulate as emulate
 from .imu.recorded import Recorded as Recorded
 from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
@@ -25,8 +25,8 @@ from .montecarlo.consistency import (
     over_time as over_time,
 )
 from .montecarlo.experiment import Experiment as Experiment
+from .montecarlo.filter_errors import FilterErrors as FilterErrors
 from .montecarlo.outage_errors import difference as difference, spread as spread
-from .montecarlo.runs import Runs as Runs
 from .montecarlo.scenario import Scenario as Scenario, Simulated as Simulated
 from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
 from .montecarlo.validation import Validation as Validation

@@ -14,6 +14,7 @@ from gmwm.process.parameter import parameter
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 8
+_PEAK, _PEAK_AT = 0.618, 1.89  # of sigma and of tau: the top of the Allan deviation, IEEE Std 952
 
 
 class GaussMarkov(Process):
@@ -34,6 +35,11 @@ class GaussMarkov(Process):
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
         super().__init__(sigma, tau)
+
+    @classmethod
+    def of_peak(cls, deviation: float, averaging: float) -> GaussMarkov:
+        """The process whose Allan deviation has its top at a height (u) and a place (s)."""
+        return cls(deviation / _PEAK, averaging / _PEAK_AT)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * exponential_psd(dt / self.tau, f, dt)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import stat
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -105,15 +105,8 @@ def read(
 
 
 def _open(path: Path) -> Table:
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError):  # ValueError: a null character in the name
-        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path} is a directory: name a file in it")
-    if path.suffix.lower() in (".npy", ".npz"):
-        return ArrayTable.open(path)
-    return CsvTable.open(path)
+    kind = ArrayTable if path.suffix.lower() in (".npy", ".npz") else CsvTable
+    return kind.open(existing_file(path))
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

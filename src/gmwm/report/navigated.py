@@ -33,7 +33,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
     text = environment.get_template("navigated.html").render(
         title=navigated.measured.title,
         version=gmwm.__version__,
-        verdict=navigated.verdict,
+        verdict=navigated.verdict.text,
         track=svg(navigated.plot_track()),
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],

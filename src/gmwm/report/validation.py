@@ -49,7 +49,7 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         rate=f"{1.0 / study.truth.dt:g}",
         runs=study[validation.names[0]].runs,
         seed=experiment.seed,
-        notes=(*study.notes, *validation.divergences),
+        notes=validation.notices,
         names=validation.names,
         reached=validation.reached,
         sentences=_sentences(validation),

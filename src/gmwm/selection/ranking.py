@@ -155,14 +155,13 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     ramped: list[Candidate] = []
     if without > tuning.RAMP_PLAUSIBLE:
         target, drift_free = _drift_free(wv, slope, choices)
-        if slope_p_value(wv, drift_free.mixture.psd) > tuning.RAMP_P:
-            return [candidate for candidate, _ in plain]
-        if drift_free.discrepancy < allowed:
-            # Both kinds must be compared under the same allowance.
-            allowed = drift_free.discrepancy
-            plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
-        found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
-        ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
+        if slope_p_value(wv, drift_free.mixture.psd) < tuning.RAMP_P:
+            if drift_free.discrepancy < allowed:
+                # Both kinds must be compared under the same allowance.
+                allowed = drift_free.discrepancy
+                plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
+            found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
+            ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
     return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
 
 

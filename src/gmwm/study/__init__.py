@@ -5,14 +5,14 @@ from gmwm.study.choice import choice_study, choice_table
 from gmwm.study.demo import compare, simulated_imu
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
-from gmwm.study.runs import run_scenario
-from gmwm.study.scenario import FIGURES, SCENARIOS, Scenario
+from gmwm.study.runs import run_study
+from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
 
 __all__ = [
     "FIGURES",
-    "SCENARIOS",
-    "Scenario",
+    "STUDIES",
+    "Study",
     "boxplots",
     "choice_study",
     "choice_table",
@@ -20,7 +20,7 @@ __all__ = [
     "converge",
     "convergence_table",
     "reproduce_figure",
-    "run_scenario",
+    "run_study",
     "simulated_imu",
     "summarise",
 ]

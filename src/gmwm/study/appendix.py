@@ -15,8 +15,9 @@ from functools import partial
 
 import numpy as np
 
+from gmwm._core.runs import do_runs
 from gmwm._core.typing import FloatArray
-from gmwm.estimate import fit
+from gmwm.estimate import estimate
 from gmwm.process import RandomWalk, WhiteNoise
 from gmwm.variance import wavelet_variance
 
@@ -82,27 +83,23 @@ def expectation() -> FloatArray:
 
 def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
     """Monte Carlo for growing length, Allan lines and GMWM on the same series."""
-    from joblib import Parallel, delayed
-
     result = []
     for n in LENGTHS:
         work = partial(_one_run, n, seed)
-        pairs = Parallel(n_jobs=jobs)(delayed(work)(run) for run in range(runs))
-        estimates = np.array(pairs)
+        estimates = do_runs(work, runs, {}, jobs=jobs)["estimates"]
         mean = estimates.mean(axis=0)
         error = estimates.std(axis=0, ddof=1) / np.sqrt(runs)
         result.append(Convergence(n, runs, expectation(), mean[0], error[0], mean[1], error[1]))
     return result
 
 
-def _one_run(n: int, seed: int, run: int) -> list[FloatArray]:
+def _one_run(n: int, seed: int, run: int) -> dict[str, FloatArray]:
+    """Both estimates of both parameters, (2, 2)."""
     series = TRUTH.simulate(n, 1.0, np.random.default_rng([seed, n, run]))
     wv = wavelet_variance(series, 1.0)
-    params = fit(TRUTH.opened(), wv).params
-    return [
-        allan_least_squares(wv.tau, wv.allan_variance),
-        np.array([params["N"] ** 2, params["K"] ** 2]),
-    ]
+    params = estimate(TRUTH.opened(), wv).params
+    lines = allan_least_squares(wv.tau, wv.allan_variance)
+    return {"estimates": np.array([lines, [params["N"] ** 2, params["K"] ** 2]])}
 
 
 def convergence_table(rows: list[Convergence]) -> str:

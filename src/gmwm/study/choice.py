@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from gmwm._core.runs import do_runs
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -79,19 +81,22 @@ def choose(index: int, n: int, seed: int) -> tuple[bool, int]:
 
 def choice_study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> list[Choice]:
     """Choose models for ``runs`` series of every truth and length, in parallel processes."""
-    from joblib import Parallel, delayed, parallel_config
-
     cases = [(index, n) for n in lengths for index in range(len(TRUTHS))]
-    with parallel_config("loky", inner_max_num_threads=1):
-        found = Parallel(n_jobs=jobs)(
-            delayed(choose)(index, n, seed + run) for index, n in cases for run in range(runs)
-        )
-    result = []
-    for place, (index, n) in enumerate(cases):
-        part = found[place * runs : (place + 1) * runs]
-        right = sum(is_right for is_right, _ in part)
-        result.append(Choice(TRUTHS[index], n, runs, right, Counter(more for _, more in part)))
-    return result
+    found = do_runs(partial(_choose, cases, runs, seed), len(cases) * runs, {}, jobs=jobs)
+    right, surplus = (found[name].reshape(-1, runs) for name in ("right", "surplus"))
+    return [
+        Choice(TRUTHS[index], n, runs, int(np.sum(right[i])), Counter(surplus[i].tolist()))
+        for i, (index, n) in enumerate(cases)
+    ]
+
+
+def _choose(
+    cases: Sequence[tuple[int, int]], runs: int, seed: int, number: int
+) -> dict[str, bool | int]:
+    """A run among those of all cases."""
+    case, run = divmod(number, runs)
+    right, surplus = choose(*cases[case], seed + run)
+    return {"right": right, "surplus": surplus}
 
 
 def choice_table(choices: Sequence[Choice]) -> str:

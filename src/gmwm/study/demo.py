@@ -6,38 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.units import SI_UNIT, factor, field_units
+from gmwm._core.units import SI_UNIT, field_units
 from gmwm.estimate.result import Fit
-from gmwm.process import GaussMarkov, Model, WhiteNoise
+from gmwm.process import Model
 from gmwm.readers import Channel, Recording
+from gmwm.study.sensor_tables import TABLE_6
 
 RATE = 100.0
 """Hz."""
-
-_DEG_PER_HOUR = factor("deg/h", "rad/s")
-_GYRO_DENSITY = factor("deg/h/sqrt(Hz)", "rad/s/sqrt(Hz)")
-_MICRO_G = factor("ug", "m/s^2")
-_ACCEL_DENSITY = factor("ug/sqrt(Hz)", "m/s^2/sqrt(Hz)")
-
-
-def table_six() -> dict[str, Model]:
-    """The paper's Table VI models by quantity, in SI units.
-
-    Gauss-Markov standard deviations in deg/h and ug, correlation times 1/beta in seconds.
-    """
-    gyro = WhiteNoise(140.0 * _GYRO_DENSITY) + Model(
-        tuple(
-            GaussMarkov(sigma * _DEG_PER_HOUR, 1.0 / beta)
-            for sigma, beta in ((113.0, 0.0005), (65.0, 0.05), (206.0, 10.0))
-        )
-    )
-    accel = WhiteNoise(140.0 * _ACCEL_DENSITY) + Model(
-        tuple(
-            GaussMarkov(sigma * _MICRO_G, 1.0 / beta)
-            for sigma, beta in ((5.0, 0.04), (13.0, 0.002))
-        )
-    )
-    return {"gyro": gyro, "accel": accel}
 
 
 def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model]]:
@@ -57,9 +33,7 @@ def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model
     """
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE)
-    truth = {
-        f"{quantity}_{axis}": model for quantity, model in table_six().items() for axis in "xyz"
-    }
+    truth = TABLE_6.models
     channels = []
     for name, model in truth.items():
         quantity = name.split("_")[0]

@@ -10,32 +10,32 @@ import pyarrow as pa
 from gmwm import plotting
 from gmwm._core.files import moved_into_place
 from gmwm._core.typing import FloatArray
-from gmwm.study.scenario import Scenario
+from gmwm.study.studies import Study
 
 
-def boxplots(scenario: Scenario, table: pa.Table, stem: Path) -> list[Path]:
+def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
     """Draw one panel a quantity, one box a method; returns the PNG and the SVG.
 
     Parameters
     ----------
-    scenario : Scenario
+    study : Study
     table : pyarrow.Table
-        As `gmwm.study.runs.run_scenario` gives it.
+        As `gmwm.study.runs.run_study` gives it.
     stem : Path
         Where to, without suffix.
     """
     import matplotlib.pyplot as plt
 
     names = np.array(table["method"].to_pylist())
-    methods = [m for m in scenario.methods if m in set(names)]
+    methods = [m for m in study.methods if m in set(names)]
     panels = {
         quantity.name: {
             method: _finite(table[quantity.name].to_numpy()[names == method]) for method in methods
         }
-        for quantity in scenario.quantities
+        for quantity in study.quantities
     }
-    truths = {quantity.name: scenario.true_value(quantity) for quantity in scenario.quantities}
-    figure = plotting.boxes(panels, truths, title=f"{scenario.title} (dashed: truth)")
+    truths = {quantity.name: study.true_value(quantity) for quantity in study.quantities}
+    figure = plotting.boxes(panels, truths, title=f"{study.title} (dashed: truth)")
     written = []
     for suffix in (".png", ".svg"):
         target = stem.with_suffix(suffix)

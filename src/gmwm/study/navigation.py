@@ -21,37 +21,17 @@ from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
 from gmwm.estimate import fit
 from gmwm.estimate.result import Fit
+from gmwm.ins import tuning
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.montecarlo import Experiment, Scenario, Simulated, Validation
-from gmwm.ins.spec import sensor_models
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording
+from gmwm.study.sensor_tables import TABLE_5, TABLE_6
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-TABLE_5 = sensor_models(
-    {
-        "gyro": {"N": "720 deg/h/sqrt(Hz)", "GM": [["180 deg/h", 1000.0]]},
-        "accel": {"N": "100000 ug/sqrt(Hz)", "GM": [["40000 ug", 100.0]]},
-    },
-    "Table V",
-)
-"""What the paper's filter was tuned to by hand."""
-
-TABLE_6 = sensor_models(
-    {
-        "gyro": {
-            "N": "140 deg/h/sqrt(Hz)",
-            "GM": [["113 deg/h", 2000.0], ["65 deg/h", 20.0], ["206 deg/h", 0.1]],
-        },
-        "accel": {"N": "140 ug/sqrt(Hz)", "GM": [["5 ug", 25.0], ["13 ug", 500.0]]},
-    },
-    "Table VI",
-)
-"""What the paper's GMWM found in an XSens MTi-G, read as plain standard deviations."""
 
 FIGURES = ("fig5", "fig6", "fig7", "fig8", "fig9")
 
@@ -59,7 +39,6 @@ _OF_ONE_GYRO = ("fig5", "fig6")
 _HOURS, _RATE = 4.5, 100.0
 _SHOWN = "gyro_x"  # of the Allan plots
 _RUNS = 100
-_PEAK, _PEAK_AT = 0.618, 1.89  # Allan deviation of a Gauss-Markov process: height, place
 _TEN = 10.0  # the folk rule
 _HELICOPTER = (Outage(600.0, 60.0), Outage(1100.0, 60.0), Outage(1500.0, 60.0))
 _CAR = (Outage(500.0, 60.0), Outage(900.0, 60.0))
@@ -111,7 +90,7 @@ def _from_lines(fitted: Fit) -> Model:
     elif "B" in regions:
         floor = regions["B"]
         centre = float(np.sqrt(floor.tau_min * floor.tau_max))
-        terms.append(GaussMarkov(floor.coefficient / _PEAK, centre / _PEAK_AT))
+        terms.append(GaussMarkov.of_peak(floor.coefficient, centre))
     return Model(tuple(terms))
 
 
@@ -142,7 +121,7 @@ def experiment(
     """
     trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
     outages = _HELICOPTER if vehicle == "helicopter" else _CAR
-    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=(0.1, 0.1, 0.15)), outages)
+    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=tuning.VELOCITY_SD), outages)
     lines = calibrated.line_models()
     filters = {"GMWM": SensorModels.of(calibrated.gmwm), "AV": lines}
     if recordings:

@@ -1,4 +1,4 @@
-"""What the runs of a scenario say: errors against the truth, the bound and the paper."""
+"""What the runs of a study say: errors against the truth, the bound and the paper."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import cramer_rao
-from gmwm.study.scenario import Quantity, Scenario
+from gmwm.study.studies import Quantity, Study
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Score:
     moment_ratio : float
         ``relative`` over the bound of estimators by wavelet variances.
     coverage : float
-        Share of the runs whose 95 % interval holds the truth.
+        Fraction of the runs whose 95 % interval holds the truth.
     missing : int
         Runs without an estimate.
     published : float
@@ -49,11 +50,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Summary:
-    """All methods on all quantities of a scenario.
+    """All methods on all quantities of a study.
 
     Attributes
     ----------
-    scenario : Scenario
+    study : Study
     runs : int
     seed : int
     scores : mapping
@@ -68,7 +69,7 @@ class Summary:
         Method -> median time of an estimate, s.
     """
 
-    scenario: Scenario
+    study: Study
     runs: int
     seed: int
     scores: Mapping[tuple[str, str], Score]
@@ -79,11 +80,11 @@ class Summary:
 
     @property
     def methods(self) -> list[str]:
-        """Methods in the order of the scenario."""
-        return [m for m in self.scenario.methods if m in self.invalid]
+        """Methods in the order of the study."""
+        return [m for m in self.study.methods if m in self.invalid]
 
     def __str__(self) -> str:
-        s = self.scenario
+        s = self.study
         lines = [
             s.title,
             f"{self.runs:,} runs of {s.n:,} samples at {1.0 / s.dt:g} Hz, seed {self.seed}",
@@ -111,14 +112,14 @@ class Summary:
             "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for",
             "estimates by Haar wavelet variances only; covers: 95 % intervals",
         ]
-        return "\n".join([*lines, *(_wrapped(note) for note in s.notes)])
+        return "\n".join([*lines, *(line for note in s.notes for line in wrapped(note, "- ", 2))])
 
     def markdown(self) -> str:
         """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""
         head = ["", *self.methods, "Cramer-Rao bound"]
         rows = [head, ["---"] * len(head)]
-        for quantity in self.scenario.quantities:
-            name, truth = quantity.name, abs(self.scenario.true_value(quantity))
+        for quantity in self.study.quantities:
+            name, truth = quantity.name, abs(self.study.true_value(quantity))
             scores = [self.scores[name, method] for method in self.methods]
             bound = self.bounds[name]
             rows.append(
@@ -135,19 +136,19 @@ class Summary:
         return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
-def summarise(scenario: Scenario, table: pa.Table, seed: int) -> Summary:
-    """Scores of all methods in ``table``, as `gmwm.study.runs.run_scenario` gives it."""
-    bound = cramer_rao(scenario.truth, scenario.n, scenario.dt)
+def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
+    """Scores of all methods in ``table``, as `gmwm.study.runs.run_study` gives it."""
+    bound = cramer_rao(study.truth, study.n, study.dt)
     names = np.array(table["method"].to_pylist())
-    methods = [m for m in scenario.methods if m in set(names)]
+    methods = [m for m in study.methods if m in set(names)]
     scores, bounds, moment_bounds = {}, {}, {}
-    for quantity in scenario.quantities:
-        true = scenario.truth.params[quantity.key] or 1.0
+    for quantity in study.quantities:
+        true = study.truth.params[quantity.key] or 1.0
         factor = abs(quantity.power / true)
         best = bound.stderr[quantity.key] * factor
         moments = bound.wavelet_stderr[quantity.key] * factor
         bounds[quantity.name], moment_bounds[quantity.name] = best, moments
-        value = scenario.true_value(quantity)
+        value = study.true_value(quantity)
         columns = [table[quantity.name + end].to_numpy() for end in ("", "_lower", "_upper")]
         for method in methods:
             chosen = [column[names == method] for column in columns]
@@ -155,7 +156,7 @@ def summarise(scenario: Scenario, table: pa.Table, seed: int) -> Summary:
     valid = np.array(table["valid"].to_pylist())
     seconds = table["seconds"].to_numpy()
     return Summary(
-        scenario=scenario,
+        study=study,
         runs=len(set(table["run"].to_pylist())),
         seed=seed,
         scores=scores,
@@ -202,9 +203,3 @@ def _line(quantity: Quantity, method: str, x: Score) -> str:
 
 def _cell(absolute: float, relative: float) -> str:
     return "-" if np.isnan(relative) else f"{absolute:.3g} ({relative:.3g})"
-
-
-def _wrapped(note: str) -> str:
-    import textwrap
-
-    return textwrap.fill(note, 80, initial_indent="- ", subsequent_indent="  ")

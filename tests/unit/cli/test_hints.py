@@ -27,9 +27,11 @@ def test_every_option_that_is_named_exists(code):
     assert options.issuperset(named)
 
 
-@pytest.mark.parametrize("room", ["readers", "diagnosis", "calibration", "export", "report"])
+@pytest.mark.parametrize(
+    "room", ["readers", "diagnosis", "calibration", "export", "report", "ins", "study"]
+)
 def test_messages_of_the_library_name_no_option(room):
-    for path in (ROOT / room).glob("*.py"):
+    for path in (ROOT / room).rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             text = node.value if isinstance(node, ast.Constant) else None
             assert not (isinstance(text, str) and re.search(r"(?<![-\w])--[a-z]", text)), path

@@ -8,14 +8,15 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.study.demo import RATE, compare, simulated_imu, table_six
+from gmwm.study.demo import RATE, compare, simulated_imu
+from gmwm.study.sensor_tables import TABLE_6
 
 DEG_PER_HOUR = pi / 180.0 / 3600.0
 MICRO_G = 9.80665e-6
 
 
 def test_table_six_in_si():
-    models = table_six()
+    models = {"gyro": TABLE_6.models["gyro_x"], "accel": TABLE_6.models["accel_x"]}
     assert list(models) == ["gyro", "accel"]
     gyro = {"N": 140.0 * DEG_PER_HOUR}
     # By rising correlation time, 1/beta.
@@ -30,8 +31,8 @@ def test_table_six_in_si():
 
 def test_gyro_white_noise_in_numbers():
     # 140 deg/h/sqrt(Hz) = 2.333 deg/sqrt(h) = 6.787e-4 rad/s/sqrt(Hz)
-    assert table_six()["gyro"].params["N"] == pytest.approx(6.787e-4, rel=1e-3)
-    assert table_six()["accel"].params["N"] == pytest.approx(1.373e-3, rel=1e-3)
+    assert TABLE_6.models["gyro_x"].params["N"] == pytest.approx(6.787e-4, rel=1e-3)
+    assert TABLE_6.models["accel_x"].params["N"] == pytest.approx(1.373e-3, rel=1e-3)
 
 
 def test_simulated_recording():
@@ -42,7 +43,7 @@ def test_simulated_recording():
     assert recording.rate == pytest.approx(RATE)
     assert recording.n == 100 * RATE
     assert "seed 3" in recording.source
-    models = table_six()
+    models = {"gyro": TABLE_6.models["gyro_x"], "accel": TABLE_6.models["accel_x"]}
     for channel in recording.values():
         model = models[channel.quantity]
         assert channel.name.startswith(channel.quantity)

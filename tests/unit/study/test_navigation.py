@@ -11,7 +11,8 @@ from gmwm.ins.imu.sensors import AXES
 from gmwm.process import BiasInstability
 from gmwm.readers.recording import Recording
 from gmwm.study import navigation
-from gmwm.study.navigation import TABLE_5, TABLE_6, Calibrated, experiment, reproduce_figure
+from gmwm.study.navigation import Calibrated, experiment, reproduce_figure
+from gmwm.study.sensor_tables import TABLE_5, TABLE_6
 from gmwm.variance.analysis import wavelet_variance
 
 RATE, N = 20.0, 60_000

@@ -6,10 +6,10 @@ import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
 from gmwm.study.figures import boxplots
-from gmwm.study.scenario import FIGURES, SCENARIOS, Estimation, Quantity, Scenario
+from gmwm.study.studies import FIGURES, STUDIES, Estimation, Quantity, Study
 from gmwm.study.summary import summarise
 
-WHITE = Scenario(
+WHITE = Study(
     name="white",
     title="White noise",
     truth=Model((WhiteNoise(0.2),)),
@@ -113,4 +113,4 @@ def test_scenarios_are_those_of_the_paper():
             "beta_3": 2.0, "sigma2_3": 29.5e-6,
         }
     )  # fmt: skip
-    assert len(SCENARIOS["five-gm"].truth.terms) == 6
+    assert len(STUDIES["five-gm"].truth.terms) == 6

@@ -26,6 +26,7 @@ def conclude_moments(
     design: Design,
     moments: Moments,
     covariance: FloatArray,
+    statistical: FloatArray,
     point: Point,
     basis: FloatArray,
     weights: Weights,
@@ -41,6 +42,8 @@ def conclude_moments(
         What was fitted.
     covariance : (J, J) ndarray
         Of the moments under the fitted model, with the discrepancy, u^4.
+    statistical : (J, J) ndarray
+        The same without it.
     point : Point
         The minimum.
     basis : (J,) ndarray
@@ -66,7 +69,7 @@ def conclude_moments(
         },
         slope=moments.slope if moments.slope_is_free else None,
     )
-    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1], discrepancy)
+    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1], statistical)
     notices = [
         *limit_notices(design, point.shapes, point.x),
         *redundant_notices(
@@ -75,8 +78,7 @@ def conclude_moments(
         *level_notices(target.size, design.n_free),
     ]
     if discrepancy > 0.0:
-        statistical = np.diag(covariance) - (discrepancy * target) ** 2
-        notices += misfit_notices(moments.wv, target, implied, statistical, discrepancy)
+        notices += misfit_notices(moments.wv, target, implied, np.diag(statistical), discrepancy)
     return conclude(
         found, comparison, moments.wv, method=method, weights=weights.name,
         discrepancy=discrepancy, notices=notices,

@@ -90,8 +90,8 @@ class GMWM:
             if settled is None:
                 settled = _under_reference(design, state, level, weights, extra)
         return conclude_moments(
-            design, settled.moments, settled.covariance, settled.point, settled.basis, weights,
-            self.name, level.value,
+            design, settled.moments, settled.covariance, settled.statistical, settled.point,
+            settled.basis, weights, self.name, level.value,
         )  # fmt: skip
 
 
@@ -141,6 +141,8 @@ class State:
     moments : Moments
     covariance : (J, J) ndarray
         Of the moments, with the discrepancy, u^4.
+    statistical : (J, J) ndarray
+        The same without it.
     point : Point
         The minimum under it.
     basis : (J,) ndarray
@@ -149,6 +151,7 @@ class State:
 
     moments: Moments
     covariance: FloatArray
+    statistical: FloatArray
     point: Point
     basis: FloatArray
 
@@ -159,7 +162,7 @@ def _begun(
     """The minimum under the weights of the reference mixture."""
     covariance = level.added_to(reference.covariance, moments.target)
     point = search(Profile(design, moments.target, weights.root(covariance)))
-    return State(moments, covariance, point, reference.curve)
+    return State(moments, covariance, reference.covariance, point, reference.curve)
 
 
 def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights) -> State | None:
@@ -187,7 +190,7 @@ def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights)
         if converged or _discrepancy_is_due(level.value, rounds):
             changed = level.update(moments.target - curve, statistical, moments.target, previous)
             if converged and not changed:
-                return State(moments, covariance, point, curve)
+                return State(moments, covariance, statistical, point, curve)
         elif rounds > 1:
             ratio = float(step @ before) / max(float(before @ before), 1e-300)
             part = float(np.clip(part / max(1.0 - ratio, 0.5), tuning.LEAST_PART, 1.0))
@@ -216,7 +219,7 @@ def _under_reference(
         residual = moments.target - _implied(design, point)
         if not level.update(residual, statistical, moments.target, reference.curve):
             break
-    return State(moments, covariance, point, reference.curve)
+    return State(moments, covariance, statistical, point, reference.curve)
 
 
 def _discrepancy_is_due(value: float, rounds: int) -> bool:

@@ -92,19 +92,18 @@ class Comparison:
         covariance: FloatArray,
         basis: FloatArray,
         n_free: int,
-        discrepancy: float = 0.0,
+        statistical: FloatArray | None = None,
     ) -> Comparison:
         """Compare under a covariance that belongs to the wavelet variances ``basis``.
 
-        ``covariance`` holds the relative ``discrepancy`` of the target.
+        ``statistical`` is the covariance less the discrepancy, where there is one.
         """
         whitened = weight_root(covariance) @ (target - implied)
         dof = target.size - n_free
         plain = allowed = float("nan")
         if dof > 0 and np.all(basis > 0.0):
             plain = allowed = chi_square(target, implied, covariance, basis)[1]
-            if discrepancy > 0.0:
-                statistical = covariance - np.diag((discrepancy * target) ** 2)
+            if statistical is not None:
                 plain = chi_square(target, implied, statistical, basis)[1]
         return cls(float(whitened @ whitened), plain, allowed, dof)
 

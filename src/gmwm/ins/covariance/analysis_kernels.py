@@ -1,4 +1,4 @@
-"""The true covariance of a filter whose model is not the truth, carried along a trajectory.
+"""The true covariance of a filter whose model is not the truth, propagated along a trajectory.
 
 The joint vector holds the navigation errors, the filter's estimates of its sensor states and the
 true sensor states. It obeys linear equations along the true trajectory: the filter's estimates
@@ -17,9 +17,9 @@ from gmwm.ins.filter import (
     IS_POSITION,
     IS_VELOCITY,
     IntArray,
-    carry,
     measurement_row,
-    take_in,
+    measurement_update,
+    propagate,
     tilt_squared,
     transition,
 )
@@ -88,7 +88,7 @@ def run_both(
     second_order: bool,
     out_epoch: IntArray, out_before: IntArray, out_P: FloatArray, out_J: FloatArray,
 ) -> None:  # fmt: skip
-    """Carry a filter's covariance and the joint second moments through a scenario.
+    """Propagate a filter's covariance and the joint second moments through a scenario.
 
     Parameters
     ----------
@@ -120,13 +120,13 @@ def run_both(
         count = samples[s]
         if count > 0:
             transition(mid_v[s], mid_lla[s], mid_matrix[s], count * dt, F, A, B)
-            carry(P, A, B, axis, partner, phi[count], phi_off[count], gain[count], noise[count],
+            propagate(P, A, B, axis, partner, phi[count], phi_off[count], gain[count], noise[count],
                   noise_off[count], cross[count], integral[count], S, T, U, row)  # fmt: skip
-            carry(J, A, B, j_axis, j_partner, j_phi[count], j_phi_off[count], j_gain[count],
+            propagate(J, A, B, j_axis, j_partner, j_phi[count], j_phi_off[count], j_gain[count],
                   j_noise[count], j_noise_off[count], j_cross[count], j_integral[count],
                   j_S, j_T, U, j_row)  # fmt: skip
             if second_order:
-                # The mean is taken off, and that of the filter is nearly the true one.
+                # The mean is subtracted, and that of the filter is nearly the true one.
                 g = gravity(mid_lla[s, 0], mid_lla[s, 2])
                 gathered = tilt_squared(P, g, count * dt, gathered)[1]
                 j_gathered = tilt_squared(J, g, count * dt, j_gathered)[1]
@@ -144,7 +144,7 @@ def run_both(
                 if kind == IS_POSITION and coloured[component] >= 0:
                     state = estimate = 9 + coloured[component]
                     truth = 9 + j_coloured[component]
-                take_in(P, h, state, sd * sd, 0.0, x, K)
+                measurement_update(P, h, state, sd * sd, 0.0, x, K)
                 take_in_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
             if kind in (IS_POSITION, IS_VELOCITY):
                 gathered = j_gathered = 0.0

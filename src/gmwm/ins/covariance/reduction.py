@@ -13,6 +13,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.covariance.analysis import Analysis, Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
@@ -24,14 +25,8 @@ FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "
 """Forms of a reduced model, with their parameters."""
 
 _KINDS = ("gyro", "accel")
-_SETTLING = 120.0  # s, before the first outage and between them
 _JUDGED = slice(0, 6)  # position and velocity
-_WHITE_TAU = 1.0  # s, where white noise is read off an Allan plot
-_PEAK = 0.382  # Allan variance of a Gauss-Markov process at its peak, over its variance
-_SHORTEST = 0.1  # of the correlation time read off, in s
 _DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
-_SLOPE = 3e-3  # of the score over the logarithm of a factor, below which the search ends
-_INERTIA = 1e-3  # keeps a factor near 1 that does not matter
 _STEPS = 60
 
 
@@ -159,13 +154,13 @@ def reduce(
         analysis = course.analyse(truth, scaled(logs))
         score = analysis.score(_JUDGED)
         total = float(np.sum([score[analysis.index(o.end)] for o in scenario.outages]))
-        return total + _INERTIA * float(logs @ logs)
+        return total + tuning.INERTIA * float(logs @ logs)
 
     found = minimize(
         cost,
         np.zeros(len(names)),
         method="BFGS",
-        options={"eps": _DIFFERENCE, "gtol": _SLOPE, "maxiter": _STEPS},
+        options={"eps": _DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": _STEPS},
     )
     best = scaled(found.x)
     analyses = [course.analyse(truth, each) for each in (truth, start, best)]
@@ -194,19 +189,20 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
     for axis in AXES:
         model = models.models[axis]
         deviation = np.sqrt(2.0 * model.haar_variance(tau, dt))
-        white = float(np.interp(np.log(_WHITE_TAU), np.log(tau), deviation)) * np.sqrt(_WHITE_TAU)
+        white = float(np.interp(np.log(tuning.WHITE_AT), np.log(tau), deviation)) * np.sqrt(
+            tuning.WHITE_AT
+        )
         if form == "N+K":
             at_end = float(np.interp(np.log(longest), np.log(tau), deviation))
             reduced[axis] = WhiteNoise(white) + RandomWalk(at_end * np.sqrt(3.0 / longest))
         else:
-            slow = np.where(tau > _WHITE_TAU, deviation, 0.0)
+            slow = np.where(tau > tuning.WHITE_AT, deviation, 0.0)
             # Without the white noise's own part, the maximum is that of the slow terms.
             rest = np.sqrt(np.maximum(slow**2 - white**2 / tau, 0.0))
             top = int(np.argmax(rest))
             height = float(rest[top]) or float(deviation[-1])
-            reduced[axis] = WhiteNoise(white) + GaussMarkov(
-                height / np.sqrt(_PEAK), max(float(tau[top]) / 1.89, _SHORTEST)
-            )
+            at = max(float(tau[top]), tuning.SHORTEST_PEAK)
+            reduced[axis] = WhiteNoise(white) + GaussMarkov.of_peak(height, at)
         bias_sd[axis] = _initial_sd(models, axis, dt) if form == "N+K" else 0.0
     return SensorModels(reduced, bias_sd)
 
@@ -220,13 +216,13 @@ def _initial_sd(models: SensorModels, axis: str, dt: float) -> float:
 
 def _default_scenario(lengths: Sequence[float], dt: float) -> Scenario:
     outages = []
-    start = _SETTLING
+    start = tuning.SETTLING
     for length in lengths:
         outages.append(Outage(start, checks.positive("outage length", length)))
         # Ends at a fix: those of one second.
-        start = float(np.ceil(start + length + _SETTLING))
-    trajectory = fixed_wing_loiter(duration=max(start, 2.0 * _SETTLING), dt=dt)
-    return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=_SETTLING)
+        start = float(np.ceil(start + length + tuning.SETTLING))
+    trajectory = fixed_wing_loiter(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
+    return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=tuning.SETTLING)
 
 
 def _scaled(models: SensorModels, factors: Mapping[str, float]) -> SensorModels:

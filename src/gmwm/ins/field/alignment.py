@@ -10,11 +10,14 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes, InitialSd
 from gmwm.ins.geometry import (
     RATE,
+    STANDARD_GRAVITY,
     matrix_from_rpy,
     ned_difference,
     offset,
@@ -23,18 +26,6 @@ from gmwm.ins.geometry import (
 )
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.trajectory import NavState
-
-_WINDOW, _LEAST, _MOST = 0.5, 2.0, 30.0  # s
-_SEARCHED = 300.0  # s
-_STEADY = (0.01, 0.15)  # rad/s and m/s^2, of the means over a window about the first
-_SIGMAS = 5.0
-_GRAVITY = 9.80665  # m/s^2
-_TILT_FLOOR, _TILT_MOVING = np.radians(0.05), np.radians(1.0)
-_STILL_VELOCITY = 0.02  # m/s
-_COURSE_RATIO = 20.0  # speed over its standard deviation, at which a course is taken
-_CRAB = np.radians(2.0)  # between the course and the forward axis
-_CHORD = 5.0  # s
-_BEST_COMPASS = np.radians(5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +39,10 @@ class Alignment:
     state : NavState
     sd : InitialSd
     gyro_bias : (3,) ndarray
-        To be taken off the gyros, rad/s; zero if the vehicle never stood still.
+        Subtracted from the gyros, rad/s; zero if the vehicle never stood still.
     gyro_bias_sd : float or None
         How well it is known, rad/s; ``None`` if the vehicle never stood still.
-    notes : tuple of str
+    notices : tuple of Notice
         How it came about.
     """
 
@@ -60,7 +51,7 @@ class Alignment:
     sd: InitialSd
     gyro_bias: FloatArray
     gyro_bias_sd: float | None
-    notes: tuple[str, ...]
+    notices: tuple[Notice, ...]
 
 
 def align(
@@ -68,7 +59,7 @@ def align(
     aiding: Aiding,
     models: SensorModels,
     heading: float | None = None,
-    heading_sd: float = np.radians(2.0),
+    heading_sd: float = tuning.HEADING_SD,
 ) -> Alignment:
     """Find an initial state in the data.
 
@@ -125,8 +116,8 @@ def align(
         if not known:
             raise InputError(
                 "the heading cannot be known: GNSS shows no motion fast enough in the first "
-                f"{_SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: give "
-                "the heading",
+                f"{tuning.SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: "
+                "give the heading",
                 "heading-unknown",
             )
         yaw, yaw_sd, how = min(known, key=lambda each: each[1])
@@ -145,12 +136,21 @@ def align(
     )  # fmt: skip
     earth = C.T @ np.array([RATE * np.cos(lat), 0.0, -RATE * np.sin(lat)])
     known_sd = float(np.hypot(gyro_sd, RATE * np.hypot(yaw_sd, tilt_sd))) if still else None
-    notes = (
-        f"levelled by {(last - first) * imu.dt:.3g} s, {first * imu.dt:.6g} s after the start, "
-        + ("at rest; the gyros' mean there is taken off" if still else "in steady motion"),
-        f"{how}: {np.degrees(yaw) % 360.0:.2f} deg, 1 sigma {np.degrees(yaw_sd):.2g} deg",
-    )
-    return Alignment(epoch, state, sd, bias - earth if still else bias, known_sd, notes)
+    length, start = (last - first) * imu.dt, first * imu.dt
+    motion = "at rest; the gyros' mean there is subtracted" if still else "in steady motion"
+    notices = (
+        Notice(
+            "levelled", "note", "",
+            f"levelled by {length:.3g} s, {start:.6g} s after the start, {motion}",
+            {"length": length, "start": start, "at rest": still},
+        ),
+        Notice(
+            "heading", "note", "",
+            f"{how}: {np.degrees(yaw) % 360.0:.2f} deg, 1 sigma {np.degrees(yaw_sd):.2g} deg",
+            {"heading": yaw, "sd": yaw_sd},
+        ),
+    )  # fmt: skip
+    return Alignment(epoch, state, sd, bias - earth if still else bias, known_sd, notices)
 
 
 def _of_kind(aiding: Aiding, kind: str) -> Fixes | None:
@@ -166,13 +166,16 @@ def _steady(imu: Imu) -> tuple[int, int]:
     InputError
         If there is none.
     """
-    window = max(round(_WINDOW / imu.dt), 1)
-    count = min(imu.n, round(_SEARCHED / imu.dt)) // window
+    window = max(round(tuning.STEADY_WINDOW / imu.dt), 1)
+    count = min(imu.n, round(tuning.SEARCHED / imu.dt)) // window
     increments = np.hstack([imu.rotation, imu.velocity])[: count * window]
     means = increments.reshape(count, window, 6).mean(axis=1) / imu.dt
-    least, most = round(_LEAST / _WINDOW), round(_MOST / _WINDOW)
+    least, most = (
+        round(tuning.STEADY_LEAST / tuning.STEADY_WINDOW),
+        round(tuning.STEADY_MOST / tuning.STEADY_WINDOW),
+    )
     scatter = _scatter(increments.reshape(count, window, 6), imu.dt)
-    limit = np.maximum(np.repeat(_STEADY, 3), _SIGMAS * scatter)
+    limit = np.maximum(np.repeat(tuning.STEADY, 3), tuning.SIGMAS * scatter)
     begin = 0
     while begin + least <= count:
         end = begin + 1
@@ -184,8 +187,8 @@ def _steady(imu: Imu) -> tuple[int, int]:
             return begin * window, end * window
         begin = end
     raise InputError(
-        f"the IMU is steady for {_LEAST:g} s nowhere in the first {_SEARCHED:g} s: begin the "
-        "record where the vehicle stands still, to level by it"
+        f"the IMU is steady for {tuning.STEADY_LEAST:g} s nowhere in the first "
+        f"{tuning.SEARCHED:g} s: begin the record where the vehicle stands still, to level by it"
     )
 
 
@@ -207,8 +210,8 @@ def _motion(
         if np.any(inside):
             mean, sd = np.mean(velocity.value[inside], axis=0), np.mean(velocity.sd[inside], axis=0)
             sd = sd / np.sqrt(np.count_nonzero(inside))
-            if np.all(np.abs(mean) < _SIGMAS * sd):
-                return True, np.zeros(3), max(float(np.max(sd)), _STILL_VELOCITY)
+            if np.all(np.abs(mean) < tuning.SIGMAS * sd):
+                return True, np.zeros(3), max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
             return False, None, 0.0
     position = _of_kind(aiding, "position")
     assert position is not None
@@ -217,10 +220,10 @@ def _motion(
         return False, None, 0.0
     part = position.part(inside)
     sd = np.hypot(part.sd[0], part.sd[-1])
-    if np.any(np.abs(ned_difference(part.value[-1], part.value[0])) > _SIGMAS * sd):
+    if np.any(np.abs(ned_difference(part.value[-1], part.value[0])) > tuning.SIGMAS * sd):
         return False, None, 0.0
     speed_sd = float(np.max(sd)) / float(part.time[-1] - part.time[0])
-    return True, np.zeros(3), max(speed_sd, _STILL_VELOCITY)
+    return True, np.zeros(3), max(speed_sd, tuning.STILL_VELOCITY_SD)
 
 
 def _starting_fix(positions: Fixes, dt: float, first: int) -> tuple[int, int]:
@@ -268,7 +271,7 @@ def _course(
         turned = rpy_from_matrix(part)[:, 2] - rpy_from_matrix(C)[2]
     mean_turn = float(np.angle(np.mean(np.exp(1j * turned))))
     gone = drift * (0.5 * (begin + end) - epoch * imu.dt)
-    total = float(np.sqrt(sd**2 + _CRAB**2 + gone**2))
+    total = float(np.sqrt(sd**2 + tuning.CRAB_SD**2 + gone**2))
     return course - mean_turn, total, f"heading from GNSS, {begin:.6g} s after the start"
 
 
@@ -278,8 +281,8 @@ def _from_velocity(aiding: Aiding, start: float) -> tuple[float, float, float, f
         return None
     speed = np.hypot(velocity.value[:, 0], velocity.value[:, 1])
     sd = np.sqrt(np.mean(velocity.sd[:, :2] ** 2, axis=1))
-    fast = (speed > _COURSE_RATIO * sd) & (velocity.time >= start)
-    fast &= velocity.time <= start + _SEARCHED
+    fast = (speed > tuning.COURSE_RATIO * sd) & (velocity.time >= start)
+    fast &= velocity.time <= start + tuning.SEARCHED
     if not np.any(fast):
         return None
     i = int(np.argmax(fast))
@@ -293,14 +296,14 @@ def _from_chord(aiding: Aiding, start: float) -> tuple[float, float, float, floa
     positions = _of_kind(aiding, "position")
     assert positions is not None
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
-    begins = np.flatnonzero((time >= start - 1e-6) & (time <= start + _SEARCHED))
+    begins = np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED))
     for i in begins:
         for j in range(i + 1, time.size):
-            if time[j] - time[i] > _CHORD:
+            if time[j] - time[i] > tuning.CHORD:
                 break
             north, east, _ = ned_difference(positions.value[j], positions.value[i])
             length, error = np.hypot(north, east), np.hypot(sd[i], sd[j])
-            if length > _COURSE_RATIO * error:
+            if length > tuning.COURSE_RATIO * error:
                 course = float(np.arctan2(east, north))
                 return course, float(error / length), float(time[i]), float(time[j])
     return None
@@ -312,7 +315,7 @@ def _compass(
     """Heading from the Earth's rotation, if the gyros can tell it. Groves (2013), eq. 5.105."""
     north, east, _ = matrix_from_rpy(level) @ mean[:3]
     sd = float(gyro_sd / (RATE * np.cos(lat)))
-    if sd > _BEST_COMPASS:
+    if sd > tuning.COMPASS_SD:
         return None
     return float(np.arctan2(-east, north)), sd, "heading from the Earth's rotation"
 
@@ -327,7 +330,7 @@ def _first_velocity(aiding: Aiding, epoch: int, dt: float) -> tuple[FloatArray, 
     positions = _of_kind(aiding, "position")
     assert positions is not None
     i = int(np.argmin(np.abs(positions.time - epoch * dt)))
-    if i + 1 >= positions.time.size or positions.time[i + 1] - positions.time[i] > _CHORD:
+    if i + 1 >= positions.time.size or positions.time[i + 1] - positions.time[i] > tuning.CHORD:
         raise InputError("the first position fix has no other near it: begin where fixes are dense")
     step = positions.time[i + 1] - positions.time[i]
     way = ned_difference(positions.value[i + 1], positions.value[i])
@@ -356,8 +359,8 @@ def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> flo
         float(np.sqrt(_stationary(models, axis, dt))) for axis in AXES if axis.startswith("accel")
     ]
     error = np.hypot(max(slow), _mean_sd(models, "accel", length, dt))
-    sd = np.hypot(np.hypot(error, _bias(models, "accel")) / _GRAVITY, _TILT_FLOOR)
-    return float(sd if still else np.hypot(sd, _TILT_MOVING))
+    sd = np.hypot(np.hypot(error, _bias(models, "accel")) / STANDARD_GRAVITY, tuning.TILT_FLOOR)
+    return float(sd if still else np.hypot(sd, tuning.TILT_MOVING))
 
 
 def _stationary(models: SensorModels, axis: str, dt: float) -> float:
@@ -366,7 +369,7 @@ def _stationary(models: SensorModels, axis: str, dt: float) -> float:
 
 
 def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding]:
-    """Increments and fixes after the initial state, with the gyros' bias taken off.
+    """Increments and fixes after the initial state, with the gyros' bias subtracted.
 
     Parameters
     ----------

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.logs import (
     POSITION_WORDS,
@@ -18,6 +20,7 @@ from gmwm.ins.logs import (
     angle_unit,
     check_angles,
     check_rising,
+    find_columns,
     is_time,
     length_factor,
     open_log,
@@ -26,12 +29,6 @@ from gmwm.ins.logs import (
     words_of,
 )
 from gmwm.readers import TIME, CsvTable, label, meaning
-
-POSITION_SD = (1.0, 1.0, 1.5)
-"""Of fixes that say none, to the north, east and down, m."""
-
-VELOCITY_SD = (0.1, 0.1, 0.15)
-"""The same of velocities, m/s."""
 
 _POSITION = ("latitude", "longitude", "height")
 _VELOCITY = ("velocity north", "velocity east", "velocity down")
@@ -59,7 +56,7 @@ class FixLog:
     position_sd, velocity_sd : (E, 3) ndarray or None
         To the north, east and down; ``None`` where the file has none.
     source : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     time: FloatArray
@@ -68,13 +65,13 @@ class FixLog:
     position_sd: FloatArray | None
     velocity_sd: FloatArray | None
     source: str
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     def aiding(
         self,
         start: float = 0.0,
-        position_sd: Sequence[float] = POSITION_SD,
-        velocity_sd: Sequence[float] = VELOCITY_SD,
+        position_sd: Sequence[float] = tuning.POSITION_SD,
+        velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
         lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> Aiding:
         """The fixes on the clock of an IMU.
@@ -105,8 +102,8 @@ def read_fixes(
     path: str | os.PathLike[str],
     *,
     start: float = 0.0,
-    position_sd: Sequence[float] = POSITION_SD,
-    velocity_sd: Sequence[float] = VELOCITY_SD,
+    position_sd: Sequence[float] = tuning.POSITION_SD,
+    velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
     lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Aiding:
     """Read GNSS fixes.
@@ -149,11 +146,16 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     velocity = None
     if all(name in found for name in _VELOCITY):
         velocity = np.stack([found[name] for name in _VELOCITY], axis=1)
-    notes = [f"columns not used: {', '.join(unused)}"] if unused else []
+    notices = []
+    if unused:
+        text = f"columns not used: {', '.join(unused)}"
+        notices.append(Notice("columns-unused", "note", "", text, {"columns": ", ".join(unused)}))
     no_fix = (position[:, 0] == 0.0) & (position[:, 1] == 0.0)
     if np.any(no_fix):
         position[no_fix] = np.nan
-        notes.append(f"{np.count_nonzero(no_fix)} positions at 0, 0 are taken for missing")
+        count = int(np.count_nonzero(no_fix))
+        text = f"{count} positions at 0, 0 are counted as missing"
+        notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
     return FixLog(
         time=found[TIME] * (meaning(table.names[columns[TIME]]).seconds or 1.0),
         position=position,
@@ -163,7 +165,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         if velocity is None
         else _deviations(table, columns, found, "sd velocity ", velocity),
         source=table.source,
-        notes=tuple(notes),
+        notices=tuple(notices),
     )
 
 
@@ -197,25 +199,9 @@ def _quantities(name: str) -> tuple[str, ...]:
 
 def _columns(table: CsvTable) -> tuple[dict[str, int], list[str]]:
     """The column of each quantity, and the names of those that are none."""
-    columns: dict[str, int] = {}
-    unused = []
-    for column, name in enumerate(table.names):
-        found = _quantities(name)
-        if not found:
-            unused.append(name or str(column))
-        for quantity in found:
-            if quantity in columns:
-                raise InputError(
-                    f"{table.source}: columns {label(table.names, columns[quantity])} and "
-                    f"{label(table.names, column)} both look like {quantity}: rename one of them"
-                )
-            columns[quantity] = column
-    missing = [name for name in (TIME, *_POSITION) if name not in columns]
-    if missing:
-        raise InputError(
-            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
-            "like time_s,latitude_deg,longitude_deg,height_m"
-        )
+    columns, unused = find_columns(
+        table, _quantities, (TIME, *_POSITION), "time_s,latitude_deg,longitude_deg,height_m"
+    )
     for group in (_VELOCITY, tuple(f"sd {each}" for each in ("north", "east", "down")),
                   tuple(f"sd {each}" for each in _VELOCITY)):  # fmt: skip
         _check_all(table, columns, group)

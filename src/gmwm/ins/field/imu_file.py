@@ -10,14 +10,15 @@ from typing import Literal
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.ins import tuning
+from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
 from gmwm.readers import Recording, bare, read
 
 _CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
-_LEAST, _MOST = 0.5, 2.0  # of standard gravity
-_GRAVITY = 9.80665  # m/s^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,13 @@ class ImuLog:
     start : float
         Time of the first epoch on that clock, s; 0 without time stamps.
     source : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     imu: Imu
     start: float
     source: str
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
 
 def read_imu(
@@ -95,23 +96,26 @@ def read_imu_log(
             "after the first, is missing: fill the gap, or use the part before or after it"
         )
     force = float(np.linalg.norm(np.mean(samples[:, 3:], axis=0)))
-    if not _LEAST * _GRAVITY < force < _MOST * _GRAVITY:
+    least, most = tuning.SPECIFIC_FORCE
+    if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
         raise InputError(
             f"{recording.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
-            "check the unit of the accelerometers, and that gravity is not taken off"
+            "check the unit of the accelerometers, and that gravity is not subtracted"
         )
     imu = Imu(recording.dt, samples[:, :3] * recording.dt, samples[:, 3:] * recording.dt)
-    start, notes = _clock(Path(path), recording, time)
+    start, notices = _clock(Path(path), recording, time)
     if np.mean(samples[:, 5]) > 0.0:
-        notes = (*notes, "accel_z is positive: its axis points up, and roll is near 180 deg")
-    return ImuLog(imu, start, recording.source, (*map(str, recording.notices), *notes))
+        text = "its mean is positive: the axis points up, and roll is near 180 deg"
+        notices = (*notices, Notice("axis-up", "warning", "accel_z", text))
+    return ImuLog(imu, start, recording.source, (*recording.notices, *notices))
 
 
 def _clock(
     path: Path, recording: Recording, time: str | int | bool | None
-) -> tuple[float, tuple[str, ...]]:
-    """Time of the first epoch, s, and what is to be said of it."""
-    none = 0.0, ("the IMU has no time stamps: fixes are timed from its first sample",)
+) -> tuple[float, tuple[Notice, ...]]:
+    """Time of the first epoch, s, and its notices."""
+    text = "the IMU has no time stamps: fixes are timed from its first sample"
+    none = 0.0, (Notice("no-time-stamps", "note", "", text),)
     if time is False or path.suffix.lower() in (".npy", ".npz"):
         return none
     table = open_log(path)

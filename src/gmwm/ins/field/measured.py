@@ -5,27 +5,69 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import BeforeValidator, Field
 
-from gmwm._core import checks
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
-from gmwm.ins.field.fix_file import POSITION_SD, VELOCITY_SD, read_fix_log
+from gmwm.ins import tuning
+from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log
 from gmwm.ins.filter import Aiding
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.spec import mapping, positive, read_models, reading_options, three, value
+from gmwm.ins.spec import (
+    FileName,
+    Meters,
+    Models,
+    PositiveMeters,
+    PositiveRadians,
+    PositiveSpeed,
+    Radians,
+    ReadingSpec,
+    Spec,
+    Three,
+    number,
+    read_models,
+)
 
-KEYS = ("imu", "gnss_fixes", "sensors", "lever_arm", "heading", "heading_sd", "position_sd",
-        "velocity_sd", "bias")  # fmt: skip
-"""What a description may say."""
+_UNITS = {"position": "m", "velocity": "m/s"}
 
-_OF_IMU = ("file", "rate", "units", "channels", "time")
-_TURN_ON = {"gyro": np.radians(0.1), "accel": 0.1}
-"""Standard deviation of what a static calibration takes off and a sensor changes when it is
-switched on, where nobody says better: rad/s, m/s^2."""
+
+class ImuSpec(ReadingSpec):
+    """The record of an IMU."""
+
+    file: FileName
+
+
+class BiasSpec(Spec):
+    """How far sensors may be off when they are switched on."""
+
+    gyro: Annotated[float, number(SI_UNIT["gyro"]), Field(ge=0.0)] | None = None
+    accel: Annotated[float, number(SI_UNIT["accel"]), Field(ge=0.0)] | None = None
+
+
+class MeasuredSpec(Spec):
+    """What a file may say."""
+
+    NEEDS: ClassVar[str] = (
+        "filtering needs the IMU's record (imu), GNSS fixes (gnss_fixes) and sensor models "
+        "(sensors)"
+    )
+
+    imu: Annotated[
+        ImuSpec, BeforeValidator(lambda each: each if isinstance(each, Mapping) else {"file": each})
+    ]
+    gnss_fixes: FileName
+    sensors: Models
+    lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
+    heading: Radians | None = None
+    heading_sd: PositiveRadians = tuning.HEADING_SD
+    position_sd: Three[PositiveMeters] = tuning.POSITION_SD
+    velocity_sd: Three[PositiveSpeed] = tuning.VELOCITY_SD
+    bias: BiasSpec = BiasSpec()
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +87,7 @@ class Measured:
     heading_sd : float
         rad.
     title : str
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
     imu: Imu
@@ -53,9 +95,9 @@ class Measured:
     sensors: SensorModels
     start: float = 0.0
     heading: float | None = None
-    heading_sd: float = np.radians(2.0)
+    heading_sd: float = tuning.HEADING_SD
     title: str = ""
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @classmethod
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
@@ -73,88 +115,62 @@ class Measured:
         InputError
             If something is missing, unknown or cannot be used.
         """
-        content = mapping("the description", content, KEYS)
-        missing = [name for name in ("imu", "gnss_fixes", "sensors") if name not in content]
-        if missing:
-            raise InputError(
-                f"there is no {', no '.join(missing)}: filtering needs the IMU's record (imu, "
-                "--imu), GNSS fixes (gnss_fixes, --gnss) and sensor models (sensors, --sensors)"
-            )
-        given = content["imu"] if isinstance(content["imu"], Mapping) else {"file": content["imu"]}
-        given = mapping("imu", given, _OF_IMU)
-        file, fixes = _name("imu", given.get("file")), _name("gnss_fixes", content["gnss_fixes"])
-        sensors = read_models("sensors", content["sensors"], folder)
-        angles = {
-            name: value(content[name], "rad", name)
-            for name in ("heading", "heading_sd")
-            if name in content
-        }
-        if "heading_sd" in angles:
-            checks.positive("heading_sd", angles["heading_sd"])
-        sensors, told = _with_bias(sensors, content.get("bias", {}))
-        usual = {"position_sd": POSITION_SD, "velocity_sd": VELOCITY_SD}
-        deviations = {
-            name: _positive(content[name], unit, name) if name in content else usual[name]
-            for name, unit in (("position_sd", "m"), ("velocity_sd", "m/s"))
-        }
-        arm = three(content.get("lever_arm", [0.0, 0.0, 0.0]), "m", "lever_arm")
-        log = read_imu_log(folder / file, **reading_options("imu", given))
-        found = read_fix_log(folder / fixes)
+        spec = MeasuredSpec.parse(content)
+        sensors, assumed = _with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
+        log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
+        found = read_fix_log(folder / spec.gnss_fixes)
         aiding, cut = _within(
-            found.aiding(log.start, deviations["position_sd"], deviations["velocity_sd"], arm),
+            found.aiding(log.start, spec.position_sd, spec.velocity_sd, spec.lever_arm),
             log.imu, log.source, found.source, log.start,
         )  # fmt: skip
-        for kind, own in (("position", found.position_sd), ("velocity", found.velocity_sd)):
+        for kind, own, usual in (("position", found.position_sd, spec.position_sd),
+                                 ("velocity", found.velocity_sd, spec.velocity_sd)):  # fmt: skip
             if own is None and any(each.kind == kind for each in aiding.fixes):
-                sd = ", ".join(f"{each:g}" for each in deviations[f"{kind}_sd"])
-                told = (*told, f"{kind} fixes are taken to have standard deviations of {sd} "
-                        f"{'m' if kind == 'position' else 'm/s'} (north, east, down)")  # fmt: skip
+                sd, unit = ", ".join(f"{each:g}" for each in usual), _UNITS[kind]
+                text = (
+                    f"{kind} fixes are taken to have standard deviations of {sd} {unit} (north, "
+                    "east, down)"
+                )
+                values = dict(zip(("north", "east", "down"), usual, strict=True))
+                assumed = (*assumed, Notice("sd-assumed", "note", "", text, values))
         return cls(
             imu=log.imu,
             aiding=aiding,
             sensors=sensors,
             start=log.start,
-            heading=angles.get("heading"),
-            heading_sd=angles.get("heading_sd", float(np.radians(2.0))),
+            heading=spec.heading,
+            heading_sd=spec.heading_sd,
             title=log.source,
-            notes=(*log.notes, *found.notes, *cut, *told),
+            notices=(*log.notices, *found.notices, *cut, *assumed),
         )
 
 
-def _name(where: str, given: Any) -> str:
-    if not isinstance(given, str) or "\0" in given:
-        raise InputError(f"{where}: {checks.shown(given)}: write the name of a file")
-    return given
-
-
-def _positive(content: Any, unit: str, where: str) -> list[float]:
-    return [checks.positive(where, each) for each in three(content, unit, where)]
-
-
-def _with_bias(models: SensorModels, content: Any) -> tuple[SensorModels, tuple[str, ...]]:
+def _with_bias(
+    models: SensorModels, given: Mapping[str, float]
+) -> tuple[SensorModels, tuple[Notice, ...]]:
     """Models with a constant that is drawn when a sensor is switched on, and what was assumed."""
-    content = mapping("bias", content, ("gyro", "accel"))
-    given = {
-        kind: value(each, SI_UNIT[kind], f"bias, {kind}")
-        if each == 0
-        else positive(each, SI_UNIT[kind], f"bias, {kind}")
-        for kind, each in content.items()
-    }
-    bias_sd, assumed = {}, []
+    bias_sd, assumed = {}, {}
     for axis in AXES:
         kind = axis.partition("_")[0]
-        bias_sd[axis] = given.get(kind, models.bias_sd[axis] or _TURN_ON[kind])
-        if kind not in given and not models.bias_sd[axis] and kind not in assumed:
-            assumed.append(kind)
-    text = {"gyro": "gyros 0.1 deg/s", "accel": "accelerometers 0.1 m/s^2"}
-    told = "biases at switching on, which a static calibration does not know, are taken to be "
-    note = told + " and ".join(text[kind] for kind in assumed) + " (1 sigma)"
-    return replace(models, bias_sd=bias_sd), (note,) if assumed else ()
+        bias_sd[axis] = given.get(kind, models.bias_sd[axis] or tuning.TURN_ON_SD[kind])
+        if kind not in given and not models.bias_sd[axis]:
+            assumed[kind] = bias_sd[axis]
+    shown = {
+        "gyro": lambda sd: f"gyros {np.degrees(sd):g} deg/s",
+        "accel": lambda sd: f"accelerometers {sd:g} m/s^2",
+    }
+    text = (
+        "biases at switching on, which a static calibration does not know, are taken to be "
+        + " and ".join(shown[kind](sd) for kind, sd in assumed.items())
+        + " (1 sigma)"
+    )
+    notices = (Notice("biases-assumed", "note", "", text, assumed),) if assumed else ()
+    return replace(models, bias_sd=bias_sd), notices
 
 
 def _within(
     aiding: Aiding, imu: Imu, record: str, source: str, start: float
-) -> tuple[Aiding, tuple[str, ...]]:
+) -> tuple[Aiding, tuple[Notice, ...]]:
     """The fixes of the time of the IMU's record."""
     end = imu.n * imu.dt
     kept, left_out, total = [], 0, 0
@@ -173,5 +189,6 @@ def _within(
             f"{source} has {spans}, none in the time of {record}, {start:.10g} s to "
             f"{start + end:.10g} s: bring both to one clock"
         )
-    note = f"{left_out} fixes before or after the IMU's record are left out"
-    return replace(aiding, fixes=tuple(kept)), (note,) if left_out else ()
+    text = f"{left_out} fixes before or after the IMU's record are left out"
+    notice = Notice("fixes-left-out", "note", "", text, {"count": left_out})
+    return replace(aiding, fixes=tuple(kept)), (notice,) if left_out else ()

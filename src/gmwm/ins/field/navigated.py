@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,8 +10,11 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from gmwm._core.files import written
+from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.field.alignment import Alignment, align, started
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.filter import KINDS, Solution, navigate
@@ -23,10 +25,6 @@ from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDTH = 80
-_DOUBT = 0.001  # probability below which innovations contradict the model
-_LOST = 5.0  # times the expected size of innovations
-_MOSTLY_FINE = 1.5  # NIS by the median
 _COLUMNS = (
     "time_s", "latitude_deg", "longitude_deg", "height_m",
     "velocity_north_mps", "velocity_east_mps", "velocity_down_mps",
@@ -168,64 +166,77 @@ class Navigated:
         """Kinds whose innovations have another size than expected -> how many times it is."""
         tests = {kind: self.test(kind).nis for kind in self.kinds}
         tests["all"] = self.test().nis
-        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= _DOUBT}
+        found = {
+            k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= tuning.CONTRADICTED
+        }
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
 
     @property
     def _is_white(self) -> bool:
         whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > _DOUBT)
+        return bool(np.isnan(whiteness) or whiteness > tuning.CONTRADICTED)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Notice:
         """Whether the filter's model fits these data; only the innovations can tell."""
-        if self.solution.diverged_at is not None:
-            return (
-                "The filter diverged: the sensor models or the initial state are far off, or a "
-                "fix is."
-            )
-        if self.fits:
-            return (
-                "The innovations do not contradict the filter's model: they are as large as it "
-                "expects, and white."
-            )
         sizes = self._misfits
-        if sizes and max(sizes.values()) > _LOST:
-            return (
-                f"The filter is lost: innovations are {max(sizes.values()):.2g} times as large as "
-                "it expects, and the accuracy that it predicts is not to be believed; look first "
-                "at the heading that it started with, then at the units of the sensors and the "
-                "clock of the fixes."
-            )
+        largest = max(sizes.values(), default=1.0)
+        if self.solution.diverged_at is not None:
+            return Notice(
+                "diverged", "bad", "",
+                "The filter diverged: the sensor models or the initial state are far from right, "
+                "or a fix is.",
+                {"time": self.solution.diverged_at},
+            )  # fmt: skip
+        if self.fits:
+            return Notice(
+                "consistent", "good", "",
+                "The innovations do not contradict the filter's model: they are as large as it "
+                "expects, and white.",
+            )  # fmt: skip
+        if largest > tuning.LOST:
+            return Notice(
+                "lost", "bad", "",
+                f"The filter is lost: innovations are {largest:.2g} times as large as it expects, "
+                "and the accuracy that it predicts is not to be believed; look first at the "
+                "heading that it started with, then at the units of the sensors and the clock of "
+                "the fixes.",
+                sizes,
+            )  # fmt: skip
         if sizes:
-            told = " and ".join(
+            cause, why = self._cause(sizes)
+            shown = " and ".join(
                 f"{size:.2g} times as large{'' if kind == 'all' else f' in {kind}'}"
                 for kind, size in sizes.items()
             )
-            return f"The filter's model does not fit: innovations are {told} as it expects; " + (
-                self._cause(sizes) + "."
-            )
-        return (
+            return Notice(
+                cause, "bad", "",
+                f"The filter's model does not fit: innovations are {shown} as it expects; {why}.",
+                sizes,
+            )  # fmt: skip
+        return Notice(
+            "coloured", "bad", "",
             "The filter's model does not fit: innovations are as large as it expects, but depend "
             "on those before; the errors of the fixes are coloured, or a slow error of the "
-            "sensors is missing in their models."
-        )
+            "sensors is missing in their models.",
+            {"whiteness": self.test().whiteness},
+        )  # fmt: skip
 
-    def _cause(self, sizes: dict[str, float]) -> str:
-        """What innovations of these sizes may come from."""
+    def _cause(self, sizes: dict[str, float]) -> tuple[str, str]:
+        """What innovations of these sizes may come from: code and text."""
         if min(sizes.values()) < 1.0 < max(sizes.values()):
-            return "the standard deviations of the fixes do not go together"
+            return "mixed-sizes", "the standard deviations of the fixes do not go together"
         if max(sizes.values()) < 1.0:
-            return (
+            return "too-small", (
                 "the sensors are better than their models say, or the fixes than their standard "
                 "deviations"
             )
-        if self._usual_size < _MOSTLY_FINE:
-            return (
+        if self._usual_size < tuning.MOSTLY_FINE:
+            return "outliers", (
                 "most are not, so that some fixes are outliers, or errors without fixes grow "
                 "faster than the sensor models say"
             )
-        return (
+        return "too-large", (
             "the sensors are worse than their models say, or the fixes than their standard "
             "deviations"
         )
@@ -236,10 +247,11 @@ class Navigated:
         solution, imu = self.solution, self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        lines += [_wrapped(note) for note in (*self.measured.notes, *self.alignment.notes)]
+        for notice in (*self.measured.notices, *self.alignment.notices):
+            lines += wrapped(str(notice), "- ", 2)
         if solution.diverged_at is not None:
             at = float(self.clock(np.array([solution.diverged_at]))[0])
-            lines.append(_wrapped(f"the filter diverged at {at:.10g} s and was stopped"))
+            lines += wrapped(f"the filter diverged at {at:.10g} s and was stopped", "- ", 2)
         lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
         for kind in self.kinds:
             test = self.test(kind)
@@ -250,16 +262,16 @@ class Navigated:
             )
         far, at = self.farthest
         lines += [f"largest: {far:.3g} sigma at {at:.10g} s", "", *self._accuracy(), ""]
-        lines += textwrap.wrap(self.verdict, _WIDTH)
+        lines += wrapped(self.verdict.text)
         return "\n".join(lines)
 
     def _accuracy(self) -> list[str]:
         lines = []
         if self.solution.time.size and self.solution.diverged_at is None:
             sd = self.solution.sd[-1]
-            doubt = "" if self.fits else " (if its model were right, which it is not)"
+            caveat = "" if self.fits else " (if its model were right, which it is not)"
             lines += [
-                f"Predicted accuracy at the end, 1 sigma{doubt}",
+                f"Predicted accuracy at the end, 1 sigma{caveat}",
                 f"horizontal {np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
                 f"{np.linalg.norm(sd[3:6]):.3g} m/s,",
                 f"tilt {np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "
@@ -275,7 +287,7 @@ class Navigated:
         )
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
-        return lines + textwrap.wrap(text, _WIDTH)
+        return lines + wrapped(text)
 
     def write_solution(self, path: Path) -> Path:
         """Write the solution as a CSV file.
@@ -330,10 +342,6 @@ class Navigated:
                 innovations.sd[of_kind],
             )
         return plotting.innovations(panels)
-
-
-def _wrapped(note: str) -> str:
-    return textwrap.fill(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
 
 
 def _hole(solution: Solution, start: float, end: float) -> Hole:

@@ -1,7 +1,13 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
 from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, gnss
-from gmwm.ins.filter.covariance_kernels import NAVIGATION, carry, take_in, tilt_squared, transition
+from gmwm.ins.filter.covariance_kernels import (
+    NAVIGATION,
+    measurement_update,
+    propagate,
+    tilt_squared,
+    transition,
+)
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, modified, navigate, unmodified
 from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_VELOCITY, measurement_row
 from gmwm.ins.filter.solution import Solution
@@ -22,12 +28,12 @@ __all__ = [
     "Outputs",
     "SensorStates",
     "Solution",
-    "carry",
     "gnss",
     "measurement_row",
+    "measurement_update",
     "modified",
     "navigate",
-    "take_in",
+    "propagate",
     "tilt_squared",
     "transition",
     "unmodified",

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_STANDSTILL, IS_VELOCITY
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import matrix_from_rpy, offset
@@ -27,7 +28,6 @@ KINDS = {
 """Kinds of fixes, with their codes in the kernels."""
 
 _OF_GNSS = ("position", "velocity")
-_STANDSTILL = 1e-3  # m/s
 _SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 
 
@@ -231,7 +231,7 @@ def gnss(
     trajectory: Trajectory,
     interval: float = 1.0,
     *,
-    position_sd: float | Sequence[float] | None = (1.0, 1.0, 1.5),
+    position_sd: float | Sequence[float] | None = tuning.POSITION_SD,
     velocity_sd: float | Sequence[float] | None = None,
     lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
     coloured_sd: Sequence[float] = (0.0, 0.0, 0.0),
@@ -257,7 +257,7 @@ def gnss(
     Raises
     ------
     InputError
-        If the interval is no multiple of the trajectory's, or a standard deviation not positive.
+        If the interval is not a multiple of the trajectory's, or a standard deviation not positive.
     """
     stride = checks.positive("interval", interval) / trajectory.dt
     if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:
@@ -293,7 +293,7 @@ def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) ->
 def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
     """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
     whole = gnss(trajectory, interval, position_sd=None, velocity_sd=sd).fixes[0]
-    still = np.linalg.norm(whole.value, axis=1) < _STANDSTILL
+    still = np.linalg.norm(whole.value, axis=1) < tuning.STANDSTILL
     kept = whole.part(still)
     return Aiding((Fixes("standstill", kept.time, np.zeros_like(kept.value), kept.sd),))
 

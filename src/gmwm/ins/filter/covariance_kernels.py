@@ -1,9 +1,9 @@
-"""Kernels that carry the covariance of navigation and sensor errors, and take in measurements.
+"""Kernels that propagate and update the covariance of navigation and sensor errors.
 
 The navigation errors are, in this order: position to the north, east and down (m), modified
 velocity error (m/s) and attitude (rad), estimate less truth. The modified velocity error is
 ``u = dv - v x phi``: that which is left when the error of the velocity's direction, which the
-attitude error makes, is taken off. In its equations gravity stands where the specific force would,
+attitude error makes, is subtracted. In its equations gravity stands where the specific force would,
 so that they do not depend on how the vehicle manoeuvres between two steps (Scherzinger & Reid 1994,
 "Modified strapdown inertial navigator error models", *IEEE PLANS*). The errors of the sensor states
 follow, truth less estimate.
@@ -132,13 +132,13 @@ def transition(
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def carry(
+def propagate(
     P: FloatArray, A: FloatArray, B: FloatArray, axis: IntArray, partner: IntArray,
     phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
     noise_off: FloatArray, cross: FloatArray, integral: FloatArray,
     S: FloatArray, T: FloatArray, U: FloatArray, row: FloatArray,
 ) -> None:  # fmt: skip
-    """Carry a covariance over a step, in place.
+    """Propagate a covariance over a step, in place.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def take_in(
+def measurement_update(
     P: FloatArray, h: FloatArray, state: int, variance: float, z: float, x: FloatArray,
     K: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip

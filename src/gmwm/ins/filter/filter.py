@@ -12,16 +12,15 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
 from gmwm.ins.filter.filter_kernels import IS_POSITION, run
-from gmwm.ins.filter.solution import Innovations, Solution
+from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels
 from gmwm.ins.trajectory import NavState, check_latitudes
-
-_COVARIANCE_STEP = 0.1  # s
 
 
 @dataclass(frozen=True)
@@ -59,10 +58,10 @@ class InitialSd:
 class Filter:
     """An error-state Kalman filter with the states of given sensor models, ready to run.
 
-    Closed loop: after the measurements of an epoch, the estimated errors are taken off position,
-    velocity and attitude; the increments of the IMU are corrected for the estimated sensor errors
-    sample by sample. The covariance is carried in steps of ``stride`` samples, and at every epoch
-    that has a measurement or a result.
+    Closed loop: after the measurements of an epoch, the estimated errors are subtracted from
+    position, velocity and attitude; the increments of the IMU are corrected for the estimated
+    sensor errors sample by sample. The covariance is propagated in steps of ``stride`` samples, and
+    at every epoch that has a measurement or a result.
 
     Attributes
     ----------
@@ -94,7 +93,7 @@ class Filter:
         sensors: SensorModels,
         aiding: Aiding,
         dt: float,
-        step: float = _COVARIANCE_STEP,
+        step: float = tuning.COVARIANCE_STEP,
         second_order: bool = True,
     ) -> Filter:
         """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s)."""
@@ -176,7 +175,7 @@ class Filter:
             covariance=unmodified(nav_P[:done], nav[:done, 3:]),
             sensor_errors=sensor[:done],
             sensor_covariance=sensor_P[:done],
-            innovations=Innovations(
+            innovations=FilterInnovations(
                 time=np.asarray(events.epoch * imu.dt, dtype=float),
                 kind=events.kind,
                 value=innovation,
@@ -267,7 +266,7 @@ def navigate(
     aiding: Aiding,
     *,
     initial_sd: InitialSd | None = None,
-    step: float = _COVARIANCE_STEP,
+    step: float = tuning.COVARIANCE_STEP,
     interval: float = 1.0,
     before: Sequence[float] = (),
     second_order: bool = True,

@@ -8,7 +8,12 @@ import numba
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.ins.filter.covariance_kernels import carry, take_in, tilt_squared, transition
+from gmwm.ins.filter.covariance_kernels import (
+    measurement_update,
+    propagate,
+    tilt_squared,
+    transition,
+)
 from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
@@ -103,7 +108,7 @@ def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> Non
     lla[1] -= x[1] / ((transverse + lla[2]) * math.cos(lla[0]))
     lla[2] += x[2]
     # The velocity less u is the true one, turned by the attitude error as the attitude is; to the
-    # second order, for a fast vehicle with a heading in doubt.
+    # second order, for a fast vehicle with a poorly known heading.
     a, b, c = v[0] - x[3], v[1] - x[4], v[2] - x[5]
     p, q, r = x[7] * c - x[8] * b, x[8] * a - x[6] * c, x[6] * b - x[7] * a
     v[0] = a + p + 0.5 * (x[7] * r - x[8] * q)
@@ -120,7 +125,7 @@ def sample_error(
     first: IntArray, output: FloatArray, phi: FloatArray, phi_off: FloatArray, partner: IntArray,
     paired: bool, x: FloatArray, held: FloatArray, error: FloatArray,
 ) -> None:  # fmt: skip
-    """Sensor errors (6,) that the states x (m,) predict for a sample; then carry the states.
+    """Sensor errors (6,) that the states x (m,) predict for a sample; then propagate the states.
 
     Gauss-Markov estimates decay between measurements; without it, they would be believed for ever.
     """
@@ -249,7 +254,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                 if kind == IS_POSITION and coloured[component] >= 0:
                     state = 9 + coloured[component]
                     z += x[coloured[component]]
-                found, variance = take_in(P, h, state, sd * sd, z, estimated, K)
+                found, variance = measurement_update(P, h, state, sd * sd, z, estimated, K)
                 innovation[event, component] = found
                 innovation_sd[event, component] = math.sqrt(variance)
             event += 1
@@ -296,7 +301,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                         C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
         epoch = stop
         transition(v_mid, lla_mid, C_mid, samples * dt, F, A, B)
-        carry(P, A, B, axis, partner, phi[samples], phi_off[samples], gain[samples],
+        propagate(P, A, B, axis, partner, phi[samples], phi_off[samples], gain[samples],
               noise[samples], noise_off[samples], cross[samples], integral[samples],
               S, T, U, row)  # fmt: skip
         if second_order:

@@ -46,7 +46,7 @@ def step(
     fz_before: float,
     dt: float,
 ) -> tuple[float, float, float]:
-    """Carry attitude, velocity and position over one sampling interval, in place.
+    """Propagate attitude, velocity and position over one sampling interval, in place.
 
     Coning and sculling are corrected with the increments of the interval before, as if rate and
     specific force changed linearly; on the first interval, give its own increments as those before.
@@ -193,7 +193,7 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
     Raises
     ------
     InputError
-        If it starts closer than 1 deg to a pole, where north is no direction to steer by.
+        If it starts closer than 1 deg to a pole, where north cannot be steered by.
     """
     if abs(initial.lla[0]) > HIGHEST_LATITUDE:
         raise InputError(

@@ -14,7 +14,7 @@ from gmwm.ins.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
-class Innovations:
+class FilterInnovations:
     """Measurements less what the filter expected, component by component.
 
     Attributes
@@ -72,7 +72,7 @@ class Solution:
     sensor_errors : (K, 6) ndarray
         Estimated errors of the sensors without their white noise, rad/s and m/s^2.
     sensor_covariance : (K, 6, 6) ndarray
-    innovations : Innovations
+    innovations : FilterInnovations
     state_names : tuple of str
         Of the sensor states.
     states : (m,) ndarray
@@ -90,7 +90,7 @@ class Solution:
     covariance: FloatArray
     sensor_errors: FloatArray
     sensor_covariance: FloatArray
-    innovations: Innovations
+    innovations: FilterInnovations
     state_names: tuple[str, ...]
     states: FloatArray
     state_covariance: FloatArray

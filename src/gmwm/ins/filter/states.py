@@ -1,6 +1,6 @@
-"""Sensor states of a navigation filter: what carries the coloured errors of six axes.
+"""Sensor states of a navigation filter: those of the coloured errors of six axes.
 
-Every term of a model is a block of one or two states. Over k samples a block is carried exactly:
+Every term of a model is a block of one or two states. Over k samples a block is propagated exactly:
 its transition, its noise, the angle or velocity that it adds to the integrals of the sensor, and
 the covariance of that with the states. So a correlation time may be shorter than the step of the
 covariance, as that of an analogue filter in front of the sampler is.
@@ -37,7 +37,7 @@ class SensorStates:
     axis : (m,) ndarray of int
         Sensor of `AXES` that each state adds to; `NO_AXIS` for none.
     output : (m,) ndarray
-        Share of the state in the error of its sensor.
+        Fraction of the state in the error of its sensor.
     partner : (m,) ndarray of int
         The other state of its block; itself if there is none.
     mean : (m,) ndarray

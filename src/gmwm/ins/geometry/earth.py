@@ -24,6 +24,9 @@ ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 GRAVITATIONAL_CONSTANT = 3.986004418e14
 """Of the Earth with its atmosphere, m^3/s^2."""
 
+STANDARD_GRAVITY = 9.80665
+"""m/s^2, the unit g."""
+
 _SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1.0 - FLATTENING)
 _EQUATORIAL_GRAVITY = 9.7803253359  # m/s^2
 _POLAR_GRAVITY = 9.8321849379  # m/s^2
@@ -71,7 +74,7 @@ def gravity_at(sin_lat: float, h: float) -> float:
     -------
     float
         Magnitude, m/s^2, taken to point down: Somigliana's formula (Groves 2013, eq. 2.134),
-        carried to the height by the second-order free-air formula (eq. 2.139).
+        continued to the height by the second-order free-air formula (eq. 2.139).
     """
     square = sin_lat * sin_lat
     at_ellipsoid = (

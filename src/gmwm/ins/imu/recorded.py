@@ -11,11 +11,11 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.imu.sensors import AXES, SensorErrors
 from gmwm.readers import Recording
 
 _RATE_TOLERANCE = 1e-3
-_BIAS_WINDOW = 60.0  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Recorded:
     Attributes
     ----------
     stretches : tuple of (n, 6) ndarray
-        Errors in the order of `AXES`, rad/s and m/s^2, the mean of each recording taken off.
+        Errors in the order of `AXES`, rad/s and m/s^2, less the mean of each recording.
     dt : float
         Sampling interval, s.
     source : str
@@ -133,6 +133,6 @@ def _errors(recording: Recording) -> FloatArray:
 
 def _averaged(errors: FloatArray, dt: float) -> FloatArray:
     """Means over a minute, (windows, 6)."""
-    window = max(min(round(_BIAS_WINDOW / dt), len(errors)), 1)
+    window = max(min(round(tuning.BIAS_WINDOW / dt), len(errors)), 1)
     whole = len(errors) // window * window
     return np.asarray(errors[:whole].reshape(-1, window, 6).mean(axis=1))

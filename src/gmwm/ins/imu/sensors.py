@@ -121,7 +121,7 @@ def _spread(given: Mapping[str, Any], what: str) -> dict[str, Any]:
     for name in given:
         if name not in AXES and name not in _KINDS:
             raise InputError(
-                f"{what}: {checks.shown(name)} is no sensor: there are gyro and accel, or "
+                f"{what}: {checks.shown(name)} is not a sensor: write gyro, accel, or one of "
                 f"{', '.join(AXES)}"
             )
     kinds = {axis: axis.partition("_")[0] for axis in AXES}

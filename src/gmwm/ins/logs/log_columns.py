@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-import stat
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from gmwm._core.files import existing_file
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import TIME, CsvTable, label, meaning
@@ -48,13 +49,52 @@ def open_log(path: Path) -> CsvTable:
     InputError
         If there is no such file, it is a directory, or no table.
     """
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError):  # ValueError: a null character in the name
-        raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path} is a directory: name a file in it")
-    return CsvTable.open(path)
+    return CsvTable.open(existing_file(path))
+
+
+def find_columns(
+    table: CsvTable,
+    quantities: Callable[[str], Sequence[str]],
+    needed: Sequence[str],
+    header: str,
+) -> tuple[dict[str, int], list[str]]:
+    """The column of each quantity, and the names of columns that are none.
+
+    Parameters
+    ----------
+    table : CsvTable
+    quantities : callable
+        What a column of a name holds; empty if it is something else.
+    needed : sequence of str
+        Quantities that there must be.
+    header : str
+        An example that has them.
+
+    Raises
+    ------
+    InputError
+        If two columns look like one quantity, or one that is needed has none.
+    """
+    columns: dict[str, int] = {}
+    unused = []
+    for column, name in enumerate(table.names):
+        found = quantities(name)
+        if not found:
+            unused.append(name or str(column))
+        for quantity in found:
+            if quantity in columns:
+                raise InputError(
+                    f"{table.source}: columns {label(table.names, columns[quantity])} and "
+                    f"{label(table.names, column)} both look like {quantity}: rename one of them"
+                )
+            columns[quantity] = column
+    missing = [name for name in needed if name not in columns]
+    if missing:
+        raise InputError(
+            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
+            f"like {header}"
+        )
+    return columns, unused
 
 
 def is_time(name: str) -> bool:
@@ -106,7 +146,7 @@ def angle_factor(table: CsvTable, column: int, quantity: str, common: str | None
         )
     if unit not in ("rad", "deg"):
         raise InputError(
-            f"{where}: {unit} is no unit of an angle: name it {quantity}_rad or {quantity}_deg"
+            f"{where}: {unit} is not a unit of angle: name it {quantity}_rad or {quantity}_deg"
         )
     return FACTORS[unit]
 
@@ -116,7 +156,7 @@ def length_factor(table: CsvTable, column: int, quantity: str) -> float:
     unit = unit_of(table.names[column]) or "m"
     if unit not in ("m", "ft"):
         raise InputError(
-            f"{table.source}, column {label(table.names, column)}: {unit} is no unit of a "
+            f"{table.source}, column {label(table.names, column)}: {unit} is not a unit of "
             f"{quantity}: name it {quantity}_m"
         )
     return FACTORS[unit]

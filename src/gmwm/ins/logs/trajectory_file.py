@@ -16,14 +16,16 @@ from gmwm.ins.logs.log_columns import (
     angle_unit,
     check_angles,
     check_rising,
+    find_columns,
     is_time,
     length_factor,
     open_log,
     place,
     words_of,
 )
-from gmwm.readers import TIME, CsvTable, label, meaning
+from gmwm.readers import TIME, CsvTable, meaning
 
+_HEADER = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
 _ANGLES = ("latitude", "longitude", "roll", "pitch", "yaw")
 _WORDS = POSITION_WORDS | {
     word: quantity
@@ -77,7 +79,7 @@ def read_log(path: Path) -> Log:
         If a column is missing, a value is missing or impossible, or the clock is not even.
     """
     table = open_log(path)
-    columns = _columns(table)
+    columns, _ = find_columns(table, _quantities, (TIME, *_ANGLES, "height"), _HEADER)
     found = table.load(list(columns.values()))
     values = {name: found[column] for name, column in columns.items()}
     for name, column in columns.items():
@@ -93,35 +95,14 @@ def read_log(path: Path) -> Log:
     )
 
 
-def _quantity(name: str) -> str | None:
-    """Time, latitude, ... or ``None`` if the column is something else."""
+def _quantities(name: str) -> tuple[str, ...]:
+    """Time, latitude, ... or none if the column is something else."""
     if is_time(name):
-        return TIME
+        return (TIME,)
     words = words_of(name)
-    if not words or not _NOT_THE_VALUE.isdisjoint(words):
-        return None
-    return _WORDS.get(words[-1])
-
-
-def _columns(table: CsvTable) -> dict[str, int]:
-    """The column of each quantity."""
-    columns: dict[str, int] = {}
-    for column, name in enumerate(table.names):
-        quantity = _quantity(name)
-        if quantity in columns:
-            raise InputError(
-                f"{table.source}: columns {label(table.names, columns[quantity])} and "
-                f"{label(table.names, column)} both look like the {quantity}: rename one of them"
-            )
-        if quantity is not None:
-            columns[quantity] = column
-    missing = [name for name in (TIME, *_ANGLES, "height") if name not in columns]
-    if missing:
-        raise InputError(
-            f"{table.source} has no column for {', '.join(missing)}: name the columns in a header "
-            "like time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
-        )
-    return columns
+    if not words or not _NOT_THE_VALUE.isdisjoint(words) or words[-1] not in _WORDS:
+        return ()
+    return (_WORDS[words[-1]],)
 
 
 def _check_complete(table: CsvTable, column: int, values: FloatArray) -> None:

@@ -14,13 +14,11 @@ from scipy.stats import chi2, norm, t
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.montecarlo.runs import GROUPS, Runs
+from gmwm.ins import tuning
+from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
-
-_CONFIDENCE = 0.95
-_FAR = 0.001  # probability below which a filter is called inconsistent
 
 
 @dataclass(frozen=True)
@@ -54,15 +52,15 @@ class Coverage:
     Attributes
     ----------
     level : float
-    share : float
+    fraction : float
     lower, upper : float
-        Interval of 95 % of the share: binomial at one epoch (Clopper & Pearson 1934, *Biometrika*
-        26, 404-413), and over a time with as many draws as the scatter between the runs is worth
-        (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
+        Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
+        *Biometrika* 26, 404-413), and over a time with as many draws as the scatter between the
+        runs is worth (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
     """
 
     level: float
-    share: float
+    fraction: float
     lower: float
     upper: float
 
@@ -79,7 +77,7 @@ class Consistency:
     Attributes
     ----------
     nees : dict
-        Group of `gmwm.ins.montecarlo.runs.GROUPS`, or "sensors", -> NEES per degree of freedom.
+        Group of `GROUPS`, or "sensors", -> NEES per degree of freedom.
     coverage : dict
         Group -> `Coverage` at each of `LEVELS`, of its components' errors.
     rms : dict
@@ -98,17 +96,19 @@ class Consistency:
     @property
     def consistent(self) -> bool:
         """Whether no group's NEES is out of question."""
-        return all(ratio.p_value > _FAR / len(self.nees) for ratio in self.nees.values())
+        return all(
+            ratio.p_value > tuning.CONTRADICTED / len(self.nees) for ratio in self.nees.values()
+        )
 
 
-def at_epoch(runs: Runs, index: int) -> Consistency:
+def at_epoch(runs: FilterErrors, index: int) -> Consistency:
     """Consistency at one epoch, over independent runs: chi-square bands.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     index : int
-        Of the epoch; see `Runs.index`.
+        Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
     nees, coverage, rms, score = {}, {}, {}, {}
@@ -128,14 +128,14 @@ def at_epoch(runs: Runs, index: int) -> Consistency:
     return Consistency(nees, coverage, rms, score)
 
 
-def over_time(runs: Runs, start: float = 0.0, end: float = np.inf) -> Consistency:
+def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
     """Consistency over a time, averaged run by run: bands from the scatter between the runs.
 
     The errors of one run are correlated, so that a run counts as one draw; Student's t.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     start, end : float, optional
         s.
 
@@ -185,7 +185,7 @@ class InnovationTest:
     whiteness: float
 
 
-def innovation_test(runs: Runs) -> InnovationTest:
+def innovation_test(runs: FilterErrors) -> InnovationTest:
     """Innovations of all runs: their size and their whiteness."""
     total, count = np.nansum(runs.nis, axis=0)
     scores = runs.whiteness[np.isfinite(runs.whiteness)]
@@ -207,7 +207,7 @@ def mean_ratio(values: FloatArray) -> Ratio:
     if runs < 2:
         return Ratio(mean, float("nan"), float("nan"), float("nan"))
     error = float(np.std(values, ddof=1) / np.sqrt(runs))
-    width = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, runs - 1)) * error
+    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, runs - 1)) * error
     p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
@@ -218,58 +218,65 @@ def covered(standard: FloatArray) -> tuple[Coverage, ...]:
     The components of a run are correlated, so that a run counts as one draw.
     """
     size = standard.shape[0]
-    shares = _shares(standard[:, None])
+    fractions = _fractions(standard[:, None])
     return tuple(
-        _coverage(level, share, size) for level, share in zip(LEVELS, _means(shares), strict=True)
+        _coverage(level, fraction, size)
+        for level, fraction in zip(LEVELS, _means(fractions), strict=True)
     )
 
 
-def _shares(standard: FloatArray) -> FloatArray:
-    """Share of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
+def _fractions(standard: FloatArray) -> FloatArray:
+    """Of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
     bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
     return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds], axis=1)
 
 
-def _means(shares: FloatArray) -> list[float]:
+def _means(fractions: FloatArray) -> list[float]:
     return (
-        [float(each) for each in np.mean(shares, axis=0)] if len(shares) else [np.nan] * len(LEVELS)
+        [float(each) for each in np.mean(fractions, axis=0)]
+        if len(fractions)
+        else [np.nan] * len(LEVELS)
     )
 
 
 def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
-    runs, shares = len(standard), _shares(standard)
+    runs, fractions = len(standard), _fractions(standard)
     result = []
-    for level, mean, each in zip(LEVELS, _means(shares), shares.T, strict=True):
+    for level, mean, each in zip(LEVELS, _means(fractions), fractions.T, strict=True):
         draws = float(runs)
         error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
         if error > 0.0:
-            few, many = t.ppf(0.5 + 0.5 * _CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
+            few, many = t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
             draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
         result.append(_coverage(level, mean, draws))
     return tuple(result)
 
 
-def _coverage(level: float, share: float, size: float) -> Coverage:
+def _coverage(level: float, fraction: float, size: float) -> Coverage:
     """With its binomial interval."""
     if not size > 0.0:
         return Coverage(level, float("nan"), float("nan"), float("nan"))
-    hits, tail = share * size, 0.5 * (1.0 - _CONFIDENCE)
+    hits, tail = fraction * size, 0.5 * (1.0 - tuning.CONFIDENCE)
     lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
-    return Coverage(level, share, lower, upper)
+    return Coverage(level, fraction, lower, upper)
 
 
 def _ratio(total: float, dof: float) -> Ratio:
     if not dof > 0.0 or not np.isfinite(total):
         return Ratio(float("nan"), float("nan"), float("nan"), float("nan"))
-    lower, upper = chi2.ppf([0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE], dof) / dof
+    lower, upper = (
+        chi2.ppf([0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE], dof) / dof
+    )
     p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
     return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
 
 
 def _standard_sensors(
-    runs: Runs, alive: np.typing.NDArray[np.bool_], epochs: slice | np.typing.NDArray[np.intp]
+    runs: FilterErrors,
+    alive: np.typing.NDArray[np.bool_],
+    epochs: slice | np.typing.NDArray[np.intp],
 ) -> FloatArray:
     """Standardised errors of the sensors that have states, (R, K, d)."""
     error, sd = runs.sensor_error[alive][:, epochs], runs.sensor_sd[alive][:, epochs]

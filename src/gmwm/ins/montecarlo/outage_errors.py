@@ -10,14 +10,12 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.montecarlo.runs import Runs
+from gmwm.ins import tuning
+from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
 """What is judged, with its unit."""
-
-_DRAWS = 4000
-_LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -64,18 +62,18 @@ class Difference:
         return bool(self.lower > 0.0 or self.upper < 0.0)
 
 
-def sizes(runs: Runs, time: float) -> dict[str, FloatArray]:
+def sizes(runs: FilterErrors, time: float) -> dict[str, FloatArray]:
     """Size of each error of `QUANTITIES` in every run, (R,), before the fixes of an epoch."""
     error = runs.error[:, runs.index(time)]
     return _grouped(error)
 
 
-def spread(runs: Runs, time: float) -> dict[str, Spread]:
+def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
     """Errors before the first fix after an outage.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FilterErrors
     time : float
         End of the outage, s.
 
@@ -129,10 +127,10 @@ def difference(
         raise InputError("one or the other filter diverged in every run: check their sensor models")
     a, b = a[alive], b[alive]
     rng = np.random.default_rng(seed)
-    index = rng.integers(a.size, size=(_DRAWS, a.size))
+    index = rng.integers(a.size, size=(tuning.BOOTSTRAP_DRAWS, a.size))
     drawn = np.mean(a[index] - b[index], axis=1)
     ratios = np.sqrt(np.mean(a[index] ** 2, axis=1) / np.mean(b[index] ** 2, axis=1))
-    ends = [0.5 - 0.5 * _LEVEL, 0.5 + 0.5 * _LEVEL]
+    ends = [0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE]
     low, high = np.quantile(drawn, ends)
     ratio_low, ratio_high = np.quantile(ratios, ends)
     return Difference(

@@ -8,13 +8,12 @@ from typing import Protocol
 import numpy as np
 
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, InitialSd, Outage, Outputs
 from gmwm.ins.imu import SensorErrors, SensorModels
 from gmwm.ins.trajectory import Trajectory
 
-_MOST_EPOCHS = 300
 _SAME_TIME = 1e-6  # s
-_IN_OUTAGE = 1.0  # s
 
 
 class ErrorSource(Protocol):
@@ -73,7 +72,7 @@ class Scenario:
     aiding: Aiding
     outages: tuple[Outage, ...] = ()
     initial_sd: InitialSd = field(default_factory=InitialSd)
-    step: float = 0.1
+    step: float = tuning.COVARIANCE_STEP
     interval: float = 0.0
     second_order: bool = True
 
@@ -95,7 +94,7 @@ class Scenario:
     @property
     def kept_interval(self) -> float:
         """Interval at which errors are kept, s."""
-        least = self.trajectory.duration / _MOST_EPOCHS
+        least = self.trajectory.duration / tuning.KEPT_EPOCHS
         return self.interval or float(max(np.ceil(least), self.trajectory.dt))
 
     def outputs(self) -> Outputs:
@@ -104,6 +103,6 @@ class Scenario:
         Evenly spaced, every second of an outage, and its end before the first fix.
         """
         dt, n = self.trajectory.dt, self.trajectory.n
-        within = [np.arange(o.start, o.end, max(_IN_OUTAGE, dt)) for o in self.outages]
+        within = [np.arange(o.start, o.end, max(tuning.OUTAGE_EPOCHS, dt)) for o in self.outages]
         ends = [outage.end for outage in self.outages]
         return Outputs.every(self.kept_interval, dt, n, ends, also=np.concatenate([[], *within]))

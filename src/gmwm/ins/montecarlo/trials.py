@@ -6,17 +6,19 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice
+from gmwm._core.runs import Earlier, do_runs
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
-from gmwm.ins.montecarlo.run_store import CHUNK, Chunk, RunStore
-from gmwm.ins.montecarlo.runs import PER_RUN, Runs, joined, judged
+from gmwm.ins.montecarlo.filter_errors import PER_RUN, FilterErrors, judged
 from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
 from gmwm.ins.trajectory import NavState, Trajectory
 
@@ -28,21 +30,21 @@ class MonteCarlo:
     Attributes
     ----------
     filters : dict
-        Name -> `Runs`.
+        Name -> `FilterErrors`.
     outages : tuple of Outage
     example : dict
         Name -> `Solution` of the first run, once a second.
     truth : Trajectory
-    notes : tuple of str
+    notices : tuple of Notice
     """
 
-    filters: dict[str, Runs]
+    filters: dict[str, FilterErrors]
     outages: tuple[Outage, ...]
     example: dict[str, Solution]
     truth: Trajectory
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
-    def __getitem__(self, name: str) -> Runs:
+    def __getitem__(self, name: str) -> FilterErrors:
         if name not in self.filters:
             raise InputError(f"no filter {name!r}: there are {', '.join(self.filters)}")
         return self.filters[name]
@@ -56,7 +58,9 @@ def monte_carlo(
     seed: int = 0,
     *,
     jobs: int = 1,
+    cluster: str | None = None,
     folder: Path | None = None,
+    earlier: Earlier = "resume",
     progress: Progress | None = None,
 ) -> MonteCarlo:
     """Run filters with different sensor models on the same simulated flights.
@@ -74,8 +78,12 @@ def monte_carlo(
     runs, seed : int, optional
     jobs : int, optional
         Processes; -1 for one a core.
+    cluster : str, optional
+        Address of a Dask scheduler that does the work instead.
     folder : Path, optional
-        Where finished runs are kept, and taken from: an interrupted study goes on.
+        Where finished runs are kept every few seconds, also when the work is interrupted.
+    earlier : {"resume", "replace", "refuse"}, optional
+        What to do with runs that the folder holds already.
     progress : callable, optional
         Called as ``progress(done, runs, "")``.
 
@@ -88,52 +96,57 @@ def monte_carlo(
     InputError
         If there is no filter, no run, the seed is negative, or the folder holds another study.
     """
-    from joblib import Parallel, delayed
-
     if not filters:
         raise InputError("there is no filter: give one at least")
     runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
     imu = emulate(scenario.trajectory)
-    notes: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
     if source.available is not None and source.available < runs:
-        notes = (
+        text = (
             f"{source.available} runs in place of {runs}: the recording has no more stretches "
-            "of this length that do not overlap",
+            "of this length that do not overlap"
         )
+        values = {"runs": source.available, "asked": runs}
+        notices = (Notice("fewer-runs", "warning", "", text, values),)
         runs = source.available
     task = _Task(scenario, source, dict(filters), imu, seed)
-    store = RunStore.of(folder, _fingerprint(task), runs)
-    starts = range(0, runs, CHUNK)
-    found = {start: store.get(start) for start in starts}
-    chunks = {start: chunk for start, chunk in found.items() if chunk is not None}
-    missing = [start for start in starts if start not in chunks]
-    done = runs - sum(min(CHUNK, runs - start) for start in missing)
-    work = (delayed(_chunk)(task, start, min(start + CHUNK, runs)) for start in missing)
-    for start, chunk in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
-        chunks[start] = chunk
-        store.put(start, chunk)
-        done += len(next(iter(chunk.values())).error)
-        if progress is not None:
-            progress(done, runs, "")
-    parts = [chunks[start] for start in starts]
+    found = do_runs(
+        task, runs, task.study(), folder=folder, earlier=earlier, jobs=jobs, cluster=cluster,
+        progress=progress,
+    )  # fmt: skip
+    outputs = scenario.outputs()
+    time, before = outputs.time(imu.dt), outputs.before == 1
     return MonteCarlo(
-        filters={name: joined([part[name] for part in parts]) for name in filters},
+        filters={
+            name: FilterErrors(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
+            for name in filters
+        },
         outages=scenario.outages,
         example=task.example(),
         truth=scenario.trajectory,
-        notes=notes,
+        notices=notices,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """All that a worker needs."""
+    """All that a worker needs; called with the number of a run, it does that."""
 
     scenario: Scenario
     source: ErrorSource
     filters: dict[str, SensorModels]
     imu: Imu
     seed: int
+
+    def __call__(self, run: int) -> dict[str, FloatArray]:
+        """What is kept of a run, by filter and name."""
+        outputs = self.scenario.outputs()
+        found, errors = self.solutions(run, outputs)
+        return {
+            f"{name}/{key}": values
+            for name, solution in found.items()
+            for key, values in judged(solution, self.scenario.trajectory, errors, outputs).items()
+        }
 
     def solutions(self, run: int, outputs: Outputs) -> tuple[dict[str, Solution], SensorErrors]:
         """All filters on the errors of one run, and the sensor errors."""
@@ -156,6 +169,24 @@ class _Task:
         dt = self.imu.dt
         return self.solutions(0, Outputs.every(max(1.0, dt), dt, self.imu.n, ends))[0]
 
+    def study(self) -> dict[str, Any]:
+        """Everything that the runs depend on."""
+        scenario, source, aiding = self.scenario, self.source, self.scenario.aiding
+        truth = scenario.trajectory
+        fixes = [(each.kind, each.time, each.value, each.sd) for each in aiding.fixes]
+        arms = aiding.lever_arm, aiding.coloured_sd, aiding.coloured_tau
+        drawn = _exactly(source.models) if isinstance(source, Simulated) else source
+        return {
+            "seed": self.seed,
+            "filters": {name: _digest(_exactly(each)) for name, each in self.filters.items()},
+            "sensor errors": _digest(drawn),
+            "trajectory": _digest(truth.dt, truth.lla, truth.velocity, truth.rpy),
+            "fixes": _digest(*arms, *(part for each in fixes for part in each)),
+            "outages": _digest(scenario.outages),
+            "settings": _digest(scenario.initial_sd, scenario.step, scenario.second_order,
+                                scenario.interval),
+        }  # fmt: skip
+
 
 def disturbed(state: NavState, sd: InitialSd, rng: np.random.Generator) -> NavState:
     """An estimate of a state: the truth with errors drawn from their standard deviations."""
@@ -168,43 +199,13 @@ def disturbed(state: NavState, sd: InitialSd, rng: np.random.Generator) -> NavSt
     )
 
 
-def _chunk(task: _Task, start: int, stop: int) -> tuple[int, Chunk]:
-    outputs = task.scenario.outputs()
-    rows: dict[str, list[dict[str, FloatArray]]] = {name: [] for name in task.filters}
-    for run in range(start, stop):
-        found, errors = task.solutions(run, outputs)
-        for name, solution in found.items():
-            rows[name].append(judged(solution, task.scenario.trajectory, errors, outputs))
-    time = outputs.time(task.imu.dt)
-    return start, {
-        name: Runs(
-            time=time,
-            before=outputs.before == 1,
-            **{key: np.stack([row[key] for row in each]) for key in PER_RUN},
-        )
-        for name, each in rows.items()
-    }
-
-
-def _fingerprint(task: _Task) -> str:
-    """Of everything that the runs depend on."""
-    scenario = task.scenario
+def _digest(*parts: Any) -> str:
+    """Of arrays and of what has all its digits in its text."""
     digest = hashlib.sha256()
-    truth, aiding = scenario.trajectory, scenario.aiding
-    filters = [(name, _exactly(models)) for name, models in task.filters.items()]
-    source = task.source
-    drawn = _exactly(source.models) if isinstance(source, Simulated) else repr(source)
-    for part in (filters, drawn, task.seed, scenario.outages, scenario.initial_sd,
-                 scenario.step, scenario.second_order,
-                 scenario.interval, aiding.coloured_tau, truth.dt):  # fmt: skip
-        digest.update(repr(part).encode())
-    arrays = [truth.lla, truth.velocity, truth.rpy, aiding.lever_arm, aiding.coloured_sd]
-    for fixes in aiding.fixes:
-        digest.update(fixes.kind.encode())
-        arrays += [fixes.time, fixes.value, fixes.sd]
-    for array in arrays:
-        digest.update(repr(np.shape(array)).encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
+    for part in parts:
+        array = isinstance(part, np.ndarray)
+        digest.update(repr(part.shape if array else part).encode())
+        digest.update(np.ascontiguousarray(part).tobytes() if array else b"")
     return digest.hexdigest()
 
 

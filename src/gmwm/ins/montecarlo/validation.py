@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.notices import Notice
+from gmwm._core.runs import Earlier
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.montecarlo.consistency import (
     LEVELS,
@@ -21,6 +24,7 @@ from gmwm.ins.montecarlo.consistency import (
     over_time,
 )
 from gmwm.ins.montecarlo.experiment import Experiment
+from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.outage_errors import (
     QUANTITIES,
     Difference,
@@ -29,16 +33,13 @@ from gmwm.ins.montecarlo.outage_errors import (
     pooled_sizes,
     spread,
 )
-from gmwm.ins.montecarlo.runs import Runs
 from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SETTLED = 0.25  # share of the trajectory after which the filter with GNSS is judged
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("position", "velocity", "attitude", "sensors")
-_WIDTH = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +61,16 @@ class Validation:
         experiment: Experiment,
         *,
         jobs: int = 1,
+        cluster: str | None = None,
         folder: Path | None = None,
+        earlier: Earlier = "resume",
         progress: Progress | None = None,
     ) -> Validation:
         """Do the runs of an experiment; see `gmwm.ins.montecarlo.trials.monte_carlo`."""
         study = monte_carlo(
             experiment.scenario, experiment.source, experiment.filters, experiment.runs,
-            experiment.seed, jobs=jobs, folder=folder, progress=progress,
+            experiment.seed, jobs=jobs, cluster=cluster, folder=folder, earlier=earlier,
+            progress=progress,
         )  # fmt: skip
         return cls(experiment, study)
 
@@ -89,13 +93,18 @@ class Validation:
         return tuple(found)
 
     @property
-    def divergences(self) -> tuple[str, ...]:
-        """One sentence for each filter that diverged in some run."""
+    def notices(self) -> tuple[Notice, ...]:
+        """What to know of the runs: too few of them, filters that diverged."""
         found = {name: self.study[name] for name in self.names if self.study[name].diverged}
-        return tuple(
-            f"{name} diverged in {runs.diverged} of {runs.runs} runs: figures are of the others"
+        diverged = (
+            Notice(
+                "diverged", "bad", name,
+                f"diverged in {runs.diverged} of {runs.runs} runs; figures are of the others",
+                {"diverged": runs.diverged, "runs": runs.runs},
+            )
             for name, runs in found.items()
-        )
+        )  # fmt: skip
+        return (*self.study.notices, *diverged)
 
     def spreads(self, name: str) -> list[dict[str, Spread]]:
         """Errors of a filter before the first fix after each outage."""
@@ -110,7 +119,7 @@ class Validation:
         """Consistency of a filter while GNSS is on, once it has settled."""
         duration = self.study.truth.duration
         first = min((outage.start for outage in self.study.outages), default=duration)
-        start = min(_SETTLED * duration, 0.5 * first)
+        start = min(tuning.SETTLED * duration, 0.5 * first)
         return over_time(self.study[name], start, first)
 
     def innovations(self, name: str) -> InnovationTest:
@@ -158,9 +167,9 @@ class Validation:
             f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
             f"{word}, seed {self.experiment.seed}"
         )
-        lines = textwrap.wrap(first, _WIDTH, subsequent_indent="  ")
-        for note in (*self.study.notes, *self.divergences):
-            lines += textwrap.wrap(note, _WIDTH, initial_indent="- ", subsequent_indent="  ")
+        lines = wrapped(first, indent=2)
+        for notice in self.notices:
+            lines += wrapped(str(notice), "- ", 2)
         return lines
 
     def _error_rows(self, outage: int, width: int) -> list[str]:
@@ -199,7 +208,9 @@ class Validation:
         for name in self.names:
             for label, found in self._judgements(name):
                 cells = [
-                    "- " if np.isnan(c.share) else f"{100.0 * c.share:.1f}" + " *"[not c.within]
+                    "- "
+                    if np.isnan(c.fraction)
+                    else f"{100.0 * c.fraction:.1f}" + " *"[not c.within]
                     for c in found.coverage["position"]
                 ]
                 rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
@@ -297,7 +308,9 @@ class Validation:
         return self.study.outages[index]
 
 
-def _growth(runs: Runs, start: float, end: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _growth(
+    runs: FilterErrors, start: float, end: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times since the start, and horizontal and vertical RMS, true and predicted."""
     shown = (runs.time >= start) & (runs.time <= end) & (runs.before | (runs.time < end))
     alive = np.all(np.isfinite(runs.error[:, shown, 0]), axis=1)

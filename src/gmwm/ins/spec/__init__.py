@@ -1,17 +1,34 @@
 """Studies of navigation as people write them, in YAML."""
 
-from gmwm.ins.spec.document import mapping, positive, read_document, three
-from gmwm.ins.spec.experiment import experiment_from, read_models, reading_options
-from gmwm.ins.spec.model_text import sensor_models, value
+from gmwm.ins.spec.document import read_document
+from gmwm.ins.spec.experiment import ReadingSpec, experiment_from
+from gmwm.ins.spec.fields import (
+    FileName,
+    Meters,
+    PositiveMeters,
+    PositiveRadians,
+    PositiveSpeed,
+    Radians,
+    Spec,
+    Three,
+    number,
+)
+from gmwm.ins.spec.sensor_terms import Models, read_models, sensor_models
 
 __all__ = [
+    "FileName",
+    "Meters",
+    "Models",
+    "PositiveMeters",
+    "PositiveRadians",
+    "PositiveSpeed",
+    "Radians",
+    "ReadingSpec",
+    "Spec",
+    "Three",
     "experiment_from",
-    "mapping",
-    "positive",
+    "number",
     "read_document",
     "read_models",
-    "reading_options",
     "sensor_models",
-    "three",
-    "value",
 ]

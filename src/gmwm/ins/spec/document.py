@@ -1,14 +1,13 @@
-"""YAML documents that people write: read strictly, so that no line is passed over in silence."""
+"""YAML documents that people write: a key that is there twice is refused, not replaced."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gmwm._core import checks
 from gmwm.errors import InputError
-from gmwm.ins.spec.model_text import value
 
 
 def read_document(path: Path) -> dict[str, Any]:
@@ -21,7 +20,7 @@ def read_document(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, is no YAML, is no mapping, or has a key twice.
+        If it cannot be read, is not YAML or not a mapping, or has a key twice.
     """
     import yaml
 
@@ -30,62 +29,14 @@ def read_document(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is no YAML ({_reason(error)}): mend it") from None
+        raise InputError(f"{path}: is not YAML ({_reason(error)}): correct it") from None
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
     if not isinstance(content, Mapping):
-        raise InputError(f"{path}: {checks.shown(content)} is no mapping: write KEY: VALUE lines")
-    return given(content)
-
-
-def given(content: Mapping[Any, Any]) -> dict[str, Any]:
-    """A mapping without the keys that have no value."""
-    return {name: each for name, each in content.items() if each is not None}
-
-
-def mapping(where: str, content: Any, names: Sequence[str]) -> dict[str, Any]:
-    """A mapping of known keys.
-
-    Raises
-    ------
-    InputError
-        If it is none, or has another key.
-    """
-    if not isinstance(content, Mapping):
         raise InputError(
-            f"{where}: {checks.shown(content)}: write KEY: VALUE; keys are {', '.join(names)}"
+            f"{path}: {checks.shown(content)} is not a mapping: write KEY: VALUE lines"
         )
-    for name in content:
-        if name not in names:
-            raise InputError(f"{where}: {checks.shown(name)} is unknown: there are "
-                             f"{', '.join(names)}")  # fmt: skip
-    return given(content)
-
-
-def three(content: Any, si_unit: str, where: str) -> list[float]:
-    """Three numbers in SI units, from three or from one for all.
-
-    Raises
-    ------
-    InputError
-        If they are not.
-    """
-    if isinstance(content, Sequence) and not isinstance(content, str):
-        if len(content) != 3:
-            raise InputError(f"{where}: {checks.shown(content)}: give three numbers")
-        return [value(each, si_unit, where) for each in content]
-    return [value(content, si_unit, where)] * 3
-
-
-def positive(content: Any, si_unit: str, where: str) -> float:
-    """A number above zero in SI units.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    return checks.positive(where, value(content, si_unit, where))
+    return {name: each for name, each in content.items() if each is not None}
 
 
 def _load(text: str) -> Any:

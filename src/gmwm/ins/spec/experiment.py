@@ -7,17 +7,33 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 
 from gmwm._core import checks
-from gmwm.calibration import load
 from gmwm.errors import InputError
-from gmwm.ins.covariance import FORMS, reduce
+from gmwm.ins.covariance import reduce
 from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
 from gmwm.ins.imu import Recorded, SensorModels, emulate
 from gmwm.ins.montecarlo import ErrorSource, Experiment, Scenario, Simulated
-from gmwm.ins.spec.document import mapping, positive, read_document, three
-from gmwm.ins.spec.model_text import sensor_models, value
+from gmwm.ins.spec.document import read_document
+from gmwm.ins.spec.fields import (
+    RECORDINGS,
+    REDUCED,
+    FileName,
+    Meters,
+    PositiveHertz,
+    PositiveMeters,
+    PositiveRadians,
+    PositiveSeconds,
+    PositiveSpeed,
+    Seconds,
+    Spec,
+    Three,
+    written,
+)
+from gmwm.ins.spec.sensor_terms import Models, ModelsSpec, OfFile, OfTerms, form_of, read_models
 from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter, helicopter_mapping
 from gmwm.readers import read
 
@@ -28,14 +44,116 @@ MISSIONS: dict[str, Callable[..., Trajectory]] = {
 }
 """Ready-made trajectories by name."""
 
-KEYS = ("trajectory", "duration", "rate", "truth", "filters", "outages", "gnss", "initial_sd",
-        "runs", "seed")  # fmt: skip
-"""What a description may say."""
-
-_OF_RECORDINGS = ("recordings", "rate", "units", "channels", "time")
 _LONGEST_NAME = 40
 _SAME_TIME = 1e-6  # s
 _SAME_RATE = 1e-3
+
+
+_NONE = BeforeValidator(lambda given: None if given == "none" else given)
+
+
+class ReadingSpec(Spec):
+    """How a recording is read; see `gmwm.read`."""
+
+    rate: PositiveHertz | None = None
+    units: Annotated[dict[str, str] | None, written("{gyro: deg/s, accel: g}")] = None
+    channels: Annotated[dict[str, str | StrictInt] | None, written("{gyro_x: column}")] = None
+    time: Annotated[str | StrictInt | Literal[False] | None, written("a column, or none")] = None
+
+    def options(self) -> dict[str, Any]:
+        """Arguments of `gmwm.read`."""
+        options = {name: getattr(self, name) for name in ReadingSpec.model_fields}
+        return options | ({"time": False} if self.time == "none" else {})
+
+
+class RecordingsSpec(ReadingSpec):
+    """Static recordings that sensor errors are taken from."""
+
+    recordings: Annotated[
+        list[FileName],
+        written("[file, ...]"),
+        BeforeValidator(lambda given: [given] if isinstance(given, str) else given),
+    ]
+
+
+class ReducedSpec(Spec):
+    """The best small model of a form, for the outages of the experiment."""
+
+    reduce: Annotated[Literal["N+K", "N+GM"], written("N+K or N+GM")]
+    of: Models = "truth"
+
+
+class GnssSpec(Spec):
+    """Fixes; what is left out is as usual in `gmwm.ins.gnss`."""
+
+    interval: PositiveSeconds | None = None
+    position_sd: Annotated[Three[PositiveMeters] | None, _NONE] = None
+    velocity_sd: Annotated[Three[PositiveSpeed] | None, _NONE] = None
+    lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
+    coloured_sd: Three[Meters] | None = None
+    coloured_tau: PositiveSeconds | None = None
+
+
+class InitialSdSpec(Spec):
+    """What initial errors are drawn from."""
+
+    position: PositiveMeters | None = None
+    velocity: PositiveSpeed | None = None
+    tilt: PositiveRadians | None = None
+    heading: PositiveRadians | None = None
+
+
+def _named(given: Any) -> dict[str, Any]:
+    """Filters by names that tables and figures can show."""
+    if not isinstance(given, Mapping):
+        raise ValueError(
+            f"{checks.shown(given)}: write NAME: calibration.json, or NAME: with models"
+        )
+    found: dict[str, Any] = {}
+    for key, each in given.items():
+        name = str(key)
+        if not name.strip() or not name.isprintable() or len(name) > _LONGEST_NAME:
+            raise ValueError(
+                f"{name[:_LONGEST_NAME]!r} cannot be a name: write 1 to {_LONGEST_NAME} "
+                "characters that can be printed"
+            )
+        if name in found:
+            raise ValueError(f"{name!r} is there twice: give each a name of its own")
+        found[name] = each
+    return found
+
+
+_Truth = Annotated[
+    OfFile | Annotated[RecordingsSpec, Tag(RECORDINGS)] | OfTerms,
+    Discriminator(form_of),
+    written("a calibration.json, models or recordings"),
+]
+_Filter = Annotated[
+    OfFile | Annotated[ReducedSpec, Tag(REDUCED)] | OfTerms,
+    Discriminator(form_of),
+    written("a calibration.json, models, or truth"),
+]
+_Span = Annotated[tuple[Seconds, Seconds], written("[start, length] in seconds")]
+
+
+class ExperimentSpec(Spec):
+    """What a file may say."""
+
+    NEEDS: ClassVar[str] = (
+        "say what is flown or driven (trajectory), where sensor errors come from (truth), what "
+        "each filter believes (filters)"
+    )
+
+    trajectory: Annotated[str, written(f"{', '.join(MISSIONS)} or a file")]
+    duration: PositiveSeconds | None = None
+    rate: PositiveHertz | None = None
+    truth: _Truth
+    filters: Annotated[dict[str, _Filter], BeforeValidator(_named)]
+    outages: Annotated[tuple[_Span, ...], written("[[start, length], ...] in seconds")] = ()
+    gnss: GnssSpec = GnssSpec()
+    initial_sd: InitialSdSpec = InitialSdSpec()
+    runs: Annotated[StrictInt, Field(ge=1)] = 100
+    seed: Annotated[StrictInt, Field(ge=0)] = 0
 
 
 def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experiment:
@@ -53,29 +171,25 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
     InputError
         If something is missing, unknown or cannot be used.
     """
-    content = mapping("the experiment", content, KEYS)
-    missing = [name for name in ("trajectory", "truth", "filters") if not content.get(name)]
-    if missing:
-        raise InputError(
-            f"the experiment has no {', no '.join(missing)}: say what is flown or driven "
-            "(trajectory), where sensor errors come from (truth), what each filter believes "
-            "(filters)"
-        )
-    trajectory = _trajectory(content, folder)
-    outages = _outages(content.get("outages", ()))
-    aiding = _aiding(content.get("gnss", {}), trajectory)
-    scenario = Scenario(trajectory, aiding, outages, _initial_sd(content.get("initial_sd", {})))
+    spec = ExperimentSpec.parse(content)
+    trajectory = _trajectory(spec, folder)
+    outages = _apart(spec.outages)
+    aiding = _aiding(spec.gnss, trajectory)
+    scenario = Scenario(trajectory, aiding, outages, InitialSd(**spec.initial_sd.given))
     _check_fixes(aiding, outages)
-    source, truth = _source(content["truth"], trajectory, folder)
-    believed = _Believed(truth, source, [o.duration for o in outages], trajectory.dt, folder)
+    source, truth = _source(spec.truth, trajectory, folder)
+    lengths = [outage.duration for outage in outages]
+    believed = _Believed(truth, source, lengths, trajectory.dt, folder)
     return Experiment(
         scenario=scenario,
         source=source,
-        filters=believed.filters(content["filters"]),
+        filters={
+            name: believed.models(f"filters, {name}", each) for name, each in spec.filters.items()
+        },
         truth=truth,
-        runs=checks.whole("runs", content.get("runs", 100), 1),
-        seed=checks.whole("seed", content.get("seed", 0), 0),
-        title=Path(content["trajectory"]).name,
+        runs=spec.runs,
+        seed=spec.seed,
+        title=Path(spec.trajectory).name,
     )
 
 
@@ -85,29 +199,24 @@ def read_experiment(path: Path) -> Mapping[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read or is no YAML.
+        If it cannot be read or is not YAML.
     """
     return read_document(path)
 
 
-def _trajectory(content: Mapping[str, Any], folder: Path) -> Trajectory:
-    name = content["trajectory"]
-    if not isinstance(name, str):
-        raise InputError(f"trajectory: {checks.shown(name)}: write {', '.join(MISSIONS)} or a file")
-    duration = content.get("duration")
-    if duration is not None:
-        duration = positive(duration, "s", "duration")
+def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
+    name, duration = spec.trajectory, spec.duration
     if name in MISSIONS:
         arguments = {} if duration is None else {"duration": duration}
-        if "rate" in content:
-            arguments["dt"] = 1.0 / positive(content["rate"], "Hz", "rate")
+        if spec.rate is not None:
+            arguments["dt"] = 1.0 / spec.rate
         return MISSIONS[name](**arguments)
     if not os.path.exists(folder / name):
         raise InputError(
-            f"trajectory {checks.shown(name)} is no file, and none of {', '.join(MISSIONS)}: "
+            f"trajectory {checks.shown(name)} is not a file, and none of {', '.join(MISSIONS)}: "
             "check the name"
         )
-    if "rate" in content:
+    if spec.rate is not None:
         raise InputError("rate: a trajectory from a file has its own: leave it out")
     trajectory = Trajectory.read(folder / name)
     if duration is None:
@@ -119,12 +228,9 @@ def _trajectory(content: Mapping[str, Any], folder: Path) -> Trajectory:
     return trajectory.segment(0.0, duration)
 
 
-def _outages(content: Any) -> tuple[Outage, ...]:
-    if not isinstance(content, Sequence) or isinstance(content, str):
-        raise InputError(
-            f"outages: {checks.shown(content)}: write [[start, length], ...] in seconds"
-        )
-    outages = sorted((_outage(each) for each in content), key=lambda outage: outage.start)
+def _apart(given: tuple[tuple[float, float], ...]) -> tuple[Outage, ...]:
+    """Outages in order that do not overlap."""
+    outages = sorted((Outage(*each) for each in given), key=lambda outage: outage.start)
     for first, second in pairwise(outages):
         if second.start < first.end - _SAME_TIME:
             raise InputError(
@@ -134,30 +240,8 @@ def _outages(content: Any) -> tuple[Outage, ...]:
     return tuple(outages)
 
 
-def _outage(given: Any) -> Outage:
-    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
-        raise InputError(f"outages: {checks.shown(given)}: write [start, length] in seconds")
-    start, duration = (value(each, "s", "outages") for each in given)
-    return Outage(start, duration)
-
-
-def _aiding(content: Any, trajectory: Trajectory) -> Aiding:
-    units = {"position_sd": "m", "velocity_sd": "m/s", "lever_arm": "m", "coloured_sd": "m"}
-    content = mapping("gnss", content, ("interval", *units, "coloured_tau"))
-    arguments: dict[str, Any] = {
-        name: positive(content[name], "s", f"gnss, {name}")
-        for name in ("interval", "coloured_tau")
-        if name in content
-    }
-    for name, unit in units.items():
-        if name in content:
-            off = name in ("position_sd", "velocity_sd") and content[name] == "none"
-            arguments[name] = None if off else three(content[name], unit, f"gnss, {name}")
-        if name.endswith(("position_sd", "velocity_sd")) and arguments.get(name):
-            arguments[name] = [checks.positive(f"gnss, {name}", each) for each in arguments[name]]
-    if any(arguments.get("lever_arm", ())):
-        arguments["imu"] = emulate(trajectory)
-    return gnss(trajectory, **arguments)
+def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
+    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
 def _check_fixes(aiding: Aiding, outages: Sequence[Outage]) -> None:
@@ -176,101 +260,25 @@ def _check_fixes(aiding: Aiding, outages: Sequence[Outage]) -> None:
             )
 
 
-def _initial_sd(content: Any) -> InitialSd:
-    units = {"position": "m", "velocity": "m/s", "tilt": "rad", "heading": "rad"}
-    content = mapping("initial_sd", content, list(units))
-    found = {
-        name: positive(each, units[name], f"initial_sd, {name}") for name, each in content.items()
-    }
-    return InitialSd(**found)
-
-
 def _source(
-    given: Any, trajectory: Trajectory, folder: Path
+    given: str | RecordingsSpec | ModelsSpec, trajectory: Trajectory, folder: Path
 ) -> tuple[ErrorSource, SensorModels | None]:
     """Where errors come from, and their models if they are simulated."""
-    if isinstance(given, Mapping) and "recordings" in given:
-        return _recorded(mapping("truth", given, _OF_RECORDINGS), trajectory, folder), None
+    if isinstance(given, RecordingsSpec):
+        return _recorded(given, trajectory, folder), None
     models = read_models("truth", given, folder)
     return Simulated(models), models
 
 
-def _recorded(given: Mapping[str, Any], trajectory: Trajectory, folder: Path) -> Recorded:
-    names = given.get("recordings", ())
-    names = [names] if isinstance(names, str) else names
-    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"truth, recordings: {checks.shown(names)}: write [file, ...]")
-    options = reading_options("truth", given)
-    source = Recorded.of([read(folder / name, **options) for name in names], trajectory.duration)
+def _recorded(given: RecordingsSpec, trajectory: Trajectory, folder: Path) -> Recorded:
+    recordings = [read(folder / name, **given.options()) for name in given.recordings]
+    source = Recorded.of(recordings, trajectory.duration)
     if abs(trajectory.dt / source.dt - 1.0) > _SAME_RATE:
         raise InputError(
             f"truth: {source.source} has {1.0 / source.dt:g} Hz and the trajectory "
             f"{1.0 / trajectory.dt:g} Hz: give a trajectory of the recordings' rate"
         )
     return source
-
-
-def reading_options(where: str, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of `gmwm.read` from the keys rate, units, channels and time.
-
-    Raises
-    ------
-    InputError
-        If one is of a wrong type.
-    """
-    options: dict[str, Any] = {}
-    if "rate" in content:
-        options["rate"] = positive(content["rate"], "Hz", f"{where}, rate")
-    for name, example in (("units", "{gyro: deg/s, accel: g}"), ("channels", "{gyro_x: wx}")):
-        if name in content:
-            if not isinstance(content[name], Mapping):
-                raise InputError(f"{where}, {name}: {checks.shown(content[name])}: write {example}")
-            options[name] = dict(content[name])
-    if "time" in content:
-        column = content["time"]
-        off = column == "none" or column is False
-        if not off and (isinstance(column, bool) or not isinstance(column, str | int)):
-            raise InputError(f"{where}, time: {checks.shown(column)}: write a column, or none")
-        options["time"] = False if off else column
-    for name, each in options.get("units", {}).items():
-        if not isinstance(each, str):
-            raise InputError(f"{where}, units, {name}: {checks.shown(each)}: write deg/s, g, ...")
-    for name, each in options.get("channels", {}).items():
-        if isinstance(each, bool) or not isinstance(each, str | int):
-            raise InputError(f"{where}, channels, {name}: {checks.shown(each)}: write a column")
-    return options
-
-
-def read_models(where: str, given: Any, folder: Path) -> SensorModels:
-    """Sensor models from the name of a calibration.json or from what the document says.
-
-    Parameters
-    ----------
-    where : str
-        For messages.
-    given : str or mapping
-    folder : Path
-        That a name is relative to.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or lacks an axis.
-    """
-    if isinstance(given, str):
-        try:
-            calibration = load(folder / given)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-        except ValueError:  # a null character in the name
-            raise InputError(f"{where}: {checks.shown(given)} is no path: check it") from None
-        try:
-            return SensorModels.of(calibration)
-        except InputError as error:
-            raise InputError(f"{where}, {given}: {error}") from None
-    if isinstance(given, Mapping):
-        return sensor_models(given, where)
-    raise InputError(f"{where}: {checks.shown(given)}: give a calibration.json, or models")
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,21 +291,7 @@ class _Believed:
     dt: float
     folder: Path
 
-    def filters(self, given: Any) -> dict[str, SensorModels]:
-        if not isinstance(given, Mapping):
-            raise InputError(
-                f"filters: {checks.shown(given)}: write NAME: calibration.json, or NAME: with "
-                "models"
-            )
-        found: dict[str, SensorModels] = {}
-        for key, each in given.items():
-            name = _name(key)
-            if name in found:
-                raise InputError(f"filters: {name!r} is there twice: give each a name of its own")
-            found[name] = self._models(f"filter {name}", each)
-        return found
-
-    def _models(self, where: str, given: Any) -> SensorModels:
+    def models(self, where: str, given: str | ReducedSpec | ModelsSpec) -> SensorModels:
         models = self._given(where, given)
         try:
             SensorStates.of(models, self.dt, 1)
@@ -305,40 +299,27 @@ class _Believed:
             raise InputError(f"{where}, {error}") from None
         return models
 
-    def _given(self, where: str, given: Any) -> SensorModels:
+    def _given(self, where: str, given: str | ReducedSpec | ModelsSpec) -> SensorModels:
         if given == "truth":
             if self.truth is None:
                 raise InputError(f"{where}: real errors have no true model: give a calibration")
             return self.truth
-        if isinstance(given, Mapping) and "reduce" in given:
-            return self._reduced(where, mapping(where, given, ("reduce", "of")))
+        if isinstance(given, ReducedSpec):
+            return self._reduced(where, given)
         models = read_models(where, given, self.folder)
         return _with_bias(models, self.source) if isinstance(self.source, Recorded) else models
 
-    def _reduced(self, where: str, given: Mapping[str, Any]) -> SensorModels:
-        of = given.get("of", "truth")
-        full = self.truth if of == "truth" else read_models(where, of, self.folder)
+    def _reduced(self, where: str, given: ReducedSpec) -> SensorModels:
+        full = self.truth if given.of == "truth" else read_models(where, given.of, self.folder)
         if full is None:
             raise InputError(f"{where}: say what is reduced, as in of: calibration.json")
-        checks.choice(f"{where}, reduce", given.get("reduce"), list(FORMS))
         lengths = {round(length / self.dt) * self.dt for length in self.lengths}
         try:
             return reduce(
-                full, given["reduce"], sorted(lengths) or (10.0, 30.0, 60.0), dt=self.dt
+                full, given.reduce, sorted(lengths) or (10.0, 30.0, 60.0), dt=self.dt
             ).models
         except InputError as error:
             raise InputError(f"{where}, {error}") from None
-
-
-def _name(key: Any) -> str:
-    """The name of a filter, as tables and figures can show it."""
-    name = str(key)
-    if not name.strip() or not name.isprintable() or len(name) > _LONGEST_NAME:
-        raise InputError(
-            f"filters: {name[:_LONGEST_NAME]!r} is no name: write 1 to "
-            f"{_LONGEST_NAME} characters that can be printed"
-        )
-    return name
 
 
 def _with_bias(models: SensorModels, source: Recorded) -> SensorModels:

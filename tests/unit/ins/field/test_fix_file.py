@@ -77,8 +77,8 @@ def test_empty_rows_and_the_gulf_of_guinea_are_no_fixes(tmp_path: Path) -> None:
     [
         ("time_s,latitude_deg,height_m,x", 0, ROWS[0], "no column for longitude"),
         ("time_s,latitude_rad,longitude_rad,height_m", 0, ROWS[0], "line 2: a latitude of 26"),
-        ("time_s,latitude_m,longitude_deg,height_m", 0, ROWS[0], "m is no unit of an angle"),
-        ("time_s,latitude_deg,longitude_deg,height_deg", 0, ROWS[0], "no unit of a height"),
+        ("time_s,latitude_m,longitude_deg,height_m", 0, ROWS[0], "m is not a unit of angle"),
+        ("time_s,latitude_deg,longitude_deg,height_deg", 0, ROWS[0], "not a unit of height"),
         (HEAD, 2, [101.0, 46, 7, 400], "line 4: time stamp 101 repeats the one before"),
         (HEAD, 2, [99.0, 46, 7, 400], "line 4: time stamp 99 goes back"),
         (HEAD, 2, ["", 46, 7, 400], "line 4: no time"),
@@ -154,8 +154,9 @@ def test_bad_imu_files(tmp_path: Path) -> None:
         read_imu(write_imu(tmp_path, rows[:, :6], IMU_HEAD.rpartition(",")[0]))
     free = rows.copy()
     free[:, 6] += 9.8
-    with pytest.raises(InputError, match="that gravity is not taken off"):
+    with pytest.raises(InputError, match="that gravity is not subtracted"):
         read_imu(write_imu(tmp_path, free))
     upward = rows.copy()
     upward[:, 6] *= -1.0
-    assert "points up" in " ".join(read_imu_log(write_imu(tmp_path, upward)).notes)
+    notices = read_imu_log(write_imu(tmp_path, upward)).notices
+    assert ("axis-up", "accel_z") in {(notice.code, notice.where) for notice in notices}

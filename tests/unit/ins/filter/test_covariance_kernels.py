@@ -15,7 +15,13 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.ins.filter.covariance_kernels import carry, error_rates, take_in, tilt_squared, transition
+from gmwm.ins.filter.covariance_kernels import (
+    error_rates,
+    measurement_update,
+    propagate,
+    tilt_squared,
+    transition,
+)
 from gmwm.ins.filter.mechanization import integrate
 from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry.earth import ned_difference, offset
@@ -214,10 +220,10 @@ def random_covariance(n, rng, scale):
     return root @ root.T
 
 
-def carried(P, A, B, states, k):
-    """P after `carry`, in a copy."""
+def propagated(P, A, B, states, k):
+    """P after `propagate`, in a copy."""
     P, m, n = P.copy(), states.m, len(P)
-    carry(
+    propagate(
         P, A, B, states.axis, states.partner, states.phi[k], states.phi_off[k], states.gain[k],
         states.noise[k], states.noise_off[k], states.cross[k], states.integral[k],
         np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n),
@@ -255,7 +261,7 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     last = np.eye(9 + m, 9 + m + 6)
     last[:9, :9], last[:9, 9 + m :] = A, B
     expected = last @ whole @ last.T
-    found = carried(P, A, B, states, k)
+    found = propagated(P, A, B, states, k)
     unit = np.sqrt(np.diag(expected))
     unit[unit == 0.0] = 1.0
     np.testing.assert_allclose(found / unit / unit[:, None], expected / unit / unit[:, None],
@@ -270,11 +276,11 @@ def test_a_step_of_ten_samples_is_near_ten_steps_of_one():
     P = random_covariance(9 + states.m, rng, scale)
     state = nav_state(STATES[0])
     _, A, B = kernel_matrices(state, 10 * DT)
-    coarse = carried(P, A, B, states, 10)
+    coarse = propagated(P, A, B, states, 10)
     fine = P
     _, A, B = kernel_matrices(state, DT)
     for _ in range(10):
-        fine = carried(fine, A, B, states, 1)
+        fine = propagated(fine, A, B, states, 1)
     unit = np.sqrt(np.diag(fine))
     unit[unit == 0.0] = 1.0
     np.testing.assert_allclose(coarse / unit / unit[:, None], fine / unit / unit[:, None],
@@ -289,7 +295,7 @@ def test_noise_over_many_steps_needs_no_start():
     _, A, B = kernel_matrices(still, 10 * DT)
     P = np.zeros((9, 9))
     for _ in range(100):
-        P = carried(P, A, B, states, 10)
+        P = propagated(P, A, B, states, 10)
     t = 10.0
     angle, speed = 1e-4**2 * t, 2e-3**2 * t
     np.testing.assert_allclose(np.diag(P)[6:], angle, rtol=1e-4)
@@ -320,7 +326,7 @@ def test_an_update_is_the_textbook_one(state):
     S = H @ P @ H.T + R
     nis = 0.0
     for i in range(3):
-        found, variance = take_in(P, H[i, :9].copy(), state, R[i, i], z[i], x, K)
+        found, variance = measurement_update(P, H[i, :9].copy(), state, R[i, i], z[i], x, K)
         nis += found**2 / variance
     np.testing.assert_allclose(P, expected, atol=1e-12 * np.abs(expected).max())
     np.testing.assert_allclose(x, gain @ z, rtol=1e-9, atol=1e-12)
@@ -334,7 +340,7 @@ def test_a_very_exact_measurement_leaves_a_covariance():
     h, x, K = np.zeros(9), np.zeros(12), np.zeros(12)
     h[4] = 1.0
     for _ in range(1000):
-        take_in(P, h, -1, 1e-8, 0.0, x, K)
+        measurement_update(P, h, -1, 1e-8, 0.0, x, K)
     assert P[4, 4] == pytest.approx(1e-11, rel=1e-3)
     assert np.linalg.eigvalsh(P).min() > -1e-13 * np.linalg.eigvalsh(P).max()
 

@@ -116,7 +116,7 @@ def test_positions_follow_pyins() -> None:
 
     lla = theirs[LLA_COLS].to_numpy() * [math.pi / 180, math.pi / 180, 1.0]
     rpy = np.radians(theirs[RPH_COLS].to_numpy())
-    # The errors carry both far off, together; theirs neglects third-order terms of the steps.
+    # The errors drive both far away, together; theirs neglects third-order terms of the steps.
     assert np.max(np.abs(ned_difference(found.lla, flat.lla))) > 200.0
     assert (
         np.max(np.abs(ned_difference(found.lla, lla))) < 0.02

@@ -110,9 +110,9 @@ def test_bad_rows_are_named(tmp_path: Path, table: np.ndarray, message: str) -> 
     [
         (HEADER.replace("roll", "foo"), "no column for roll: name the columns"),
         (HEADER.replace("time_s", "x"), "no column for time"),
-        (HEADER.replace("roll", "lat"), "'latitude_deg' and 'lat_deg' both look like the latitude"),
-        (HEADER.replace("roll_deg", "roll_m"), "'roll_m': m is no unit of an angle"),
-        (HEADER.replace("height_m", "height_deg"), "deg is no unit of a height"),
+        (HEADER.replace("roll", "lat"), "'latitude_deg' and 'lat_deg' both look like latitude"),
+        (HEADER.replace("roll_deg", "roll_m"), "'roll_m': m is not a unit of angle"),
+        (HEADER.replace("height_m", "height_deg"), "deg is not a unit of height"),
         (HEADER.replace("_deg", "_rad"), "a latitude of .* deg: check the unit"),
     ],
 )

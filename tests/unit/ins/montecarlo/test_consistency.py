@@ -23,7 +23,7 @@ from gmwm.ins.montecarlo.consistency import (
     mean_ratio,
     over_time,
 )
-from gmwm.ins.montecarlo.runs import GROUPS, Runs
+from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
 SIZES = {"position": 3, "velocity": 3, "attitude": 3, "navigation": 9, "sensors": 6}
 
@@ -46,7 +46,7 @@ def synthetic(rng, runs, epochs=1, *, true=1.0, memory=0.0):
             "...i,ij,...j", error[..., part], np.linalg.inv(block), error[..., part]
         )
         log_det[..., i] = np.log(np.linalg.det(block))
-    return Runs(
+    return FilterErrors(
         time=np.arange(epochs, dtype=float),
         before=np.zeros(epochs, dtype=bool),
         error=error,
@@ -96,8 +96,8 @@ def test_bands_of_one_epoch_hold_95_percent_of_consistent_draws():
     draws = 250
     found = [at_epoch(synthetic(rng, 30), 0) for _ in range(draws)]
     for name in SIZES:
-        share = np.mean([each.nees[name].within for each in found])
-        assert least(draws, 0.95) <= share <= most(draws, 0.95), name
+        fraction = np.mean([each.nees[name].within for each in found])
+        assert least(draws, 0.95) <= fraction <= most(draws, 0.95), name
         p_values = np.sort([each.nees[name].p_value for each in found])
         uniform = np.arange(1, draws + 1) / draws
         assert np.max(np.abs(p_values - uniform)) < 2.3 / np.sqrt(draws), name  # Kolmogorov, 5e-5
@@ -117,8 +117,8 @@ def test_bands_over_time_hold_95_percent_of_correlated_draws():
     found = [over_time(synthetic(rng, 30, 20, memory=0.9)) for _ in range(draws)]
     for name in SIZES:
         # Student's t with some skewness left: 93 % to 96 %.
-        share = np.mean([each.nees[name].within for each in found])
-        assert least(draws, 0.93) <= share <= most(draws, 0.96), name
+        fraction = np.mean([each.nees[name].within for each in found])
+        assert least(draws, 0.93) <= fraction <= most(draws, 0.96), name
     assert np.mean([each.consistent for each in found]) >= least(draws, 0.985)
 
 
@@ -143,9 +143,9 @@ def test_interval_of_coverage_over_time_is_honest(memory):
     found = [over_time(synthetic(rng, 40, 15, memory=memory)) for _ in range(draws)]
     for name in ("position", "navigation", "sensors"):
         for i, level in enumerate(LEVELS):
-            share = np.mean([each.coverage[name][i].within for each in found])
+            fraction = np.mean([each.coverage[name][i].within for each in found])
             # Nominal 95 %; at 99.7 % a few runs make the count, and the law is approximate.
-            assert share >= least(draws, 0.95 if level < 0.99 else 0.93), (name, level)
+            assert fraction >= least(draws, 0.95 if level < 0.99 else 0.93), (name, level)
 
 
 def test_interval_of_coverage_over_time_tightens_with_what_the_runs_are_worth():
@@ -158,12 +158,14 @@ def test_interval_of_coverage_over_time_tightens_with_what_the_runs_are_worth():
 
 
 def test_interval_of_coverage_over_time_of_few_runs_is_that_of_student():
-    """Where the share is near one half and the draws are many, the binomial law is normal."""
+    """Where the fraction is near one half and the draws are many, the binomial law is normal."""
     runs = synthetic(np.random.default_rng(21), 6, 300, memory=0.9)
-    shares = np.mean(np.abs(runs.error[..., :3] / runs.sd[..., :3]) < norm.ppf(0.75), axis=(1, 2))
-    expected = stats_t.interval(0.95, 5, shares.mean(), shares.std(ddof=1) / np.sqrt(6.0))
+    fractions = np.mean(
+        np.abs(runs.error[..., :3] / runs.sd[..., :3]) < norm.ppf(0.75), axis=(1, 2)
+    )
+    expected = stats_t.interval(0.95, 5, fractions.mean(), fractions.std(ddof=1) / np.sqrt(6.0))
     found = over_time(runs).coverage["position"][0]
-    assert found.share == pytest.approx(shares.mean())
+    assert found.fraction == pytest.approx(fractions.mean())
     assert (found.lower, found.upper) == pytest.approx(expected, abs=0.1 * np.ptp(expected))
 
 
@@ -181,9 +183,11 @@ def test_covariance_wrong_by_a_factor_is_flagged(true, judge):
         assert ratio.p_value < 1e-3
         assert (ratio.value > 1.0) == (true > 1.0)
         assert found.rms[name] == pytest.approx(np.sqrt(true), rel=0.1)
-        share = norm.cdf(norm.ppf(0.975) / np.sqrt(true)) * 2.0 - 1.0
-        assert found.coverage[name][2].share == pytest.approx(share, abs=0.1)
-        assert all((each.share < each.level) == (true > 1.0) for each in found.coverage[name][:3])
+        fraction = norm.cdf(norm.ppf(0.975) / np.sqrt(true)) * 2.0 - 1.0
+        assert found.coverage[name][2].fraction == pytest.approx(fraction, abs=0.1)
+        assert all(
+            (each.fraction < each.level) == (true > 1.0) for each in found.coverage[name][:3]
+        )
 
 
 @given(st.floats(0.1, 0.9), st.floats(1.1, 10.0))
@@ -226,7 +230,7 @@ def test_interval_of_coverage_is_that_of_clopper_and_pearson(runs, data):
     standard = np.where(np.arange(runs) < inside, 0.0, 99.0)[:, None]
     expected = proportion_confint(inside, runs, 0.05, "beta")
     for coverage in covered(standard):
-        assert coverage.share == pytest.approx(inside / runs)
+        assert coverage.fraction == pytest.approx(inside / runs)
         np.testing.assert_allclose([coverage.lower, coverage.upper], expected, atol=1e-12)
 
 
@@ -261,7 +265,7 @@ def assert_unknown(found: Consistency):
         assert not found.nees[name].within
         assert np.isnan(found.rms[name])
         assert np.isnan(found.score[name])
-        assert all(np.isnan(each.share) and not each.within for each in found.coverage[name])
+        assert all(np.isnan(each.fraction) and not each.within for each in found.coverage[name])
 
 
 @pytest.mark.parametrize("judge", [lambda runs: at_epoch(runs, 1), over_time])
@@ -326,7 +330,7 @@ def test_sensors_without_states_do_not_count():
     )
     for found in (at_epoch(half, 1), over_time(half)):
         assert found.nees["sensors"].value == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 600))
-        assert found.coverage["sensors"][2].share == pytest.approx(0.95, abs=0.04)
+        assert found.coverage["sensors"][2].fraction == pytest.approx(0.95, abs=0.04)
 
 
 def test_epochs_at_which_a_sensor_is_known_exactly_are_left_out():

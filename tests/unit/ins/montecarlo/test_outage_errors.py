@@ -9,8 +9,8 @@ from scipy.stats import binom, ttest_rel
 
 from gmwm.errors import InputError
 from gmwm.ins.filter.aiding import Outage
+from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.outage_errors import QUANTITIES, difference, pooled_sizes, sizes, spread
-from gmwm.ins.montecarlo.runs import Runs
 from gmwm.ins.montecarlo.trials import MonteCarlo
 
 TIME = np.array([0.0, 30.0, 30.0, 60.0, 60.0])
@@ -21,7 +21,7 @@ def runs_of(error, sd=None):
     """Runs of which only the errors matter, (R, K, 9)."""
     error = np.asarray(error, dtype=float)
     none = np.zeros((*error.shape[:2], 4))
-    return Runs(
+    return FilterErrors(
         time=TIME, before=BEFORE, error=error, sd=np.ones_like(error) if sd is None else sd,
         nees=none, log_det=none, sensor_error=none, sensor_sd=none, sensor_nees=none[..., 0],
         nis=np.ones((len(error), 2)), whiteness=np.zeros(len(error)),

@@ -49,7 +49,7 @@ def test_a_filter_that_diverged_is_named_and_left_out(made_up):
     found = made_up(dead=("right",))
     text = str(found)
     assert found.reached == ("bold", "timid")
-    assert "- right diverged in 40 of 40 runs" in text
+    assert "- right: diverged in 40 of 40 runs" in text
     assert "nan" not in text
     for figure in (found.plot_track(), found.plot_growth(), found.plot_errors(0)):
         plt.close(figure)

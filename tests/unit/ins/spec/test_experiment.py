@@ -5,11 +5,10 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import read_experiment
-from gmwm.ins.field import measured
+from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu.sensors import AXES
-from gmwm.ins.spec import experiment
 from gmwm.ins.spec.document import read_document
-from gmwm.ins.spec.experiment import MISSIONS, experiment_from
+from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec, experiment_from
 from gmwm.process import RandomWalk
 from places import REPOSITORY
 
@@ -129,8 +128,8 @@ def test_no_experiment() -> None:
 def test_every_key_is_documented() -> None:
     page = (REPOSITORY / "docs/navigation.md").read_text()
     table = page.split("| key | what")[1].split("Paths are relative")[0]
-    for name in experiment.KEYS:
+    for name in ExperimentSpec.model_fields:
         assert f"`{name}`" in table
     example = page.split("As a file:")[1].split("```")[1]
-    for name in measured.KEYS:
+    for name in MeasuredSpec.model_fields:
         assert f"\n{name}:" in example

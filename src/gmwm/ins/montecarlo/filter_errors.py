@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +22,13 @@ GROUPS = {
 
 PER_RUN = ("error", "sd", "nees", "log_det", "sensor_error", "sensor_sd", "sensor_nees", "nis",
             "whiteness")  # fmt: skip
-"""Arrays of `Runs` whose first axis is the run."""
+"""Arrays of `FilterErrors` whose first axis is the run."""
 
 _SAME_TIME = 1e-6  # s
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class FilterErrors:
     """Errors of one filter over R runs at K epochs.
 
     Attributes
@@ -168,10 +167,3 @@ def _lag_one(solution: Solution) -> float:
     together = together[np.isfinite(together)]
     scale = np.sqrt(np.sum(together**2))
     return float(np.sum(together) / scale) if scale > 0.0 else float("nan")
-
-
-def joined(parts: Sequence[Runs]) -> Runs:
-    """The runs of several parts, in order."""
-    first = parts[0]
-    joined = {key: np.concatenate([getattr(part, key) for part in parts]) for key in PER_RUN}
-    return Runs(time=first.time, before=first.before, **joined)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from gmwm.estimate import EM, GMWM, MLE, AllanLines, Method, Whittle
 from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
@@ -36,22 +35,23 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Estimation:
-    """How a series is estimated.
+    """A method with its options, and what it is given.
 
     Attributes
     ----------
-    method : str or object that holds the options of a method
-        As `gmwm.fit` takes it.
-    variance : mapping of str to object
-        Options of `gmwm.wavelet_variance`.
+    method : method object
+        See `gmwm.fit`.
+    wavelet, robust
+        Of the wavelet variance; see `gmwm.wavelet_variance`.
     """
 
-    method: str | Method = "gmwm"
-    variance: Mapping[str, Any] = field(default_factory=dict)
+    method: Method = field(default_factory=GMWM)
+    wavelet: str = "haar"
+    robust: bool = False
 
 
 @dataclass(frozen=True)
-class Scenario:
+class Study:
     """A true model, the quantities to estimate, and the ways to do so.
 
     Attributes
@@ -85,7 +85,7 @@ class Scenario:
         return float(self.truth.params[quantity.key] or 0.0) ** quantity.power
 
 
-TABLE_2 = Scenario(
+TABLE_2 = Study(
     name="table2",
     title="Table II: white noise + random walk + rate ramp",
     truth=WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003),
@@ -104,7 +104,7 @@ TABLE_2 = Scenario(
         "EM": Estimation(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
         "EM*": Estimation(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
                             accelerate=False, tolerance=1e-3)),
-        "AV": Estimation(AllanLines({"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
+        "AV": Estimation(AllanLines(regions={"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
         "MLE": Estimation(MLE()),
         "GMWM": Estimation(),
     },
@@ -118,7 +118,7 @@ TABLE_2 = Scenario(
     ),
 )  # fmt: skip
 
-TABLE_3 = Scenario(
+TABLE_3 = Study(
     name="table3",
     title="Table III: white noise + Gauss-Markov + rate ramp",
     truth=WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001),
@@ -144,7 +144,7 @@ TABLE_3 = Scenario(
     ),
 )
 
-TABLE_4 = Scenario(
+TABLE_4 = Study(
     name="table4",
     title="Table IV: three Gauss-Markov processes",
     truth=(
@@ -167,7 +167,7 @@ TABLE_4 = Scenario(
     notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
-FIVE = Scenario(
+FIVE = Study(
     name="five-gm",
     title="White noise + five Gauss-Markov processes a decade apart (11 h at 100 Hz)",
     truth=(
@@ -192,14 +192,14 @@ FIVE = Scenario(
 FIGURES = {"fig2": TABLE_2, "fig3": TABLE_3, "fig4": TABLE_4}
 
 
-_WEIGHTS: Mapping[str, Estimation] = {
+_WEIGHTS = {
     "model": Estimation(),
     "diagonal": Estimation(GMWM(weights="diagonal")),
     "identity": Estimation(GMWM(weights="identity")),
     "data": Estimation(GMWM(weights="data")),
-    "db2": Estimation(variance={"wavelet": "db2"}),
-    "db2 data": Estimation(GMWM(weights="data"), {"wavelet": "db2", "data_covariance": "octave"}),
-    "robust": Estimation(variance={"robust": True}),
+    "db2": Estimation(wavelet="db2"),
+    "db2 data": Estimation(GMWM(weights="data"), wavelet="db2"),
+    "robust": Estimation(robust=True),
 }
 
 _WEIGHT_NOTES = (
@@ -209,10 +209,10 @@ _WEIGHT_NOTES = (
 )
 
 
-def _compared(scenario: Scenario, number: int, runs: int) -> Scenario:
-    title = scenario.title.split(": ", 1)[1]
+def _compared(study: Study, number: int, runs: int) -> Study:
+    title = study.title.split(": ", 1)[1]
     return replace(
-        scenario,
+        study,
         name=f"weights{number}",
         title=f"Weights and wavelets, Table {'I' * number if number < 4 else 'IV'}: {title}",
         runs=runs,
@@ -227,4 +227,4 @@ WEIGHTS = (
     _compared(TABLE_4, 4, 50),
 )
 
-SCENARIOS = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}
+STUDIES = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}

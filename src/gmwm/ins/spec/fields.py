@@ -1,0 +1,161 @@
+"""What people write, checked field by field: values with units, and messages that name the place.
+
+A value with a unit such as ``"140 deg/h"`` becomes a number in SI units by a validator of the
+field; pydantic says where it stood.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self, TypeVar
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    model_validator,
+)
+
+from gmwm._core import checks
+from gmwm._core.units import factor
+from gmwm.errors import InputError
+
+FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>", "<reduced>")
+"""Forms that one key may have; pydantic puts them into the place of an error."""
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
+
+
+class Spec(BaseModel):
+    """A mapping of known keys; those without a value count as left out."""
+
+    model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True)
+
+    NEEDS: ClassVar[str] = "write it"
+    """What to do where a key is missing."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        names = ", ".join(cls.model_fields)
+        if not isinstance(given, Mapping):
+            raise ValueError(f"{checks.shown(given)}: write KEY: VALUE; keys are {names}")
+        for name in given:
+            if name not in cls.model_fields:
+                raise ValueError(f"{checks.shown(name)} is unknown: there are {names}")
+        return {name: each for name, each in given.items() if each is not None}
+
+    @classmethod
+    def parse(cls, given: Any, where: str = "") -> Self:
+        """Check what was written.
+
+        Raises
+        ------
+        InputError
+            With the place of the first thing that cannot be used.
+        """
+        try:
+            return cls.model_validate(given)
+        except ValidationError as error:
+            raise InputError(*_sentence(error, where, cls.NEEDS)) from None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The values that were written, by key."""
+        return {name: getattr(self, name) for name in self.model_fields_set}
+
+
+def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]:
+    """Text and code."""
+    errors = error.errors(include_url=False)
+    first, *path = errors[0], *errors[0]["loc"]
+    missing = first["type"] == "missing"
+    if missing:
+        path = path[:-1]
+    place = where
+    for part in path:
+        if isinstance(part, int):
+            place += f"[{part}]"
+        elif part not in TAGS:
+            place += f", {part}" if place else part
+    if missing:
+        names = [str(e["loc"][-1]) for e in errors if e["type"] == "missing"]
+        text = f"there is no {', no '.join(names)}: {needs}"
+    elif first["type"] == "value_error":
+        text = str(first["ctx"]["error"])
+    else:
+        text = f"{checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
+    return (f"{place}: {text}" if place else text), "missing-key" if missing else ""
+
+
+def value(given: Any, si_unit: str) -> float:
+    """A number in SI units, from a number or from text such as ``"140 deg/h"``.
+
+    Raises
+    ------
+    InputError
+        If it is not a finite number, or its unit is of another dimension.
+    """
+    if checks.is_number(given):
+        return float(given)
+    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+    if match is None:
+        raise InputError(
+            f"{checks.shown(given)} is not a number: write one, with a unit like {si_unit} or "
+            "without for SI"
+        )
+    number, unit = match.groups()
+    found = float(number) * (factor(unit, si_unit) if unit else 1.0)
+    if not checks.is_number(found):
+        raise InputError(f"{checks.shown(given)} is too large: check it")
+    return found
+
+
+def number(si_unit: str) -> BeforeValidator:
+    """A value in SI units."""
+    return BeforeValidator(lambda given: value(given, si_unit))
+
+
+def _says_it_better(error: Any) -> bool:
+    """Whether a part has the form and another fault, or lacks a key."""
+    kind, loc = error["type"], error["loc"]
+    return kind in ("value_error", "greater_than") or (
+        kind == "missing" and isinstance(loc[-1], str)
+    )
+
+
+def written(form: str) -> WrapValidator:
+    """Something of a form, which the message shows where another was written."""
+
+    def check(given: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            return handler(given)
+        except ValidationError as error:
+            if any(_says_it_better(each) for each in error.errors()):
+                raise
+            raise ValueError(f"{checks.shown(given)}: write {form}") from None
+
+    return WrapValidator(check)
+
+
+def _spread(given: Any) -> Any:
+    return given if isinstance(given, list | tuple) else (given,) * 3
+
+
+T = TypeVar("T")
+Three = Annotated[tuple[T, T, T], written("three values, or one for all"), BeforeValidator(_spread)]
+Seconds = Annotated[float, number("s")]
+Meters = Annotated[float, number("m")]
+Radians = Annotated[float, number("rad")]
+PositiveHertz = Annotated[float, number("Hz"), Field(gt=0.0)]
+PositiveMeters = Annotated[Meters, Field(gt=0.0)]
+PositiveRadians = Annotated[Radians, Field(gt=0.0)]
+PositiveSeconds = Annotated[Seconds, Field(gt=0.0)]
+PositiveSpeed = Annotated[float, number("m/s"), Field(gt=0.0)]
+FileName = Annotated[str, StringConstraints(pattern=r"^[^\x00]+$"), written("the name of a file")]

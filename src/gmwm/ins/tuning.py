@@ -1,0 +1,115 @@
+"""Constants of navigation that change answers, each with its source or its reason.
+
+Constants of the Earth stand in `gmwm.ins.geometry`; those that only keep arithmetic safe, and words
+of file formats, stand where they are used.
+"""
+
+import math
+
+# -- the filter -----------------------------------------------------------------------------------
+
+COVARIANCE_STEP = 0.1
+"""s between steps of the covariance: short against a manoeuvre and the time between fixes."""
+
+STANDSTILL = 1e-3
+"""m/s, below which the vehicle of a simulated trajectory stands."""
+
+POSITION_SD = (1.0, 1.0, 1.5)
+"""Of fixes that state none, to the north, east and down, m: of a good receiver in the open."""
+
+VELOCITY_SD = (0.1, 0.1, 0.15)
+"""The same of velocities, m/s."""
+
+TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
+"""Of a bias from one switching on to the next, which a static calibration cannot know, where nobody
+specifies better: rad/s, m/s^2."""
+
+SPECIFIC_FORCE = (0.5, 2.0)
+"""Of standard gravity: mean specific force of a record, beyond which its unit is wrong."""
+
+# -- alignment ------------------------------------------------------------------------------------
+
+STEADY_WINDOW = 0.5
+"""s, over which samples are averaged to see whether a vehicle is steady: longer than a vibration,
+shorter than a manoeuvre."""
+
+STEADY_LEAST, STEADY_MOST = 2.0, 30.0
+"""s of steady motion to level by: fewer are noise, more let the biases drift."""
+
+STEADY = (0.01, 0.15)
+"""rad/s and m/s^2: largest change of such a mean of a steady vehicle; 0.6 deg/s, 1 deg of tilt."""
+
+SEARCHED = 300.0
+"""s from the start in which steady motion and a course are looked for."""
+
+SIGMAS = 5.0
+"""Standard deviations within which a mean or velocity counts as zero: one false in two million."""
+
+TILT_FLOOR, TILT_MOVING = math.radians(0.05), math.radians(1.0)
+"""rad, of levelling: mounting and uneven ground; accelerations of steady motion."""
+
+STILL_VELOCITY_SD = 0.02
+"""m/s, least standard deviation of the velocity of a vehicle at rest."""
+
+COURSE_RATIO = 20.0
+"""Speed over its standard deviation at which a course is taken: it is then known to 3 deg."""
+
+CRAB_SD = math.radians(2.0)
+"""rad between the course and the forward axis."""
+
+HEADING_SD = math.radians(2.0)
+"""rad, of a heading that is given without one."""
+
+CHORD = 5.0
+"""s between two fixes whose line is taken for a course: a turn is slower."""
+
+COMPASS_SD = math.radians(5.0)
+"""rad, beyond which the Earth's rotation gives no heading: a filter is linear up to some 10 deg."""
+
+# -- verdicts -------------------------------------------------------------------------------------
+
+CONTRADICTED = 0.001
+"""Probability below which a filter is called inconsistent, or its innovations contradict it."""
+
+CONFIDENCE = 0.95
+"""Of bands and intervals."""
+
+LOST = 5.0
+"""Times the expected size, beyond which innovations say that a filter is lost."""
+
+MOSTLY_FINE = 1.5
+"""NIS by the median, below which a few outliers make the mean large."""
+
+# -- validations ----------------------------------------------------------------------------------
+
+SETTLED = 0.25
+"""Fraction of the trajectory after which the filter with GNSS is judged."""
+
+KEPT_EPOCHS = 300
+"""Epochs of a run whose errors are kept, besides those of outages: a figure shows no more."""
+
+OUTAGE_EPOCHS = 1.0
+"""s between epochs that are kept in an outage."""
+
+BOOTSTRAP_DRAWS = 4000
+"""Of the runs, for intervals of 95 %: 100 draws lie beyond each end."""
+
+BIAS_WINDOW = 60.0
+"""s over which a recording is averaged to see how far its slow errors go: outages of a minute."""
+
+# -- reduced models -------------------------------------------------------------------------------
+
+SETTLING = 120.0
+"""s before the first outage and between them, for the filter to settle."""
+
+WHITE_AT = 1.0
+"""s, averaging time at which white noise is read off an Allan plot, as data sheets do."""
+
+SHORTEST_PEAK = 0.189
+"""s, shortest averaging time at which a peak is read off: a correlation time of 0.1 s."""
+
+SLOPE = 3e-3
+"""Of the score over the logarithm of a factor, below which the search for factors ends."""
+
+INERTIA = 1e-3
+"""Of the score, for a factor's squared distance from 1: what does not matter stays there."""
