@@ -3,10 +3,10 @@
 from gmwm.variance.allan_family import Deviations, deviations
 from gmwm.variance.analysis import MIN_SAMPLES, as_channel, as_wavelet_variance, wavelet_variance
 from gmwm.variance.covariance.haar import haar_covariance
+from gmwm.variance.gaps import Runs
 from gmwm.variance.modwt import Modwt, imodwt, modwt
 from gmwm.variance.pilot import pilot_psd
 from gmwm.variance.pooled import PooledVariance
-from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
 
 __all__ = [

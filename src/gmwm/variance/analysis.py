@@ -12,8 +12,8 @@ from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.gaps import Runs
 from gmwm.variance.levels import Levels
-from gmwm.variance.runs import Runs
 from gmwm.variance.wavelet import WaveletVariance
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
@@ -36,7 +36,7 @@ def wavelet_variance(
     All levels with at least one coefficient free of end effects are given; the mean of the series
     does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
     averaging time are filled from what is around them, and what that changes in the expected
-    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing samples
+    variance is taken off again (`gmwm.variance.gaps.filling`). Coefficients that other missing samples
     take part in are left out.
 
     Parameters

@@ -11,25 +11,21 @@ from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import wavelet as known_wavelet
+from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.filling import Filling
-from gmwm.variance.gaps import (
+from gmwm.variance.gaps.effects import (
     GapEffects,
     Gaps,
     IntArray,
+    Runs,
     common_share,
     pair_factor,
     window_centres,
     window_count,
 )
+from gmwm.variance.gaps.filling import Filling
 from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
 from gmwm.variance.pilot import pilot_psd
-from gmwm.variance.runs import Runs
-
-_MAX_BLOCKS, _MAX_BLOCKS_WITH_GAPS = 2048, 512
-_LARGEST_CHANGE = 1.5  # of an expected variance by filling
-_DECIDED = 32.0  # such windows, from which a level tells whether it can be filled
-_SEEN = 8.0  # windows that do not overlap, from which a level tells the pilot spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +93,7 @@ class Levels:
         One at least of the finest.
         """
         windows = self.counts / (2.0 * self.averaging)
-        known = max(int(np.sum(np.cumprod(windows >= _SEEN))), 1)
+        known = max(int(np.sum(np.cumprod(windows >= tuning.PILOT_WINDOWS))), 1)
         part = replace(
             self,
             averaging=self.averaging[start:known],
@@ -119,12 +115,14 @@ class Levels:
         found = replace(self, filling=filling)
         change, error = filling.change(self.averaging)
         own = self.averaging / np.maximum(found.counts, 1.0)
-        filled = np.abs(change) <= _LARGEST_CHANGE
+        filled = np.abs(change) <= tuning.LARGEST_CHANGE
         filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
         # Of the coarsest levels the pilot knows too little to decide anew.
-        decided = max(int(np.sum(found.counts >= _DECIDED * 2.0 * self.averaging)), 1)
+        decided = max(
+            int(np.sum(found.counts >= tuning.DECIDING_WINDOWS * 2.0 * self.averaging)), 1
+        )
         filled[decided:] = filled[decided - 1]
-        change = np.minimum(change, _LARGEST_CHANGE)
+        change = np.minimum(change, tuning.LARGEST_CHANGE)
         change, error = np.where(filled, (change, error), 0.0)
         found = replace(found, change=change, error=error, filled=filled)
         exist = int(np.sum(np.cumprod(found.counts > 0.0)))
@@ -237,7 +235,7 @@ class Levels:
         """Means of blocks, NaN where a gap is not filled for the coarsest level, and their size."""
         values, integral = self._coarsest()
         n = self.runs.n
-        most = _MAX_BLOCKS if not np.any(np.isnan(values)) else _MAX_BLOCKS_WITH_GAPS
+        most = tuning.MOST_BLOCKS if not np.any(np.isnan(values)) else tuning.MOST_BLOCKS_WITH_GAPS
         block = -(-n // most)
         whole = (n // block) * block
         means = np.diff(integral[: whole + 1 : block]) / block

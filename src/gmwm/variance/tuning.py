@@ -23,6 +23,51 @@ PILOT_STEEPEST = 2.5
 HAAR_PEAK = 0.37
 """The Haar gain of averaging time tau peaks at f = 0.37/tau."""
 
+# -- gaps -----------------------------------------------------------------------------------------
+
+AVERAGES_OF_GAP = 4
+"""Lengths of a gap in the shortest averaging time for which it is filled: the Haar autocorrelation
+is a straight line there, and its error is small beside the coefficient."""
+
+FILLING_REACH = 32
+"""Blocks on either side that a filling looks at, at least; four lengths of the gap if that is
+more. Farther ones take little from the error of a random walk or of white noise."""
+
+GAP_BLOCKS = 64
+"""Blocks in a gap, at most; longer gaps are taken in blocks of several samples."""
+
+ISLAND = 32
+"""A run of less than this part of a gap beside it is lost with the gap: there is no block of it."""
+
+PASSED_OCTAVES = 3
+"""By which a gap is shorter than another that looks across it."""
+
+NEIGHBOURHOOD = 128
+"""Half samples: gaps so near have correlated errors."""
+
+PAIRED_KINDS = 24
+"""Kinds of gaps, the most frequent, whose pairs are counted; twice as many change no expected
+variance by 1 % where half of the samples are missing."""
+
+LARGEST_CHANGE = 1.5
+"""Of an expected variance by filling: half of white noise missing singly has 1.35, and a bias of
+2 %."""
+
+PILOT_WINDOWS = 8.0
+"""Windows that do not overlap, from which a level tells the spectrum that gaps are filled under."""
+
+DECIDING_WINDOWS = 32.0
+"""The same, from which a level tells whether it can be filled; coarser ones follow it."""
+
+LAGS_PER_AVERAGE = 8
+"""Lags at which pairs of coefficients are counted."""
+
+MOST_BLOCKS = 2048
+"""Means of blocks that a drift is estimated from."""
+
+MOST_BLOCKS_WITH_GAPS = 512
+"""The same where some are missing, which makes a dense matrix of them."""
+
 # -- covariances by lags --------------------------------------------------------------------------
 
 EXACT_SAMPLES = 2048

@@ -2,7 +2,7 @@
 
 A coefficient of averaging time m is made of 2 m samples, so that a few missing ones would take all
 long averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
-coefficients of that level are taken, see `gmwm.variance.filling`; longer ones split the record:
+coefficients of that level are taken, see `gmwm.variance.gaps.filling`; longer ones split the record:
 coefficients that they take part in are left out.
 """
 
@@ -17,17 +17,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
-from gmwm.variance.gap_kernels import pairs_at_lag
-from gmwm.variance.runs import Runs
+from gmwm.variance import tuning
+from gmwm.variance.gaps.kernels import pairs_at_lag
 
 IntArray = NDArray[np.int64]
 
-_AVERAGES = 4  # averaging times from so many lengths of a gap on, it is filled
-_LEAST_REACH = 32  # blocks on either side that a filling looks at, at least
-_FINE = 64  # blocks in a gap, at most
-_ISLAND = 32  # a run of less than this part of a gap beside it is lost with the gap
-_PASSED = 3  # octaves by which a gap is shorter than another that looks across it
-_LAGS_PER_AVERAGE = 8
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs of samples without a missing one.
+
+    Attributes
+    ----------
+    starts, stops : tuple of int
+        First sample of each run, and the one after its last, ascending.
+    n : int
+        Length of the series, missing samples included.
+    """
+
+    starts: tuple[int, ...]
+    stops: tuple[int, ...]
+    n: int
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Runs:
+        """Those of a series (n,) in which NaN stands for missing samples."""
+        present = np.concatenate([[False], ~np.isnan(values), [False]])
+        edges = np.flatnonzero(present[1:] != present[:-1])
+        return cls(tuple(edges[::2].tolist()), tuple(edges[1::2].tolist()), int(values.size))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no sample is missing."""
+        return self.starts == (0,) and self.stops == (self.n,)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Starts and stops, (runs, 2)."""
+        return np.stack([self.starts, self.stops], axis=1).astype(np.int64)
+
+    @property
+    def present(self) -> int:
+        """Number of samples that exist."""
+        return int(np.sum(self.edges[:, 1] - self.edges[:, 0]))
+
+    @property
+    def longest(self) -> int:
+        """Length of the longest run."""
+        return int(np.max(self.edges[:, 1] - self.edges[:, 0], initial=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +102,9 @@ class Gaps:
     def block(self) -> IntArray:
         """Samples of the unit in which each gap is less than 64 long, (G,)."""
         length = self.edges[:, 1] - self.edges[:, 0]
-        return 2 ** np.floor(np.log2(np.maximum(2 * length / _FINE, 1.0))).astype(np.int64)
+        return 2 ** np.floor(np.log2(np.maximum(2 * length / tuning.GAP_BLOCKS, 1.0))).astype(
+            np.int64
+        )
 
     @cached_property
     def length(self) -> IntArray:
@@ -83,19 +122,19 @@ class Gaps:
         ends = self.runs.edges[0, 0], self.runs.edges[-1, 1]
         for octave in np.unique(self.octave):
             own = self.octave == octave
-            others = self.octave > octave - _PASSED
+            others = self.octave > octave - tuning.PASSED_OCTAVES
             edges = self.edges[others]
             before = np.concatenate([[ends[0]], edges[:-1, 1]])
             after = np.concatenate([edges[1:, 0], [ends[1]]])
             room = np.minimum(edges[:, 0] - before, after - edges[:, 1])
             free[own] = room[own[others]]
-        reach = np.minimum(free // self.block, np.maximum(4 * self.length, _LEAST_REACH))
+        reach = np.minimum(free // self.block, np.maximum(4 * self.length, tuning.FILLING_REACH))
         return np.floor(np.log2(np.maximum(reach, 0.5))).astype(np.int64) + 1
 
     @cached_property
     def kinds(self) -> tuple[IntArray, IntArray]:
         """Block, length and boxes of the kinds of gaps there are, (K, 3), and each gap's, (G,)."""
-        base = 2 * _FINE  # more than any length or number of boxes
+        base = 2 * tuning.GAP_BLOCKS  # more than any length or number of boxes
         code = (self.block * base + self.length) * base + self.boxes
         found, kind = np.unique(code, return_inverse=True)
         table = [found // base**2, found // base % base, found % base]
@@ -103,7 +142,7 @@ class Gaps:
 
     def filled(self, m: float) -> NDArray[np.bool_]:
         """Which gaps are filled for averaging times of ``m`` samples, (G,)."""
-        return np.asarray((self.octave <= np.log2(m / _AVERAGES)) & (self.boxes > 0))
+        return np.asarray((self.octave <= np.log2(m / tuning.AVERAGES_OF_GAP)) & (self.boxes > 0))
 
     def joined(self, m: float) -> IntArray:
         """Runs of samples that exist or are filled for averaging times of ``m`` samples, (P, 2)."""
@@ -141,7 +180,7 @@ def _without_islands(edges: IntArray) -> IntArray:
     while edges.shape[0] > 1:
         length = edges[:, 1] - edges[:, 0]
         apart = edges[1:, 0] - edges[:-1, 1]
-        one = _ISLAND * apart < np.maximum(length[1:], length[:-1])
+        one = tuning.ISLAND * apart < np.maximum(length[1:], length[:-1])
         if not np.any(one):
             break
         starts = edges[np.concatenate([[True], ~one]), 0]
@@ -203,7 +242,7 @@ def pair_factor(centres: IntArray, m: int, n: int) -> float:
 
     By the pairs of coefficients at the lags at which those of white noise are correlated.
     """
-    lags = np.arange(0, 2 * m, max(m // _LAGS_PER_AVERAGE, 1))
+    lags = np.arange(0, 2 * m, max(m // tuning.LAGS_PER_AVERAGE, 1))
     correlation = np.where(lags <= m, 1.0 - 1.5 * lags / m, 0.5 * lags / m - 1.0)
     weight = correlation**2 * np.where(lags == 0, 1.0, 2.0)
     complete = n - 2.0 * m + 1.0

@@ -17,16 +17,16 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.estimate import estimate
-from gmwm.variance.filling import Filling
-from gmwm.variance.gap_kernels import pairs_at_lag
-from gmwm.variance.gaps import (
+from gmwm.variance.gaps.effects import (
     Gaps,
+    Runs,
     common_share,
     pair_factor,
     window_centres,
     window_count,
 )
-from gmwm.variance.runs import Runs
+from gmwm.variance.gaps.filling import Filling
+from gmwm.variance.gaps.kernels import pairs_at_lag
 
 
 def with_gaps(x, gaps):

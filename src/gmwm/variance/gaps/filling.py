@@ -34,9 +34,10 @@ from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, haar_gain, quadrature
+from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import block_density
-from gmwm.variance.gap_kernels import fill, neighbours
-from gmwm.variance.gaps import Gaps, window_count
+from gmwm.variance.gaps.effects import Gaps, window_count
+from gmwm.variance.gaps.kernels import fill, neighbours
 from gmwm.variance.kernels import cumulative
 
 _REACH = 256.0  # blocks: what the frequencies resolve
@@ -44,8 +45,6 @@ _LOWEST = 2.0**-26  # cycles per block
 _MEAN_SIN4 = 3.0 / 8.0
 _LOBES = 32.0  # of the gain that are resolved
 _RIDGE = 1e-10
-_NEIGHBOURHOOD = 128  # half samples: gaps so near have correlated errors
-_PAIRED = 24  # kinds of gaps of which this is taken, the most frequent
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +68,7 @@ def _nodes() -> tuple[FloatArray, FloatArray]:
 def _cosines() -> FloatArray:
     """Of all lags of half a sample within the neighbourhood, (F, lags)."""
     f, _ = _nodes()
-    return np.asarray(np.cos(np.outer(np.pi * f, np.arange(_NEIGHBOURHOOD))))
+    return np.asarray(np.cos(np.outer(np.pi * f, np.arange(tuning.NEIGHBOURHOOD))))
 
 
 @lru_cache(maxsize=96)
@@ -81,7 +80,7 @@ def _shape(length: int) -> _Shape:
     tent = 2.0 * (lags * (length - lags)) @ np.cos(np.outer(lags, omega))
     sums = np.sum(np.abs(np.subtract.outer(inside, inside)), axis=1)
     edge = 0.5 * (length - 1)
-    number = int(np.log2(max(4 * length, 32))) + 1
+    number = int(np.log2(max(4 * length, tuning.FILLING_REACH))) + 1
     far = 2.0 ** np.arange(number)
     near = np.concatenate([[0.0], far[:-1]])
     # The mean over distances near + 1 ... far, by the sum of a geometric series.
@@ -228,20 +227,20 @@ class Filling:
         kinds, kind = self.gaps.kinds
         number = np.bincount(kind, minlength=kinds.shape[0])
         short = (kinds[:, 0] == 1) & (kinds[:, 2] > 0)
-        usual = np.argsort(-number * short)[:_PAIRED]
+        usual = np.argsort(-number * short)[: tuning.PAIRED_KINDS]
         usual = np.sort(usual[short[usual]])
         if not usual.size:
             return total
         place = np.full(number.size, -1)
         place[usual] = np.arange(usual.size)
         centre = np.sum(self.gaps.edges, axis=1)
-        pairs = neighbours(centre, place[kind], usual.size, _NEIGHBOURHOOD)
+        pairs = neighbours(centre, place[kind], usual.size, tuning.NEIGHBOURHOOD)
         pairs = pairs + pairs.swapaxes(0, 1)
         first, second = np.nonzero(np.triu(np.any(pairs > 0, axis=2)))
         if not first.size:
             return total
         sums = np.array([self._kernels(row)[3] for row in usual])
-        lag = 0.5 * np.arange(_NEIGHBOURHOOD)
+        lag = 0.5 * np.arange(tuning.NEIGHBOURHOOD)
         common = (sums[first] * sums[second] * power) @ _cosines()
         common *= pairs[first, second] * np.where(first == second, 1.0, 2.0)[:, None]
         for j, m in enumerate(averaging):
