@@ -2,8 +2,8 @@
 
 A coefficient of averaging time m is made of 2 m samples, so that a few missing ones would take all
 long averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
-coefficients of that level are taken, see `gmwm.variance.gaps.filling`; longer ones split the record:
-coefficients that they take part in are left out.
+coefficients of that level are taken, see `gmwm.variance.gaps.filling`; longer ones split the
+record: coefficients that they take part in are left out.
 """
 
 from __future__ import annotations
