@@ -3,7 +3,7 @@
 A sample is held until the next one, as a navigation computer does that multiplies it by dt, and
 what is integrated is this staircase. Over one interval h the integrals of first, second and third
 order then follow ``I <- C(h) I + g(h) y`` with C the powers h^k/k! below the diagonal and
-g = (h, h^2/2, h^3/6): an exact linear recursion, whose covariance is carried over n steps by
+g = (h, h^2/2, h^3/6): an exact linear recursion, whose covariance is propagated over n steps by
 squaring the transition about log2(n) times. A process without states is integrated by its spectrum.
 """
 

@@ -201,7 +201,7 @@ def _parse_by_field(
             if value is None:
                 raise InputError(
                     f"{table.source}, {place}, column {label(table.names, column)}: "
-                    f"{_excerpt(cells[column])} is not a number: mend the line, or choose other "
+                    f"{_excerpt(cells[column])} is not a number: correct the line, or choose other "
                     "columns with channels= and time="
                 )
             if math.isinf(value):
@@ -217,14 +217,14 @@ def _cells(table: CsvTable, place: str, text: str) -> list[str]:
         cells = split_line(text, table.layout.delimiter)
     except ValueError as error:
         raise InputError(
-            f"{table.source}, {place}: quotes that do not match: mend the line"
+            f"{table.source}, {place}: quotes that do not match: correct the line"
         ) from error
     if len(cells) == width + 1 and not cells[-1]:
         cells.pop()
     if len(cells) != width:
         raise InputError(
-            f"{table.source}, {place}: {len(cells)} fields where {width} were expected: mend the "
-            "line or remove it"
+            f"{table.source}, {place}: {len(cells)} fields where {width} were expected: correct "
+            "the line or remove it"
         )
     return cells
 

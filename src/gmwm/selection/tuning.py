@@ -8,7 +8,7 @@ STRICTNESS = 1.5
 """The c of Hannan & Quinn (1979); consistent above 1."""
 
 TIE = 2.0
-"""Difference of the criterion within which the data hardly tell models apart (twice the
+"""Difference of the criterion within which the data hardly distinguish models (twice the
 log-likelihood: Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
 
 RAMP_MARGIN = 6.0

@@ -116,7 +116,7 @@ def align(
         if not known:
             raise InputError(
                 "the heading cannot be known: GNSS shows no motion fast enough in the first "
-                f"{tuning.SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: "
+                f"{tuning.SEARCHED:g} s, and the gyros cannot find it from the Earth's rotation: "
                 "give the heading",
                 "heading-unknown",
             )
