@@ -74,7 +74,7 @@ class Notice:
         Raises
         ------
         KeyError, TypeError, ValueError
-            If the content is no notice.
+            If the content is not a notice.
         """
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {content['severity']!r}")

@@ -69,7 +69,7 @@ def error_budget(
         outage; its covariance is zero. False: nothing is known, stationary processes start in their
         stationary state. In both cases a random walk starts at zero, a line has a random phase, and
         flicker noise, of which True knows the past, is counted from its first sample by False. A
-        constant bias is no part of a model: False counts what varies about the mean of the
+        constant bias is not part of a model: False counts what varies about the mean of the
         recording.
 
     Returns

@@ -89,7 +89,7 @@ def integral_rms(
         unknown = _from_spectrum(process, t, dt)
         m = np.arange(1.0, ORDERS + 1.0)[:, None]
         known = process.B * t**m / (np.sqrt(2.0 * m) * gamma(m + 0.5))
-        # Within a few samples the continuous-time formula knows less than the first sample tells.
+        # Within a few samples the continuous-time formula knows less than the first sample shows.
         return np.minimum(known, unknown) if known_start else unknown
     if not process.has_spectrum():
         raise InputError(

@@ -193,7 +193,7 @@ def calibrate(
         unexamined.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
-        threads of one interpreter take in turns; -1 is one per core.
+        threads of one interpreter do in turns; -1 is one per core.
     progress : callable, optional
         Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
 

@@ -166,7 +166,7 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     Raises
     ------
     InputError
-        If a parameter is open or an amplitude is zero, for a `Sinusoid` (a line is no random
+        If a parameter is open or an amplitude is zero, for a `Sinusoid` (a line is not a random
         process) and for a record or interval that is none.
 
     Notes

@@ -44,7 +44,7 @@ class CsvTable:
         Raises
         ------
         InputError
-            If it cannot be read or is no table.
+            If it cannot be read or is not a table.
         """
         _, head = next(blocks(path, size=_HEAD), (1, b""))
         return cls(path, find_layout(path.name, head))
@@ -211,7 +211,7 @@ def _parse_by_field(
 
 
 def _cells(table: CsvTable, place: str, text: str) -> list[str]:
-    """Fields of a line; a delimiter after the last one is no harm."""
+    """Fields of a line; a delimiter after the last one does no harm."""
     width = table.layout.width
     try:
         cells = split_line(text, table.layout.delimiter)

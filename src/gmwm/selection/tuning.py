@@ -16,7 +16,7 @@ RAMP_MARGIN = 6.0
 that is seen only once."""
 
 RAMP_P = 0.002
-"""Level at which a slope is no accident of a walk that the record does not resolve."""
+"""Level below which a slope is not an accident of a walk that the record does not resolve."""
 
 RAMP_PLAUSIBLE = 2.0
 """Squared slope over its variance, below which no ramp is tried."""
