@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units
 from gmwm.calibration import tuning
 from gmwm.errors import InputError
-from gmwm.estimate import fit
+from gmwm.estimate import estimate
 from gmwm.estimate.result import Fit
 from gmwm.process import Process, RandomWalk, WhiteNoise
 
@@ -40,8 +41,9 @@ class Floor:
 def white_density(fitted: Fit) -> float:
     """Density of the white noise that acts like the fast terms at averaging times of 1 s and more.
 
-    White and quantization noise and Gauss-Markov processes of short correlation time all average
-    out; together they count for what a filter with white noise alone would be given.
+    The spectral density, far below the frequency of a second, of the terms that average out: white
+    noise, Gauss-Markov processes of short correlation time, the foot of a resonance. Quantization
+    noise and periodic lines leave none: their integrals stay bounded.
 
     Returns
     -------
@@ -50,11 +52,20 @@ def white_density(fitted: Fit) -> float:
     """
     tau = np.array([1.0, 2.0]) * max(tuning.REFERENCE_TIME, 4.0 * fitted.wv.dt)
     total = 0.0
+    low = tuning.LOW_FREQUENCY / tau[0] * np.array([1.0, 0.5])
     for term in fitted.model.terms:
+        if term.is_line:
+            continue
         first, second = term.haar_variance(tau, fitted.wv.dt)
         if first > 0.0 and second < tuning.WHITE_RATIO * first:
-            total += 2.0 * tau[0] * first
+            total += _foot(term, low, fitted.wv.dt) if term.has_spectrum() else 2.0 * tau[0] * first
     return float(np.sqrt(total))
+
+
+def _foot(term: Process, frequency: FloatArray, dt: float) -> float:
+    """Spectral density of a term at two low frequencies, zero where it is not flat, u^2/Hz."""
+    density, lower = term.psd(frequency, dt)
+    return float(density) if lower > tuning.FLAT * density else 0.0
 
 
 def floor(fitted: Fit) -> Floor:
@@ -105,7 +116,7 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
         If the data do not bound it.
     """
     opened = fitted.model.opened()
-    again = fit(opened if key in fitted.params else opened + process, fitted.wv)
+    again = estimate(opened if key in fitted.params else opened + process, fitted.wv)
     bound = float(again.interval()[key][1])
     if not np.isfinite(bound):
         raise InputError(

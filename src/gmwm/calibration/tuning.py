@@ -20,3 +20,9 @@ REFERENCE_TIME = 1.0
 WHITE_RATIO = 0.6
 """Of the wavelet variances at twice the reference time and at it, below which a term acts as white
 noise, which has 0.5."""
+
+LOW_FREQUENCY = 0.01
+"""Over one by the reference time: where the spectrum of what averages out by then is flat."""
+
+FLAT = 0.8
+"""Of the density there and at half that frequency, above which it is that of white noise."""

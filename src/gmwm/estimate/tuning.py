@@ -42,11 +42,8 @@ WELL_KNOWN_DOF = 30.0
 POOR_DEVIATION = 0.10
 """Misfit of the Allan deviation at a well-known level that navigation would feel."""
 
-LARGE_MISFIT = 0.10
-"""The same at any level, together with `EXCLUDED`."""
-
-EXCLUDED = 4.0
-"""Standard errors: one of a thousand right models has such a level among twenty."""
+EXCLUDED_P = 0.001
+"""Level of the test that no averaging time is missed: 4 standard errors for twenty of them."""
 
 RECORDINGS_DIFFER = 0.01
 """Level of the test that several recordings are the same noise."""

@@ -13,6 +13,8 @@ from gmwm import (
     QuantizationNoise,
     RandomWalk,
     RateRamp,
+    Resonance,
+    Sinusoid,
     WhiteNoise,
 )
 from gmwm._core.units import SI_UNIT
@@ -42,9 +44,19 @@ def test_slow_terms_do_not_count(slow):
     assert white_density(fitted(slow)) == 0.0
 
 
-def test_density_of_quantization_noise_is_that_at_one_second():
-    # Allan variance 3 Q^2/tau^2 against N^2/tau.
-    assert white_density(fitted(QuantizationNoise(2e-4))) == pytest.approx(np.sqrt(3.0) * 2e-4)
+def test_quantization_noise_and_lines_leave_no_white_noise():
+    # Their integrals stay bounded: the line and the resonance raised the density by up to 60 %.
+    assert white_density(fitted(QuantizationNoise(2e-4))) == 0.0
+    line = Sinusoid(amplitude=1e-3, frequency=7.3)
+    quiet = WhiteNoise(3e-4) + QuantizationNoise(2e-5) + line
+    assert white_density(fitted(quiet)) == pytest.approx(3e-4)
+
+
+def test_a_fast_resonance_counts_with_the_foot_of_its_spectrum():
+    resonance = Resonance(sigma=5e-3, frequency=10.0, damping=0.02)
+    model = WhiteNoise(3e-4) + resonance
+    foot = resonance.psd(np.array([1e-3]), 0.01)[0]
+    assert white_density(fitted(model, dt=0.01)) == pytest.approx(np.sqrt(9e-8 + foot), rel=1e-3)
 
 
 def test_fast_gauss_markov_acts_as_white_noise_of_its_density_at_zero_frequency():

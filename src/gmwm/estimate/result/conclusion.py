@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from gmwm.estimate.result.remarks import (
     bound_notices,
     confounded_notices,
     indistinct_notices,
+    missed_level_notices,
     undetermined_notices,
 )
 from gmwm.process import Process
@@ -147,7 +148,7 @@ def conclude(
         matrix = np.pad(matrix, (0, 1))
         matrix[-1, -1] = slope.variance
     ordered, matrix = in_model_order(model, keys, matrix)
-    return Fit(
+    fit = Fit(
         model=model,
         wv=wv,
         keys=ordered,
@@ -173,6 +174,8 @@ def conclude(
         slope_dof=dof,
         error_growth=growth,
     )
+    missed = missed_level_notices(fit.goodness)
+    return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
 
 
 def _upper_bounds(found: Estimates, keys: Sequence[str]) -> dict[str, float]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import norm
 
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
@@ -101,14 +102,32 @@ class Goodness:
         return float(self.misfit[worst]), float(self.tau[worst])
 
     @property
-    def is_excluded(self) -> bool:
-        """Whether the model misses some level by more than 10 % and by four standard errors.
+    def largest(self) -> tuple[float, float] | None:
+        """Largest residual with what was allowed for, and its averaging time (s).
 
-        The errors are those that the model implies itself, with what was allowed for; the
-        chi-square of a fit may have been taken under those of a richer model.
+        Among all levels that the model gives a variance; None if there is none.
         """
-        off = (np.abs(self.misfit) > tuning.LARGE_MISFIT) & (np.abs(self.allowed) > tuning.EXCLUDED)
-        return self.is_tested and bool(np.any(off))
+        if not self.is_tested or np.all(np.isnan(self.allowed)):
+            return None
+        largest = int(np.nanargmax(np.abs(self.allowed)))
+        return float(self.allowed[largest]), float(self.tau[largest])
+
+    @property
+    def largest_p(self) -> float:
+        """Probability that some level of a right model has as large a residual; NaN without one.
+
+        The levels' errors are those that the model implies itself. That of independent levels
+        (Sidak 1967, *JASA* 62, 626-633), which is an upper bound for correlated ones.
+        """
+        if self.largest is None:
+            return float("nan")
+        one = 2.0 * norm.sf(abs(self.largest[0]))
+        return float(-np.expm1(np.count_nonzero(~np.isnan(self.allowed)) * np.log1p(-one)))
+
+    @property
+    def is_excluded(self) -> bool:
+        """Whether the model misses some level by more than one in a thousand right models does."""
+        return self.largest_p < tuning.EXCLUDED_P
 
     @property
     def sentence(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
+from gmwm.estimate.result.goodness import Goodness
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
@@ -22,6 +23,7 @@ REASONS = {
     "confounded": "parameters_separable",
     "too-few-levels": "enough_levels",
     "misfit": "describes_data",
+    "level-missed": "describes_every_level",
     "not-converged": "converged",
     "no-curvature": "converged",
     "drift-in-state": "drift_is_ramp",
@@ -30,6 +32,22 @@ REASONS = {
     "recordings-differ": "recordings_agree",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
+
+
+def missed_level_notices(goodness: Goodness) -> list[Notice]:
+    """The averaging time that the model misses, if it misses one."""
+    if goodness.largest is None or not goodness.is_excluded:
+        return []
+    residual, tau = goodness.largest
+    side = "above" if residual > 0.0 else "below"
+    return [
+        Notice(
+            "level-missed", "bad", "",
+            f"at tau = {tau:.3g} s the data lie {abs(residual):.2g} standard errors {side} the "
+            "model: it lacks a term there, or the recording has a fault",
+            {"tau": tau, "residual": residual, "p_value": goodness.largest_p},
+        )
+    ]  # fmt: skip
 
 
 def no_test_notice() -> Notice:

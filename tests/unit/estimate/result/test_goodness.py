@@ -95,6 +95,26 @@ class TestResiduals:
         assert any(np.max(np.abs(fit.goodness.misfit)) > 0.3 for fit in chance)
         assert not any(fit.goodness.is_excluded for fit in chance)
 
+    def test_one_right_model_in_a_thousand_misses_a_level(self):
+        truth = WhiteNoise(1.0) + RandomWalk(0.01)
+        p = [fitted(truth, n=3000, seed=seed).goodness.largest_p for seed in range(60)]
+        # Binomial tails of one in a million.
+        assert sum(each < 0.001 for each in p) <= 3
+        assert sum(each < 0.05 for each in p) <= 13
+        assert max(p) > 0.5
+
+    def test_a_level_that_is_missed_makes_a_fit_invalid_whatever_its_degrees_of_freedom(self):
+        # A slow process that the model lacks shows at coarse levels only, which the discrepancy
+        # of the fine ones passed over.
+        truth = WhiteNoise(1.0) + Resonance(0.4, 0.2, 0.05) + RandomWalk(0.02)
+        x = truth.simulate(100_000, 1.0, 1)
+        fit = gmwm.fit(WhiteNoise() + GaussMarkov(tau=300.0), x, dt=1.0)
+        assert fit.goodness.is_excluded
+        assert not fit.reasons["describes_every_level"]
+        (missed,) = [notice for notice in fit.notices if notice.code == "level-missed"]
+        assert missed.values["residual"] == fit.goodness.largest[0]
+        assert "the data lie" in fit.message
+
     def test_nothing_allowed_for_changes_nothing(self):
         fit = fitted()
         assert fit.discrepancy == 0.0
