@@ -89,7 +89,7 @@ def test_a_line_is_taken_where_there_is_one():
 def test_an_extra_term_must_have_a_shape():
     x = gmwm.simulate(WhiteNoise(1.0), 100, 1.0, 1)
     for extra in (Sinusoid(), Sinusoid(1.0, 0.1), RateRamp()):
-        with pytest.raises(gmwm.InputError, match="leave its amplitude open"):
+        with pytest.raises(gmwm.InputError, match="leave its amplitude free"):
             gmwm.select(x, dt=1.0, extra=[extra])
 
 

@@ -23,7 +23,7 @@ def values(processes):
 
 
 def in_order(coordinates, processes):
-    """Values of the open parameters in the order of the coordinates."""
+    """Values of the free parameters in the order of the coordinates."""
     return np.array([processes[i].values[name] for i, name in coordinates.names])
 
 
