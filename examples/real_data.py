@@ -34,7 +34,6 @@ import gmwm
 from gmwm import Calibration, Fit, JointFit
 from gmwm._core.units import field_units
 from gmwm.calibration.summary import floor, white_density
-from gmwm.selection.select import describe
 
 SHAKEN = 4  # the recording with the shock
 FEWEST_DOF = 30.0  # of a level whose misfit counts
@@ -108,13 +107,13 @@ def found_table(recorded: Sequence[Recorded]) -> str:
 
 def largest_shocks(r: Recorded) -> str:
     """Height and time of the largest event of each sensor."""
-    said = []
+    shocks = []
     for event in (r.largest_event("gyro"), r.largest_event("accel")):
         if event is not None:
-            unit, one = shown_unit(event.channel)
+            unit, one = shown_unit(event.where)
             height, time = event.values["height"] / one, event.values["time"]
-            said.append(f"{event.channel} {height:+.3g} {unit} at {time:.2f} s")
-    return "; ".join(said)
+            shocks.append(f"{event.where} {height:+.3g} {unit} at {time:.2f} s")
+    return "; ".join(shocks)
 
 
 def noise_table(recorded: Sequence[Recorded]) -> str:
@@ -149,7 +148,7 @@ def model_table(own: Sequence[Calibration], together: Calibration) -> str:
     lines = ["Models"]
     for name in CHANNELS:
         for label, calibration in zip(_labels(), (*own, together), strict=True):
-            lines.append(f"{name:9}{label:6} {describe(calibration[name].model)}")
+            lines.append(f"{name:9}{label:6} {calibration[name].model.title()}")
     return "\n".join([*lines, ""])
 
 
@@ -163,13 +162,14 @@ def parameter_table(together: Calibration) -> str:
     for name in CHANNELS:
         fit = together[name]
         spread = fit.spread if isinstance(fit, JointFit) else {}
-        for row in fit.rows():
-            si = (row["value"], row["lower"], row["upper"], row["unit"])
-            value, low, high, unit = row["field"][0] if row["field"] else si
-            interval = "given" if row["kind"] == "given" else f"{low:.4g} .. {high:.4g}"
-            between = f"{100.0 * spread[row['key']]:.0f} %" if row["key"] in spread else ""
+        for row in fit.estimates:
+            usual, interval = row.usual, row.kind
+            if row.kind in ("estimated", "bound"):
+                interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
+            between = f"{100.0 * spread[row.key]:.0f} %" if row.key in spread else ""
             lines.append(
-                f"{name:9}{row['key']:20} {value:>10.4g}  {interval:22} {unit:16} {between:>5}"
+                f"{name:9}{row.key:20} {usual.value:>10.4g}  {interval:22} {usual.unit:16} "
+                f"{between:>5}"
             )
     return "\n".join([*lines, ""])
 
@@ -217,7 +217,7 @@ def misfit_of(fit: Fit) -> str:
 def joint_table(together: Calibration) -> str:
     """Levels whose interval holds the joint curve, equality of the parameters, and misfits."""
     lines = [
-        f"Joint model: share of levels below {SLOW:g} s and from {SLOW:g} s whose 95 % interval "
+        f"Joint model: fraction of levels below {SLOW:g} s and from {SLOW:g} s whose 95 % interval "
         f"holds it; largest misfit at more than {FEWEST_DOF:g} degrees of freedom",
         f"{'':9}{'valid':>6} {'equal, p':>9}"
         + "".join(f"{f'recording {number}':>28}" for number in NUMBERS),
@@ -234,7 +234,7 @@ def joint_table(together: Calibration) -> str:
 
 
 def held(fit: Fit, part: Fit) -> str:
-    """Shares of a recording's levels, fast and slow, whose interval holds the joint curve."""
+    """Fractions of a recording's levels, fast and slow, whose interval holds the joint curve."""
     wv = part.wv
     curve = fit.implied[: wv.tau.size]
     inside = (wv.lower <= curve) & (curve <= wv.upper)
@@ -253,9 +253,9 @@ def off(fit: Fit, part: Fit) -> str:
 def budget_table(own: Sequence[Calibration], together: Calibration) -> str:
     """Errors after coasting, by the models of each recording and by the joint ones."""
     times = (10.0, 60.0)
-    said = " and ".join(f"{time:g} s" for time in times)
+    listed = " and ".join(f"{time:g} s" for time in times)
     lines = [
-        f"gmwm budget: coasting for {said}, 1 sigma, slow errors known at the start",
+        f"gmwm budget: coasting for {listed}, 1 sigma, slow errors known at the start",
         f"{'':7}{'tilt [deg]':>18}{'heading [deg]':>18}{'velocity [m/s]':>18}{'position [m]':>18}",
     ]
     for label, calibration in zip(_labels(), (*own, together), strict=True):

@@ -10,8 +10,8 @@ from scipy.signal import welch
 
 import gmwm
 from gmwm import Channel, Fit, Health, JointFit, Recording
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT, factor
-from gmwm.diagnosis import Finding
 
 NUMBERS = (1, 2, 3, 4)
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -38,7 +38,7 @@ class Recorded:
         found = gmwm.health(raw)
         return cls(number, raw, found, found.masked(raw))
 
-    def largest_event(self, channels: str) -> Finding | None:
+    def largest_event(self, channels: str) -> Notice | None:
         """The highest shock of the channels whose names begin so."""
         events = [e for e in self.health.of(code="event") if e.where.startswith(channels)]
         return max(events, key=lambda event: abs(event.values["height"]), default=None)

@@ -4,7 +4,7 @@
 class InputError(ValueError):
     """What the user gave cannot be used.
 
-    The message is one sentence that says what is wrong, where, and how to mend it. The command
+    The message is one sentence: what is wrong, where, and how to correct it. The command
     line prints it and exits with code 2.
 
     Parameters
@@ -27,7 +27,7 @@ class MissingNameError(InputError, KeyError):
 
 
 class FitWarning(UserWarning):
-    """A fit that is not valid was returned; ``fit.notices`` say why.
+    """A fit that is not valid was returned; ``fit.notices`` give the reasons.
 
     ``warnings.simplefilter("ignore", gmwm.FitWarning)`` switches it off.
     """

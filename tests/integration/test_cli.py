@@ -319,7 +319,7 @@ BAD = {
     "text in a number column": (
         with_line(50, "0.1,broken"),
         ALL,
-        ("f.csv, line 50, column 'accel_x'", "'broken' is not a number", "mend the line"),
+        ("f.csv, line 50, column 'accel_x'", "'broken' is not a number", "correct the line"),
     ),
     "infinity": (with_line(60, "inf,0.1"), ALL, ("f.csv, line 60, column 'gyro_x'", "'inf'")),
     "mostly missing": (

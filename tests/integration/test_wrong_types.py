@@ -65,7 +65,7 @@ def test_numbers_of_every_type_are_taken(value):
 @pytest.mark.parametrize(
     ("n", "dt", "words"),
     [
-        ("a", 1.0, "n = 'a': give a whole number of samples, 8 or more"),
+        ("a", 1.0, "n = 'a': give an integer number of samples, 8 or more"),
         (7, 1.0, "n = 7"),
         (100.5, 1.0, "n = 100.5"),
         (1e13, 1.0, "too long"),
@@ -137,7 +137,7 @@ def test_a_series_that_fills_the_memory_is_said_to(monkeypatch):
     ],
 )
 def test_options_of_a_fit(method, option, value):
-    said = "'a' is no error model" if option == "start" else option
+    said = "'a' is not an error model" if option == "start" else option
     refused(lambda: METHODS[method](**{option: value}), said)
 
 
@@ -255,10 +255,10 @@ def test_recordings_that_are_none():
         (lambda: True * GaussMarkov(), "True * process"),
         (lambda: 0 * GaussMarkov(), "0 * process"),
         (lambda: "a" * GaussMarkov(), "'a' * process"),
-        (lambda: WhiteNoise() + 1, "1 is no error process"),
-        (lambda: 1 + WhiteNoise(), "1 is no error process"),
-        (lambda: None + WhiteNoise(), "None is no error process"),
-        (lambda: MODEL + "a", "'a' is no error process"),
+        (lambda: WhiteNoise() + 1, "1 is not an error process"),
+        (lambda: 1 + WhiteNoise(), "1 is not an error process"),
+        (lambda: None + WhiteNoise(), "None is not an error process"),
+        (lambda: MODEL + "a", "'a' is not an error process"),
     ],
 )
 def test_what_makes_no_model(make, words):

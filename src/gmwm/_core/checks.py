@@ -1,4 +1,4 @@
-"""Values that the user gave: what they must be, or one sentence that says so."""
+"""Values that the user gave: what they must be, or one sentence about it."""
 
 from __future__ import annotations
 
@@ -47,9 +47,7 @@ def positive(name: str, value: Any, mend: str = "give a positive number") -> flo
 def whole(name: str, value: Any, least: int, mend: str = "") -> int:
     """A whole number, which may be written as 1e6, not below the least one."""
     if not is_number(value) or value != int(value) or value < least:
-        raise InputError(
-            f"{name} = {shown(value)}: {mend or f'give a whole number, {least} or more'}"
-        )
+        raise InputError(f"{name} = {shown(value)}: {mend or f'give an integer, {least} or more'}")
     return int(value)
 
 
@@ -78,9 +76,9 @@ def truth(name: str, value: Any) -> bool:
 
 def samples(value: Any, least: int = 1) -> int:
     """A number of samples ``n`` that a computer can hold."""
-    mend = "give a positive whole number of samples"
+    mend = "give a positive integer number of samples"
     if least > 1:
-        mend = f"give a whole number of samples, {least} or more"
+        mend = f"give an integer number of samples, {least} or more"
     n = whole("n", value, least, mend)
     if n > _MOST:
         raise InputError(f"n = {shown(value)}: that is too long, give at most {_MOST:,} samples")
@@ -102,7 +100,7 @@ def generator(seed: Any) -> np.random.Generator:
         return np.random.default_rng(seed)
     except (TypeError, ValueError):
         raise InputError(
-            f"seed = {shown(seed)}: give a whole number, zero or more, or a numpy.random.Generator"
+            f"seed = {shown(seed)}: give an integer, zero or more, or a numpy.random.Generator"
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""Results as JSON documents that say what they are."""
+"""Results as JSON documents that name their kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a reader, a diagnosis, a fit or a selection has to say."""
+"""What a reader, a diagnosis, a fit or a selection reports."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Notice:
     where : str
         The channel, parameter or file that it concerns; empty if it concerns the whole.
     text : str
-        What there is to say, with numbers and units, without the place.
+        The report, with numbers and units, without the place.
     values : dict
         The numbers, in SI units, and the names that ``text`` mentions.
     action : str
@@ -74,7 +74,7 @@ class Notice:
         Raises
         ------
         KeyError, TypeError, ValueError
-            If the content is no notice.
+            If the content is not a notice.
         """
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {content['severity']!r}")

@@ -253,7 +253,7 @@ def _in_worker(work: Work, run: int, parent: int) -> tuple[int, Any]:
 
 @cache
 def _end_with(parent: int) -> None:
-    """End this process when its parent ends, also where that is killed and can tell nobody."""
+    """End this process when its parent ends, also where that is killed and cannot send word."""
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -51,7 +51,7 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
-# Letters and small exponents: a unit is no formula to be worked out.
+# Letters and small exponents: a unit is not a formula to be worked out.
 _EXPONENT = r"(?:\^|\*\*|(?<=[a-z]))-?[123](?!\d)"
 _PLAIN = re.compile(rf"(?:1/)?(?:[A-Za-zµ/·()√²]|\s|\*(?=[A-Za-z])|{_EXPONENT})+")
 

@@ -69,7 +69,7 @@ def error_budget(
         outage; its covariance is zero. False: nothing is known, stationary processes start in their
         stationary state. In both cases a random walk starts at zero, a line has a random phase, and
         flicker noise, of which True knows the past, is counted from its first sample by False. A
-        constant bias is no part of a model: False counts what varies about the mean of the
+        constant bias is not part of a model: False counts what varies about the mean of the
         recording.
 
     Returns
@@ -80,7 +80,7 @@ def error_budget(
     Raises
     ------
     InputError
-        If a model has open parameters or is known by simulation only, no channel is a gyro or an
+        If a model has free parameters or is known by simulation only, no channel is a gyro or an
         accelerometer, or a time is shorter than the sampling interval.
 
     Notes
@@ -168,7 +168,7 @@ def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -
         if name in budget.channels and isinstance(item, Fit) and not item.valid
     ]
     if doubtful:
-        notes.append(f"the model is not valid, read its remarks first: {', '.join(doubtful)}")
+        notes.append(f"the model is not valid, read its notices first: {', '.join(doubtful)}")
     lengths = [item.wv.n * item.wv.dt for item in channels.values() if isinstance(item, Fit)]
     if lengths and budget.times[-1] > _RECORD_SHARE * min(lengths):
         notes.append(
@@ -209,7 +209,7 @@ def _channel_rows(
 ) -> list[ErrorRow]:
     model = item.model if isinstance(item, Fit) else as_model(item)
     if model.is_open:
-        raise InputError(f"{name}: {model!r} has open parameters, give them a value or fit it")
+        raise InputError(f"{name}: {model!r} has free parameters, give them a value or fit it")
     if _quantity(name, item) == "accel":
         scales = {"velocity": 1.0, "position": 1.0}
     elif axis(name) == "z":

@@ -3,7 +3,7 @@
 A sample is held until the next one, as a navigation computer does that multiplies it by dt, and
 what is integrated is this staircase. Over one interval h the integrals of first, second and third
 order then follow ``I <- C(h) I + g(h) y`` with C the powers h^k/k! below the diagonal and
-g = (h, h^2/2, h^3/6): an exact linear recursion, whose covariance is carried over n steps by
+g = (h, h^2/2, h^3/6): an exact linear recursion, whose covariance is propagated over n steps by
 squaring the transition about log2(n) times. A process without states is integrated by its spectrum.
 """
 
@@ -89,7 +89,7 @@ def integral_rms(
         unknown = _from_spectrum(process, t, dt)
         m = np.arange(1.0, ORDERS + 1.0)[:, None]
         known = process.B * t**m / (np.sqrt(2.0 * m) * gamma(m + 0.5))
-        # Within a few samples the continuous-time formula knows less than the first sample tells.
+        # Within a few samples the continuous-time formula knows less than the first sample shows.
         return np.minimum(known, unknown) if known_start else unknown
     if not process.has_spectrum():
         raise InputError(

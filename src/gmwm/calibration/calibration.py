@@ -177,7 +177,7 @@ def calibrate(
 
     The recording is examined first: samples of shocks and spikes are left out, periodic lines and
     resonances are terms that a selected model may have, and the wavelet variances of a channel
-    with outliers all over the record are robust; notices say what was found and done. A
+    with outliers all over the record are robust; notices report what was found and done. A
     channel that is constant, or of which more than half of the samples are missing, is skipped;
     auxiliary channels (temperature, voltage, clock) have no model.
 
@@ -193,7 +193,7 @@ def calibrate(
         unexamined.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
-        threads of one interpreter take in turns; -1 is one per core.
+        threads of one interpreter do in turns; -1 is one per core.
     progress : callable, optional
         Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
 

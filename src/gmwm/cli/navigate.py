@@ -92,11 +92,11 @@ def navigate(
     INS/GNSS filters, outages, Monte Carlo: errors of the sensors, drawn from the true models or
     taken from real static recordings, are added to the error-free signals of a trajectory; every
     filter navigates on the same errors. Printed are the errors at the end of the outages and
-    whether each filter knows how good it is. A YAML file can say more than the options, which go
+    whether each filter is consistent. A YAML file can hold more than the options, which go
     before it; see docs/navigation.md.
 
     With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
-    written; what the innovations say of the sensor models is printed.
+    written; whether the innovations agree with the sensor models is printed.
 
     \b
     Examples:
@@ -123,7 +123,7 @@ def navigate(
             content["rate"] = reading.pop("rate")
         if reading:
             raise InputError(
-                f"{_READING[next(iter(reading))]} says how --imu is read, and there is none: leave "
+                f"{_READING[next(iter(reading))]} is about reading --imu, and there is none: leave "
                 "it out"
             )
         _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster, place)

@@ -125,7 +125,7 @@ def variance_notice(
     jump = np.sqrt(means[loudest] / usual) - 1.0
     tail = norm.isf(tuning.FALSE_ALARM / tuning.TENTHS) * np.sqrt(spread[loudest]) / usual
     is_loud = jump > tuning.LARGE_CHANGE and means[loudest] / usual - 1.0 > tail
-    # One loud tenth makes its half louder, which is no trend.
+    # One loud tenth makes its half louder, which is not a trend.
     counted = np.arange(tuning.TENTHS) != loudest if is_loud else np.ones(tuning.TENTHS, dtype=bool)
     first, first_error = _mean_of(
         means, spread, counted & (np.arange(tuning.TENTHS) < tuning.TENTHS // 2)

@@ -87,7 +87,7 @@ def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice
             name,
             f"{text}, more than three times the noise below them",
             values,
-            "nothing mends it: the noise below the step cannot be estimated; use a finer range",
+            "the noise below the step cannot be estimated; use a finer range",
         )
     ratio = step / noise
     text = f"{text}, {ratio:.2g} times the white noise of {readable(noise, unit)}"

@@ -38,7 +38,7 @@ class ChannelHealth:
     lsb : float
         Step of the samples, u; 0 if none was found.
     outliers : float
-        Share of the samples that are outliers spread over the record; 0 if they are no more than
+        Fraction of the samples that are outliers all over the record; 0 if they are no more than
         noise and some shocks explain.
     """
 
@@ -139,7 +139,7 @@ class Health(Document):
         Returns
         -------
         Recording
-            Its channels are NaN during their own events; a notice says how many samples that costs.
+            Its channels are NaN during their own events; a notice counts the samples.
 
         Raises
         ------

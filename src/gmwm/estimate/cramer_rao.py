@@ -166,7 +166,7 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     Raises
     ------
     InputError
-        If a parameter is open or an amplitude is zero, for a `Sinusoid` (a line is no random
+        If a parameter is open or an amplitude is zero, for a `Sinusoid` (a line is not a random
         process) and for a record or interval that is none.
 
     Notes
@@ -219,7 +219,7 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
 
 def _check(model: Model) -> None:
     if model.is_open:
-        raise InputError(f"{model!r} has open parameters: a bound needs values")
+        raise InputError(f"{model!r} has free parameters: a bound needs values")
     for item in model.parameters:
         if item.parameter.linear and not (item.value or 0.0) > 0.0:
             raise InputError(f"{item.key} is zero: leave its process out")

@@ -107,7 +107,7 @@ def estimate(
     method = method or GMWM()
     model = as_model(model)
     if not model.is_open:
-        raise InputError(f"{model!r} has no open parameter: there is nothing to estimate")
+        raise InputError(f"{model!r} has no free parameter: there is nothing to estimate")
     if are_several(data):
         if not isinstance(method, GMWM):
             raise InputError(

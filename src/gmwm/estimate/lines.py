@@ -34,7 +34,7 @@ from gmwm.process import (
 from gmwm.variance import WaveletVariance
 
 # What is a region: a run of octaves (from one level to the next) that is straight as far as the
-# data can tell, and that the data can tell from a corner.
+# data show, and that the data distinguish from a corner.
 #
 # - The slope of each octave differs from the nominal one by no more than the tolerance and what
 #   noise explains. The tolerance is that of reading a plot by eye. Noise is allowed no more than
@@ -45,8 +45,8 @@ from gmwm.variance import WaveletVariance
 #   further apart. This is what keeps a bend of the plot that passes through a nominal slope from
 #   being read: without it one record in three of white noise, random walk and ramp shows a region
 #   of slope +1/2 where there is none.
-# - Levels of fewer than 30 degrees of freedom, known to no better than 13 %, tell no slope from
-#   another. Nor should they weigh as much as all others, as they do in a mean of logarithms.
+# - Levels of fewer than 30 degrees of freedom, known to no better than 13 %, show no slope. Nor
+#   should they weigh as much as all others, as they do in a mean of logarithms.
 #
 # Measured on simulated records with all five parameters wanted: of one process alone (1000 and 6000
 # samples) none of 300 shows a second region; of white noise, random walk and ramp (6000 samples)

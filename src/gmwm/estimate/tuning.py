@@ -17,13 +17,13 @@ LEAST_EFFICIENCY = 0.25
 identity weights reach."""
 
 UNDETERMINED = 1.0
-"""Relative standard error of a shape above which its interval says nothing: a factor e."""
+"""Relative standard error of a shape above which its interval means nothing: a factor e."""
 
 DISTINCT_SIGMA = 1.96
 """Standard errors of the difference of two log correlation times: the two-sided 5 % point."""
 
 DISTINCT_RATIO = 1.05
-"""Ratio of two correlation times below which no record tells them apart, whatever its length."""
+"""Ratio of two correlation times below which no record distinguishes them, whatever its length."""
 
 CONFOUNDED = 0.999
 """Correlation of two estimates: one combination of them is 45 times better known than another."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195")
-"""Okabe & Ito's palette, told apart by colour-blind people too; black is the sum."""
+"""Okabe & Ito's palette, distinct to colour-blind people too; black is the sum."""
 
 DATA_COLOUR = "#444444"
 SUM_COLOUR = "#000000"
@@ -233,7 +233,7 @@ def residuals(
     residual : (J,) ndarray
         In standard errors; NaN where there is none.
     misfit : (J,) ndarray
-        Relative difference of the deviations, told in per cent at each stem.
+        Relative difference of the deviations, written in per cent at each stem.
     title : str, optional
     ax : matplotlib.axes.Axes, optional
     """

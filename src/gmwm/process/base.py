@@ -60,7 +60,7 @@ class Process:
     """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
 
     ordered_by: ClassVar[str] = ""
-    """Shape parameter by which several terms of this kind are ordered, and told apart."""
+    """Shape parameter by which several terms of this kind are ordered and distinguished."""
 
     is_white: ClassVar[bool] = False
     """Whether it is white at any rate: noise of a measurement, which needs no state."""
@@ -195,7 +195,7 @@ class Process:
         missing = [name for name, value in self.values.items() if value is None]
         if missing:
             raise InputError(
-                f"{self!r} has open parameters ({', '.join(missing)}): give them a value first"
+                f"{self!r} has free parameters ({', '.join(missing)}): give them a value first"
             )
 
     # -- primitives -----------------------------------------------------------------------------
@@ -434,7 +434,7 @@ class Process:
 
     @classmethod
     def is_repeatable(cls, instance: Process) -> bool:
-        """Whether two of this kind in one model can be told apart."""
+        """Whether two of this kind in one model can be distinguished."""
         if cls.repeatable is not None:
             return cls.repeatable
         return bool(instance.shape_parameters)

@@ -51,7 +51,7 @@ class Model:
     Raises
     ------
     InputError
-        If two terms cannot be told apart: two of a kind without a shape parameter, or two of
+        If two terms cannot be distinguished: two of a kind without a shape parameter, or two of
         equal given shape.
 
     Examples
@@ -185,7 +185,7 @@ class Model:
         missing = [key for key, value in self.params.items() if value is None]
         if missing:
             raise InputError(
-                f"the model {self!r} has open parameters ({', '.join(missing)}): "
+                f"the model {self!r} has free parameters ({', '.join(missing)}): "
                 "give them a value, or estimate them with gmwm.fit"
             )
 
@@ -237,7 +237,7 @@ class Model:
 
 
 def _no_term(other: Any) -> str:
-    return f"{other!r} is no error process: add processes, like WhiteNoise() + GaussMarkov()"
+    return f"{other!r} is not an error process: add processes, like WhiteNoise() + GaussMarkov()"
 
 
 def as_model(model: Process | Model) -> Model:
@@ -253,7 +253,7 @@ def as_model(model: Process | Model) -> Model:
     if isinstance(model, Process):
         return Model((model,))
     raise InputError(
-        f"{model!r} is no error model: build one like WhiteNoise() + 2 * GaussMarkov()"
+        f"{model!r} is not an error model: build one like WhiteNoise() + 2 * GaussMarkov()"
     )
 
 
@@ -279,7 +279,7 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
             name = type(term).__name__
             if not term.is_repeatable(term):
                 raise InputError(
-                    f"two {name} in one model cannot be told apart: keep one (variances add up)"
+                    f"two {name} in one model cannot be distinguished: keep one (variances add up)"
                 )
             shapes = [tuple(t.values[p.name] for p in t.shape_parameters) for t in (term, other)]
             if shapes[0] == shapes[1] and None not in shapes[0]:
@@ -288,7 +288,7 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
                     for p, v in zip(term.shape_parameters, shapes[0], strict=True)
                 )
                 raise InputError(
-                    f"two {name} of equal {values} in one model cannot be told apart: keep one "
+                    f"two {name} of equal {values} in one model cannot be distinguished: keep one "
                     "(variances add up)"
                 )
 

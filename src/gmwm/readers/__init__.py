@@ -2,7 +2,7 @@
 
 A file becomes a `Table` (named columns, not yet read), `roles` decides which column is which
 channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
-`gmwm.errors.InputError` with one sentence: what is wrong, where, and how to mend it.
+`gmwm.errors.InputError` with one sentence: what is wrong, where, and how to correct it.
 """
 
 from gmwm._core.units import AUXILIARY

@@ -39,7 +39,7 @@ _OBJECTS = np.empty(0, dtype=object)
 _KINDS = {
     "O": "Python objects",
     "c": "complex numbers",
-    "b": "truth values",
+    "b": "booleans",
     "S": "text",
     "U": "text",
     "M": "dates",

@@ -1,4 +1,4 @@
-"""The unit of each channel: what the user says, else what the header says."""
+"""The unit of each channel: as the user gives it, else as the header does."""
 
 from __future__ import annotations
 
@@ -90,13 +90,13 @@ def _check(table: Table, channel: str, sensor: str | None, unit: str) -> None:
 def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
     if sensor is None:
         return InputError(
-            f"{table.source} does not say the unit of {channel}: give it, e.g. "
+            f"{table.source} does not give the unit of {channel}: give it, e.g. "
             f'units={{"{channel}": "deg/s"}}',
             "unit-missing",
         )
     example = _EXAMPLES[sensor]
     return InputError(
-        f"{table.source} does not say the unit of {channel}: give it, e.g. "
+        f"{table.source} does not give the unit of {channel}: give it, e.g. "
         f'units={{"{sensor}": "{example}"}}',
         f"{sensor}-unit-missing",
     )

@@ -44,7 +44,7 @@ class CsvTable:
         Raises
         ------
         InputError
-            If it cannot be read or is no table.
+            If it cannot be read or is not a table.
         """
         _, head = next(blocks(path, size=_HEAD), (1, b""))
         return cls(path, find_layout(path.name, head))
@@ -201,7 +201,7 @@ def _parse_by_field(
             if value is None:
                 raise InputError(
                     f"{table.source}, {place}, column {label(table.names, column)}: "
-                    f"{_excerpt(cells[column])} is not a number: mend the line, or choose other "
+                    f"{_excerpt(cells[column])} is not a number: correct the line, or choose other "
                     "columns with channels= and time="
                 )
             if math.isinf(value):
@@ -211,20 +211,20 @@ def _parse_by_field(
 
 
 def _cells(table: CsvTable, place: str, text: str) -> list[str]:
-    """Fields of a line; a delimiter after the last one is no harm."""
+    """Fields of a line; a delimiter after the last one does no harm."""
     width = table.layout.width
     try:
         cells = split_line(text, table.layout.delimiter)
     except ValueError as error:
         raise InputError(
-            f"{table.source}, {place}: quotes that do not match: mend the line"
+            f"{table.source}, {place}: quotes that do not match: correct the line"
         ) from error
     if len(cells) == width + 1 and not cells[-1]:
         cells.pop()
     if len(cells) != width:
         raise InputError(
-            f"{table.source}, {place}: {len(cells)} fields where {width} were expected: mend the "
-            "line or remove it"
+            f"{table.source}, {place}: {len(cells)} fields where {width} were expected: correct "
+            "the line or remove it"
         )
     return cells
 

@@ -224,7 +224,7 @@ def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> l
         return (split_header if header else split_line)(line.text, delimiter)
     except ValueError as error:
         raise InputError(
-            f"{source}, line {line.number}: quotes that do not match: mend the line"
+            f"{source}, line {line.number}: quotes that do not match: correct the line"
         ) from error
 
 

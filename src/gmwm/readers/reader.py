@@ -47,7 +47,7 @@ def read(
         ``{"gyro": "deg/s", "accel": "g"}``. Not needed where the header has them.
     channels : mapping of str to (str or int), optional
         Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``. Only
-        these are read. A name that begins with ``gyro`` or ``accel`` says what the column
+        these are read. A name that begins with ``gyro`` or ``accel`` states what the column
         measures; for any other its unit does (``"temp": "T1"`` in degC or K is auxiliary). By
         default columns are known by their names; without
         names, six are gyro and accelerometer x, y, z, seven have time before them, one or three
@@ -63,12 +63,13 @@ def read(
         In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
         the time stamps jump forward, as many as fit on the grid of the sampling interval. Columns
         of temperatures, voltages and further clocks are its auxiliary channels. Its
-        ``notices`` say what was assumed, which columns were not used and what is missing.
+        ``notices`` report what was assumed, which columns were not used and what is missing.
 
     Raises
     ------
     InputError
-        If the file cannot be used. The message says what is wrong, where, and how to mend it.
+        If the file cannot be used. The message is one sentence: what is wrong, where, and
+        how to correct it.
 
     Examples
     --------

@@ -237,7 +237,7 @@ def _found_auxiliary(
 
 def _given_channels(columns: Columns, channels: Mapping[str, Reference]) -> dict[str, int]:
     if not channels:
-        raise InputError(f"channels names no channel: say which column is which, e.g. {_EXAMPLE}")
+        raise InputError(f"channels names no channel: give the column of each, e.g. {_EXAMPLE}")
     return {name: columns.find(reference, name) for name, reference in channels.items()}
 
 
@@ -249,7 +249,7 @@ def _named_channels(columns: Columns) -> dict[str, int]:
         if len(indices) > 1:
             names = " and ".join(label(columns.names, i) for i in indices[:2])
             raise InputError(
-                f"{columns.source}: columns {names} may both be {channel}: say which to use, "
+                f"{columns.source}: columns {names} may both be {channel}: choose one, "
                 f'e.g. channels={{"{channel}": {indices[0]}}}',
                 "channel-unknown",
             )

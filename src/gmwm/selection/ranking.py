@@ -59,7 +59,7 @@ class Choices:
         most = self.max_gauss_markov
         if not checks.is_number(most) or most not in range(MAX_GAUSS_MARKOV + 1):
             raise InputError(
-                f"max_gauss_markov = {checks.shown(most)}: give a whole number from 0 to "
+                f"max_gauss_markov = {checks.shown(most)}: give an integer from 0 to "
                 f"{MAX_GAUSS_MARKOV}"
             )
         for process in self.extra:
@@ -72,7 +72,7 @@ class Choices:
             shape = [process.values[p.name] for p in process.shape_parameters]
             if linear is None or process.values[linear.name] is not None or None in shape:
                 raise InputError(
-                    f"extra = {process!r}: give its shape and leave its amplitude open, as in "
+                    f"extra = {process!r}: fix its shape and leave its amplitude free, as in "
                     "Sinusoid(frequency=0.5)"
                 )
 
@@ -220,7 +220,7 @@ def _without_ramp(
 
 
 def candidate_of(fitted: Fit) -> Candidate:
-    """What a fit under its own weights says of its model.
+    """The candidate of a fit under its own weights.
 
     Candidates of such fits are less comparable than those of `rank`, whose weights are common.
     """

@@ -60,7 +60,7 @@ class Selection(Document):
 
     @property
     def ties(self) -> tuple[Candidate, ...]:
-        """Candidates within 2 of the best criterion, which the data hardly tell apart."""
+        """Candidates within 2 of the best criterion, which the data hardly distinguish."""
         limit = rank_key(self.ranking[0]) + tuning.TIE
         return tuple(item for item in self.ranking if rank_key(item) <= limit)
 
@@ -157,7 +157,7 @@ class Selection(Document):
         if len(self.ranking) > _SHOWN:
             lines.append(f"  and {len(self.ranking) - _SHOWN} more")
         if len(ties) > 1:
-            lines.append("= these tie: the data hardly tell them apart, the simplest is preferred")
+            lines.append("= these tie: the data hardly distinguish them, the simplest is preferred")
         if self.chosen not in ties:
             lines += wrapped(
                 "it is simpler than the first, and as good under weights of its own",

@@ -1,7 +1,7 @@
 """What stays open where several models describe the data equally well.
 
 The interval of a parameter holds if its model is the right one. Where other models are as good, the
-parameter of each of them is as good an answer, and their intervals together tell what is known.
+parameter of each of them is as good an answer, and their intervals together are what is known.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
         From `ranges`, at 95 %.
     """
     intervals = fitted.interval()
-    said = []
+    texts = []
     for estimate in fitted.estimates:
         key = estimate.key
         if key not in found:
@@ -110,5 +110,5 @@ def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
         unit, factor = (units[0].unit, units[0].per_si) if units else (estimate.unit, 1.0)
         low, high, a, b = (value * factor for value in (low, high, a, b))
         ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
-        said.append(f"{key} {ends} {unit} rather than {a:.3g} to {b:.3g}")
-    return said
+        texts.append(f"{key} {ends} {unit} rather than {a:.3g} to {b:.3g}")
+    return texts

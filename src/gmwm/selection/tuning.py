@@ -8,7 +8,7 @@ STRICTNESS = 1.5
 """The c of Hannan & Quinn (1979); consistent above 1."""
 
 TIE = 2.0
-"""Difference of the criterion within which the data hardly tell models apart (twice the
+"""Difference of the criterion within which the data hardly distinguish models (twice the
 log-likelihood: Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
 
 RAMP_MARGIN = 6.0
@@ -16,7 +16,7 @@ RAMP_MARGIN = 6.0
 that is seen only once."""
 
 RAMP_P = 0.002
-"""Level at which a slope is no accident of a walk that the record does not resolve."""
+"""Level below which a slope is not an accident of a walk that the record does not resolve."""
 
 RAMP_PLAUSIBLE = 2.0
 """Squared slope over its variance, below which no ramp is tried."""

@@ -64,7 +64,7 @@ class Comparison:
 
     @property
     def determined(self) -> bool:
-        """Whether the record says anything about it."""
+        """Whether the record determines it."""
         return bool(np.isfinite(self.upper))
 
     @property

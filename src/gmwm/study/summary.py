@@ -1,4 +1,4 @@
-"""What the runs of a study say: errors against the truth, the bound and the paper."""
+"""The summary of a study's runs: errors against the truth, the bound and the paper."""
 
 from __future__ import annotations
 

@@ -145,14 +145,14 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
     if runs.longest < MIN_SAMPLES:
         raise InputError(
             f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
-            "can be told of its noise"
+            "can be determined of its noise"
         )
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if low == high:
         raise InputError(f"{where} is constant ({low:g}): a dead channel has no noise model")
     if not _SMALLEST < high - low < _LARGEST:
         raise InputError(
-            f"{where} varies by {high - low:.1g}: that is no sensor noise, check the unit"
+            f"{where} varies by {high - low:.1g}: that is not sensor noise, check the unit"
         )
     return values, runs
 

@@ -184,7 +184,7 @@ def coefficients(
     count = filters.levels(smooth.size)
     if levels is not None:
         if not _is_count(levels):
-            raise InputError(f"levels = {levels!r}: give a whole number from 1")
+            raise InputError(f"levels = {levels!r}: give an integer from 1")
         count = min(count, int(levels))
     return _levels(smooth, filters.detail, filters.scaling, count)
 
@@ -219,9 +219,7 @@ def _is_count(levels: Any) -> bool:
 def _checked_levels(levels: Any, n: int) -> int:
     most = n.bit_length()
     if not (_is_count(levels) and levels <= most):
-        raise InputError(
-            f"levels = {levels!r}: give a whole number from 1 to {most} for {n} samples"
-        )
+        raise InputError(f"levels = {levels!r}: give an integer from 1 to {most} for {n} samples")
     return int(levels)
 
 

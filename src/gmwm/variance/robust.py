@@ -45,7 +45,7 @@ _SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.53; 1 - 1e-7 is b
 _TOLERANCE = 1e-7  # of the last Newton step in log nu^2; the error left is its square
 _FEW = 2**14  # coefficients; below, counting costs more than it saves
 _ZERO = 1e-6  # times the root mean square: a median below counts as zero
-_NARROW = 1e-4  # in log nu^2: a maximum below zero, so close, is no solution
+_NARROW = 1e-4  # in log nu^2: a maximum below zero, so close, is not a solution
 _LARGEST_STEP = np.log(2.0)
 _MAX_STEPS = 200
 

@@ -54,10 +54,10 @@ LARGEST_CHANGE = 1.5
 2 %."""
 
 PILOT_WINDOWS = 8.0
-"""Windows that do not overlap, from which a level tells the spectrum that gaps are filled under."""
+"""Windows that do not overlap, from which a level gives the spectrum to fill gaps under."""
 
 DECIDING_WINDOWS = 32.0
-"""The same, from which a level tells whether it can be filled; coarser ones follow it."""
+"""The same, from which a level shows whether it can be filled; coarser ones follow it."""
 
 LAGS_PER_AVERAGE = 8
 """Lags at which pairs of coefficients are counted."""

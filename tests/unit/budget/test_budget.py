@@ -213,7 +213,7 @@ def test_models_that_are_not_valid_are_named():
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
     assert not fit.valid
     notes = error_budget(fit, (1.0,)).notes
-    assert "the model is not valid, read its remarks first: gyro_x" in notes
+    assert "the model is not valid, read its notices first: gyro_x" in notes
 
 
 # -- looks ----------------------------------------------------------------------------------------
@@ -306,11 +306,11 @@ def test_a_term_of_zero_is_in_the_table_but_not_drawn():
 # -- bad input ------------------------------------------------------------------------------------
 
 REFUSED = {
-    "open parameters": (lambda: error_budget({"gyro_x": WhiteNoise()}, dt=DT), "open parameters"),
+    "free parameters": (lambda: error_budget({"gyro_x": WhiteNoise()}, dt=DT), "free parameters"),
     "no quantity": (lambda: error_budget({"temp": GYRO}, dt=DT), "a gyro or an accelerometer"),
     "no channels": (lambda: error_budget({}, dt=DT), "a gyro or an accelerometer"),
     "a model alone": (lambda: error_budget(GYRO, dt=DT), "models by channel name"),
-    "no model": (lambda: error_budget({"gyro_x": 3}, dt=DT), "is no error model"),
+    "no model": (lambda: error_budget({"gyro_x": 3}, dt=DT), "is not an error model"),
     "no interval": (lambda: error_budget({"gyro_x": GYRO}), "give its sampling interval"),
     "interval of zero": (lambda: error_budget({"gyro_x": GYRO}, dt=0.0), "positive sampling"),
     "interval of NaN": (lambda: error_budget({"gyro_x": GYRO}, dt=np.nan), "positive sampling"),

@@ -245,7 +245,7 @@ def test_text_is_readable_at_80_columns():
 @pytest.mark.parametrize(
     ("model", "n", "dt", "words"),
     [
-        (WhiteNoise(), 100, 1.0, "open parameters"),
+        (WhiteNoise(), 100, 1.0, "free parameters"),
         (WhiteNoise(1.0), 7, 1.0, "n = 7"),
         (WhiteNoise(1.0), 100.5, 1.0, "n = 100.5"),
         (WhiteNoise(1.0), 100, 0.0, "dt = 0.0"),
@@ -253,7 +253,7 @@ def test_text_is_readable_at_80_columns():
         (WhiteNoise(1.0) + RandomWalk(0.0), 100, 1.0, "K is zero"),
         (WhiteNoise(1.0) + Sinusoid(1.0, 0.1), 100, 1.0, "Sinusoid"),
         (RateRamp(1.0), 100, 1.0, "no noise process"),
-        ("white", 100, 1.0, "no error model"),
+        ("white", 100, 1.0, "not an error model"),
     ],
 )
 def test_bad_input_is_one_sentence(model, n, dt, words):

@@ -177,15 +177,15 @@ class TestWhatIsOff:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"model": WhiteNoise(1.0)}, "no open parameter"),
+        ({"model": WhiteNoise(1.0)}, "no free parameter"),
         ({"model": RateRamp()}, "no noise process"),
-        ({"model": "white"}, "no error model"),
+        ({"model": "white"}, "not an error model"),
         ({"method": "magic"}, "known are gmwm"),
         ({"omega": "data!"}, "known are model"),
         ({"weights": "data", "omega": "model"}, "are the same: give one"),
         ({"dt": None}, "sampling interval"),
         ({"model": gmwm.ARIMA(0, 2, 1)}, "one integration"),
-        ({"model": gmwm.AR([0.5, None])}, "give all or none"),
+        ({"model": gmwm.AR([0.5, None])}, "fix all or none"),
     ],
 )
 def test_bad_arguments(arguments, words):

@@ -144,7 +144,7 @@ def test_entries_that_are_not_wanted_may_be_anything(save, samples):
         (np.array([None] * 80), "holds Python objects"),
         (np.array(["a"] * 80), "holds text: save real numbers"),
         (np.zeros(80, complex), "holds complex numbers"),
-        (np.zeros(80, bool), "holds truth values"),
+        (np.zeros(80, bool), "holds booleans"),
         (np.zeros(80, "M8[s]"), "holds dates"),
         (np.zeros((80, 2, 3)), "shape (80, 2, 3)"),
         (np.float64(3.0), "shape ()"),

@@ -107,7 +107,7 @@ def test_text_for_a_number(damaged, cell):
     path.write_text(path.read_text().replace(HEADER, HEADER.replace(",", ";")))
     message = problem(path)
     assert message.startswith(f"static.csv, line 40, column 'accel_x': {cell!r} is not a number: ")
-    assert "mend the line" in message
+    assert "correct the line" in message
 
 
 def test_long_and_odd_text_is_cut_and_escaped(damaged):
@@ -171,7 +171,7 @@ def test_too_few_samples_are_there(write, samples):
 )
 def test_ragged(damaged, line, found):
     message = problem(damaged(33, line))
-    assert f"static.csv, line 33: {found} fields where 6 were expected: mend the line" in message
+    assert f"static.csv, line 33: {found} fields where 6 were expected: correct the line" in message
 
 
 @pytest.mark.parametrize("line", ["1 2 3 4 5", "1\t2 3 4  5 6 7"])
@@ -210,14 +210,14 @@ def test_unit_missing(write, samples, option, quantity):
     with pytest.raises(InputError) as caught:
         read(write(samples, HEADER), rate=1, units=units)
     message = str(caught.value)
-    assert f"static.csv does not say the unit of {quantity}_x" in message
+    assert f"static.csv does not give the unit of {quantity}_x" in message
     assert f'units={{"{quantity}": "{option}"}}' in message
     assert caught.value.code == f"{quantity}-unit-missing"
 
 
 def test_unit_of_another_name_missing(write, samples):
     message = problem(write(samples), channels={"table": 0}, units={})
-    assert 'does not say the unit of table: give it, e.g. units={"table": "deg/s"}' in message
+    assert 'does not give the unit of table: give it, e.g. units={"table": "deg/s"}' in message
 
 
 @pytest.mark.parametrize("unit", ["furlong", "", "deg/", "9 9", "LSB", "m"])

@@ -136,7 +136,7 @@ class Iteration:
         self.columns = series.columns
         if in_state:
             if not self.columns.drift_is_free:
-                raise InputError('drift = "state" needs an open RateRamp() in the model')
+                raise InputError('drift = "state" needs a RateRamp() of free slope in the model')
             if all(term.is_white for term in self._terms):
                 raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
             self.columns = Columns.without_regressors(series.columns.centred, self.dt)

@@ -114,8 +114,8 @@ class Whittle(MLE):
 def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
     """Maximise, and whiten anew with the estimates, until they stay.
 
-    The beginning of a series, which has no past to be predicted from, is no stationary filter's;
-    the gradient of the difference to the exact likelihood of a first part makes up for that.
+    A stationary filter predicts the beginning of a series from a past that it does not have; the
+    gradient of the difference to the exact likelihood of a first part makes up for that.
     """
     information = spectral_information(coordinates, first, columns.n, columns.dt)
     deviation = np.sqrt(np.diag(regular_inverse(information)))

@@ -61,7 +61,7 @@ def upper_bound(process: Process, coordinates: Coordinates, top: Top, columns: C
 
     The quantile of the profile likelihood as a density of the scale. A random walk that can hardly
     be seen shows in few degrees of freedom, so that the likelihood falls off much slower than its
-    curvature at zero tells.
+    curvature at zero shows.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Terms that the moments do not support, as only this method can tell."""
+"""Terms that the moments do not support, as only this method finds."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def redundant_notices(
 ) -> list[Notice]:
     """The term whose shape was searched for and that the data can do without, if there is one.
 
-    The amplitude alone does not tell: among all shapes one always fits some accident of the data.
+    The amplitude alone does not show it: among all shapes one always fits some accident.
     The objective without the term does, at one per cent shared among the levels where a term of
     this kind might have been found. ``point.objective`` is under ``covariance``, whatever the
     weights of the estimate were.

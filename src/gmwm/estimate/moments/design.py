@@ -50,7 +50,7 @@ class Design:
         for term in self.terms:
             if 0 < term.n_shapes < term.free_shape.size and not term.process.separable_shape:
                 raise InputError(
-                    f"{term.process!r} has some coefficients given and some open: give all or none"
+                    f"{term.process!r} has some coefficients fixed and some free: fix all or none"
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)

@@ -1,7 +1,7 @@
-"""Model discrepancy: what is granted to a model that fails the chi-square test.
+"""Model discrepancy: the error allowed to a model that fails the chi-square test.
 
 With a million samples the fine levels are known to a tenth of a per cent, and no sum of textbook
-processes is that exact. A fit that chases them lets go of the long averaging times, which are what
+processes is that exact. A fit that follows them misses the long averaging times, which are what
 navigation feels. So, where the test fails, the covariance of the wavelet variances gains a relative
 discrepancy, ``Sigma + delta^2 diag(nu_hat^2)``, with delta such that the weighted sum of squares
 equals its degrees of freedom (the moment estimator of a random effect, DerSimonian & Laird 1986,

@@ -186,7 +186,7 @@ def dictionary_fit(
         ]
         if all(process.is_line for process in mixture):
             raise InputError(
-                f"{wv.name or 'the series'} is no noise that these processes describe (an exact "
+                f"{wv.name or 'the series'} is not noise that these processes describe (an exact "
                 "line or a pattern): check the data"
             )
         whole = Model(tuple(mixture))

@@ -93,7 +93,7 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     Returns
     -------
     float
-        1 where too few blocks exist to tell.
+        1 where too few blocks exist.
     """
     blocks, block = _coarser(wv)
     first = _beside(np.flatnonzero(~np.isnan(blocks)))

@@ -135,7 +135,7 @@ class Fit(Document):
 
     @property
     def message(self) -> str:
-        """What there is to know about it, in sentences; empty if nothing."""
+        """The notices as text; empty if there are none."""
         return "; ".join(map(str, self.notices))
 
     @property
@@ -203,8 +203,8 @@ class Fit(Document):
     def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:
         """Length of record that would give each parameter a relative standard error.
 
-        Errors go with the root of the length. That is too hopeful where a discrepancy was granted
-        to the model, which no length removes.
+        Errors go with the root of the length. That is too hopeful where a discrepancy was allowed
+        for, which no length removes.
 
         Parameters
         ----------

@@ -158,7 +158,7 @@ class Goodness:
         return "\n".join([*lines, *wrapped(self.sentence, indent=2)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Standardised residuals by level, with the misfit told at each; returns the axes."""
+        """Standardised residuals by level, with the misfit written at each; returns the axes."""
         from gmwm import plotting
 
         return plotting.residuals(self.tau, self.residual, self.misfit, title=self.name, ax=ax)

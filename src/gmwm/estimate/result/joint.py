@@ -36,7 +36,7 @@ class JointFit(Fit):
         two of them determine the parameters.
     curves_p : float
         p-value of the test that the wavelet variances of each recording are those of the joint
-        model, to within the discrepancy granted to it; it judges the model too.
+        model, to within the discrepancy allowed for; it judges the model too.
     spread : dict
         Standard deviation of each parameter between recordings beyond their standard errors, by
         key: relative for positive parameters, in its SI unit for others.
@@ -71,10 +71,10 @@ class JointFit(Fit):
     @property
     def agreement(self) -> str:
         """How many recordings there are, and whether they agree."""
-        said = f"{len(self.parts)} recordings"
+        which = f"{len(self.parts)} recordings"
         if np.isfinite(self.equality_p):
-            return f"{said}, equality of the parameters: p = {self.equality_p:.2g}"
-        return f"{said}, each as the joint model has it: p = {self.curves_p:.2g}"
+            return f"{which}, equality of the parameters: p = {self.equality_p:.2g}"
+        return f"{which}, each as the joint model has it: p = {self.curves_p:.2g}"
 
     def _spread_text(self, key: str, value: float | None) -> str:
         if value is None:

@@ -113,7 +113,7 @@ def confounded_notices(model: Model, keys: Sequence[str], matrix: FloatArray) ->
                 notices.append(
                     Notice(
                         "confounded", "bad", keys[j],
-                        f"cannot be told apart from {first} (their estimates have a correlation "
+                        f"cannot be distinguished from {first} (their estimates have a correlation "
                         f"of {correlation:.5f}): fix one of them",
                         {"other": first, "correlation": correlation},
                     )
@@ -145,7 +145,7 @@ def misfit_notices(
     variance: FloatArray,
     discrepancy: float,
 ) -> list[Notice]:
-    """What there is to say of a model that fails the chi-square test.
+    """Notices of a model that fails the chi-square test.
 
     ``variance`` (J,) are the statistical variances of ``target``, u^4.
     """

@@ -27,7 +27,7 @@ from gmwm.ins.geometry import gravity
 
 
 @numba.njit(cache=True, nogil=True)
-def take_in_jointly(
+def update_jointly(
     J: FloatArray, h: FloatArray, estimate: int, truth: int, variance: float, gain: FloatArray,
     m: int, a: FloatArray, k: FloatArray,
 ) -> None:  # fmt: skip
@@ -145,7 +145,7 @@ def run_both(
                     state = estimate = 9 + coloured[component]
                     truth = 9 + j_coloured[component]
                 measurement_update(P, h, state, sd * sd, 0.0, x, K)
-                take_in_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
+                update_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
             if kind in (IS_POSITION, IS_VELOCITY):
                 gathered = j_gathered = 0.0
             event += 1

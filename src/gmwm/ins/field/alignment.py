@@ -72,7 +72,7 @@ def align(
         Of the IMU, with the standard deviation of constant biases.
     heading : float, optional
         Of the forward axis at the first fix, rad from north to the east. By default that of the
-        GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros can tell it.
+        GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros show it.
     heading_sd : float, optional
         How well a given heading is known, rad.
 
@@ -116,7 +116,7 @@ def align(
         if not known:
             raise InputError(
                 "the heading cannot be known: GNSS shows no motion fast enough in the first "
-                f"{tuning.SEARCHED:g} s, and the gyros cannot tell it from the Earth's rotation: "
+                f"{tuning.SEARCHED:g} s, and the gyros cannot find it from the Earth's rotation: "
                 "give the heading",
                 "heading-unknown",
             )
@@ -312,7 +312,7 @@ def _from_chord(aiding: Aiding, start: float) -> tuple[float, float, float, floa
 def _compass(
     mean: FloatArray, level: FloatArray, lat: float, gyro_sd: float
 ) -> tuple[float, float, str] | None:
-    """Heading from the Earth's rotation, if the gyros can tell it. Groves (2013), eq. 5.105."""
+    """Heading from the Earth's rotation, if the gyros show it. Groves (2013), eq. 5.105."""
     north, east, _ = matrix_from_rpy(level) @ mean[:3]
     sd = float(gyro_sd / (RATE * np.cos(lat)))
     if sd > tuning.COMPASS_SD:

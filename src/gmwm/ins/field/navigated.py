@@ -1,4 +1,4 @@
-"""Real data filtered: the solution, and what its innovations say of the filter's model."""
+"""Real data filtered: the solution, and what its innovations show of the filter's model."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ class Navigated:
 
     @property
     def verdict(self) -> Notice:
-        """Whether the filter's model fits these data; only the innovations can tell."""
+        """Whether the filter's model fits these data; only the innovations show it."""
         sizes = self._misfits
         largest = max(sizes.values(), default=1.0)
         if self.solution.diverged_at is not None:
@@ -228,16 +228,16 @@ class Navigated:
             return "mixed-sizes", "the standard deviations of the fixes do not go together"
         if max(sizes.values()) < 1.0:
             return "too-small", (
-                "the sensors are better than their models say, or the fixes than their standard "
-                "deviations"
+                "the sensors are better than their models predict, or the fixes than their "
+                "standard deviations"
             )
         if self._usual_size < tuning.MOSTLY_FINE:
             return "outliers", (
                 "most are not, so that some fixes are outliers, or errors without fixes grow "
-                "faster than the sensor models say"
+                "faster than the sensor models predict"
             )
         return "too-large", (
-            "the sensors are worse than their models say, or the fixes than their standard "
+            "the sensors are worse than their models predict, or the fixes than their standard "
             "deviations"
         )
 

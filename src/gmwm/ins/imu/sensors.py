@@ -139,7 +139,7 @@ def _model(axis: str, given: Any) -> Model:
     missing = [key for key, value in model.params.items() if value is None]
     if missing:
         raise InputError(
-            f"sensor models: {axis} has open parameters ({', '.join(missing)}): give them a value, "
+            f"sensor models: {axis} has free parameters ({', '.join(missing)}): give them a value, "
             "or estimate them with gmwm.fit"
         )
     return model

@@ -1,4 +1,4 @@
-"""Many runs of several filters on the same errors, and what they say."""
+"""Many runs of several filters on the same errors, and their statistics."""
 
 from gmwm.ins.montecarlo.consistency import Consistency, InnovationTest, Ratio, chi_square_ratio
 from gmwm.ins.montecarlo.experiment import Experiment

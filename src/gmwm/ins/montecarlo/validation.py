@@ -144,7 +144,7 @@ class Validation:
                     *self._error_rows(i, width),
                 ]
             )
-        blocks.append(["NEES per degree of freedom: 1 if the filter knows how good it is, * out of "
+        blocks.append(["NEES per degree of freedom: 1 if the filter is consistent, * out of "
                        "band", *self._nees_rows(width)])  # fmt: skip
         if self.study.outages:
             blocks.append(["Position errors within predicted intervals, %",

@@ -312,7 +312,7 @@ class _Believed:
     def _reduced(self, where: str, given: ReducedSpec) -> SensorModels:
         full = self.truth if given.of == "truth" else read_models(where, given.of, self.folder)
         if full is None:
-            raise InputError(f"{where}: say what is reduced, as in of: calibration.json")
+            raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
         lengths = {round(length / self.dt) * self.dt for length in self.lengths}
         try:
             return reduce(

@@ -69,7 +69,7 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Gaps within a series, each with the samples around it that may tell what it held.
+    """Gaps within a series, each with the samples around it that predict what it held.
 
     Attributes
     ----------

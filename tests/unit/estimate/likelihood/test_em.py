@@ -406,6 +406,6 @@ def test_processes_without_a_closed_form_are_refused_with_the_way_out(process):
 )
 def test_options_out_of_range_are_refused(option, value):
     with pytest.raises(
-        InputError, match=f"{option} = .*give a (small positive number|whole number, 1 or more)"
+        InputError, match=f"{option} = .*give a (small positive number|integer, 1 or more)"
     ):
         em(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), **{option: value})

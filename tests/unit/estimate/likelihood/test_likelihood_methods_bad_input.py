@@ -20,7 +20,7 @@ OF_SAMPLES = ("mle", "whittle", "em")
         (WhiteNoise(0.2) + GaussMarkov(0.5), "does not give every term"),
         (WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.1), "RandomWalk"),
         (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "N must be positive"),
-        ("mle", "no error model"),
+        ("mle", "not an error model"),
     ],
     ids=repr,
 )

@@ -135,9 +135,9 @@ def test_rounding_to_nothing_has_no_variance():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"replications": 0}, "whole number, 1 or more"),
-        ({"replications": 1.5}, "whole number, 1 or more"),
-        ({"seed": -1}, "whole number, 0 or more"),
+        ({"replications": 0}, "integer, 1 or more"),
+        ({"replications": 1.5}, "integer, 1 or more"),
+        ({"seed": -1}, "integer, 0 or more"),
         ({"discrepancy": 2.0}, "fraction of the variance"),
     ],
 )
@@ -159,4 +159,4 @@ def test_two_parameters_of_one_number_are_said_not_to_be_told_apart(series):
     x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 1)
     fit = gmwm.fit(RoundedNoise(), x, dt=1.0, method=SimulatedMoments(replications=4))
     assert not fit.valid
-    assert "lsb: cannot be told apart from sigma" in fit.message
+    assert "lsb: cannot be distinguished from sigma" in fit.message

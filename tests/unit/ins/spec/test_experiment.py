@@ -104,7 +104,7 @@ def test_a_random_walk_in_real_errors_starts_anywhere(tmp_path: Path) -> None:
     assert walks.bias_sd["gyro_x"] > 0.0
     assert walks.bias_sd["accel_x"] == 0.0
     assert found.filters["told"].bias_sd["gyro_x"] == 0.5
-    with pytest.raises(InputError, match="say what is reduced"):
+    with pytest.raises(InputError, match="name what is reduced"):
         experiment_from(LEAST | {"truth": truth, "filters": {"A": {"reduce": "N+K"}}}, tmp_path)
 
 
