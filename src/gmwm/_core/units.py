@@ -34,6 +34,7 @@ _DEFINITIONS = (
     "second = [time] = s",
     "minute = 60 * second = min",
     "hour = 3600 * second = h = hr",
+    "day = 86400 * second = d",
     "hertz = 1 / second = Hz",
     "meter = [length] = m",
     "standard_gravity = 9.80665 * meter / second ** 2 = g = g0",
@@ -101,6 +102,14 @@ def factor(unit: str, si_unit: str) -> float:
         raise InputError(
             f"unit {unit!r} does not measure the same as {si_unit}: use a unit of that kind"
         ) from error
+
+
+def seconds_in(unit: str) -> float | None:
+    """How many seconds a unit of time has, ``None`` if the text is none."""
+    try:
+        return factor(unit, "s")
+    except InputError:
+        return None
 
 
 def quantity_of(unit: str) -> str:

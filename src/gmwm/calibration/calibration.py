@@ -19,7 +19,8 @@ from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
-from gmwm.calibration.screening import SCREENING, screened, with_outcomes
+from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process
@@ -177,8 +178,9 @@ def calibrate(
 
     The recording is examined first: samples of shocks and spikes are left out, periodic lines and
     resonances are terms that a selected model may have, and the wavelet variances of a channel
-    with outliers all over the record are robust; notices report what was found and done. A
-    channel that is constant, or of which more than half of the samples are missing, is skipped;
+    with outliers all over the record are robust; a channel of which each sample is written several
+    times is taken at its own rate. Notices report what was found and done. A channel that is
+    constant, or of which more than half of the samples are missing, is skipped;
     auxiliary channels (temperature, voltage, clock) have no model.
 
     Parameters
@@ -210,7 +212,7 @@ def calibrate(
     _check_together(given)
     treated = [screened(each, screening) for each in given]
     recordings = [each.recording for each in treated]
-    alive, dead = _usable(recordings)
+    alive, dead = _usable(treated)
     if isinstance(model, Mapping):
         for name in alive:
             _model_of(name, model)
@@ -297,18 +299,21 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             )
 
 
-def _usable(recordings: Sequence[Recording]) -> tuple[dict[str, list[Channel]], dict[str, Notice]]:
+def _usable(treated: Sequence[Screened]) -> tuple[dict[str, list[Channel]], dict[str, Notice]]:
     """Each channel in the recordings where it can be used, and why others are skipped."""
-    rate = recordings[0].rate
+    rate = treated[0].recording.rate
     alive: dict[str, list[Channel]] = {}
     dead: dict[str, Notice] = {}
-    for recording in recordings:
-        for channel in recording.inertial:
+    for each in treated:
+        for channel in each.recording.inertial:
             why = _reason_to_skip(channel)
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:
-                alive.setdefault(channel.name, []).append(replace(channel, dt=1.0 / rate))
+                channel = replace(channel, dt=1.0 / rate)
+                repeated = each.repeated.get(channel.name)
+                own = thinned(channel, repeated) if repeated else channel
+                alive.setdefault(channel.name, []).append(own)
     return alive, {name: why for name, why in dead.items() if name not in alive}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.diagnosis import Health, health
+from gmwm.diagnosis import Health, Repetition, health
 from gmwm.errors import InputError
 from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Channel, Recording
@@ -34,6 +34,8 @@ class Screened:
         Channel name -> terms that its model may have, strongest first.
     robust : frozenset of str
         Channels whose wavelet variances are to be robust.
+    repeated : dict
+        Channels of which each sample is written several times, and how often.
     notices : tuple of Notice
         Those of the reader, then what was found, with what is done about it here as ``action``.
     """
@@ -41,6 +43,7 @@ class Screened:
     recording: Recording
     extra: dict[str, tuple[Process, ...]]
     robust: frozenset[str] = field(default=frozenset())
+    repeated: Mapping[str, Repetition] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
 
 
@@ -86,6 +89,7 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
         masked,
         {name: _terms(found, name, chosen) for name in names},
         robust,
+        {name: each for name in names if (each := found.repetition(name)) is not None},
         (*masked.notices, *issues),
     )
 

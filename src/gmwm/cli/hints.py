@@ -15,6 +15,7 @@ HINTS = {
     "other-runs": "-o FOLDER",
     "rate": "--rate 100",
     "runs-in-use": "-o FOLDER",
+    "time-unit": "--rate 100",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from gmwm.diagnosis.events import event_notice, find_events
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
+from gmwm.diagnosis.repeated import repetition, repetition_notice, thinned
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
@@ -79,7 +80,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     for channel in channels:
         if progress is not None:
             progress(len(examined), len(channels), channel.name)
-        examined[channel.name] = _examined(channel)
+        examined[channel.name] = _unrepeated(channel)
     if progress is not None:
         progress(len(channels), len(channels), "")
     shared = gap_notices(channels, recording.dt)
@@ -132,6 +133,21 @@ def _clock(recording: Recording) -> list[Notice]:
 def _clean(name: str) -> Notice:
     text = "nothing found that spoils the estimates"
     return Notice("clean", "good", name, text)
+
+
+def _unrepeated(channel: Channel) -> _Examined:
+    """A channel at its own rate, if each sample of it is written several times."""
+    found = repetition(channel)
+    if found is None:
+        return _examined(channel)
+    one = _examined(thinned(channel, found))
+    events = tuple(
+        (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
+        for start, stop in one.facts.events
+    )
+    facts = replace(one.facts, events=events, repetition=found)
+    # Its prediction errors have no partners of the same time in other channels.
+    return _Examined([repetition_notice(channel, found), *one.notices], facts, None)
 
 
 def _examined(channel: Channel) -> _Examined:

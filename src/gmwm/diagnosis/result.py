@@ -24,6 +24,21 @@ _INDENT = 11
 
 
 @dataclass(frozen=True)
+class Repetition:
+    """How often each sample of a channel is written.
+
+    Attributes
+    ----------
+    times : int
+    first : int
+        Index of a first one, below ``times``.
+    """
+
+    times: int
+    first: int
+
+
+@dataclass(frozen=True)
 class ChannelHealth:
     """What a program wants to know of one channel.
 
@@ -40,6 +55,9 @@ class ChannelHealth:
     outliers : float
         Fraction of the samples that are outliers all over the record; 0 if they are no more than
         noise and some shocks explain.
+    repetition : Repetition or None
+        If each sample is written several times; the other numbers are then those of the channel
+        at its own rate, events those of the recording.
     """
 
     lines: tuple[tuple[float, float], ...] = ()
@@ -47,16 +65,19 @@ class ChannelHealth:
     events: tuple[tuple[int, int], ...] = ()
     lsb: float = 0.0
     outliers: float = 0.0
+    repetition: Repetition | None = None
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> ChannelHealth:
         """Inverse of `dataclasses.asdict`, after a round trip through JSON."""
+        repeated = content.get("repetition")
         return cls(
             lines=tuple((float(f), float(a)) for f, a in content["lines"]),
             resonances=tuple((float(f), float(d)) for f, d in content["resonances"]),
             events=tuple((int(start), int(stop)) for start, stop in content["events"]),
             lsb=float(content["lsb"]),
             outliers=float(content["outliers"]),
+            repetition=repeated and Repetition(int(repeated["times"]), int(repeated["first"])),
         )
 
 
@@ -69,8 +90,8 @@ class Health(Document):
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "clock", "gap", "dead", "infinite", "stuck",
-        "saturation", "event", "outliers", "rounding", "line", "resonance", "drift", "variance",
-        "temperature", "crosstalk" and "clean".
+        "saturation", "repeated-samples", "event", "outliers", "rounding", "line", "resonance",
+        "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str
@@ -121,6 +142,10 @@ class Health(Document):
     def lsb(self, channel: str) -> float:
         """Step of the samples, u; 0 if none was found."""
         return self._channel(channel).lsb
+
+    def repetition(self, channel: str) -> Repetition | None:
+        """How often each sample is written; None if once."""
+        return self._channel(channel).repetition
 
     def outliers(self, channel: str) -> float:
         """Share of outliers spread over the record, which ask for robust wavelet variances."""

@@ -12,6 +12,10 @@ SIGNIFICANT = 1.645
 UPPER_LEVEL = 0.95
 """Probability of upper bounds, as of the intervals beside them."""
 
+LEAST_EFFICIENCY = 0.25
+"""Of an estimate against the information in the record, as far as upper bounds allow for it: what
+identity weights reach."""
+
 UNDETERMINED = 1.0
 """Relative standard error of a shape above which its interval means nothing: a factor e."""
 

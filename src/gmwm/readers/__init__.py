@@ -7,7 +7,7 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 
 from gmwm._core.units import AUXILIARY
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.names import TIME, bare, meaning
+from gmwm.readers.names import TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
 from gmwm.readers.table import label
@@ -23,4 +23,5 @@ __all__ = [
     "label",
     "meaning",
     "read",
+    "stated_seconds",
 ]

@@ -11,6 +11,8 @@ from gmwm.readers.names import meaning
 from gmwm.readers.roles import Roles
 from gmwm.readers.table import Table
 
+_SAME_UNIT = 1e-6  # relative; the same unit in two spellings differs by rounding
+
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
 
 
@@ -53,7 +55,7 @@ def channel_units(
         found[channel] = unit
         if given is None:
             from_header[channel] = unit
-        elif in_header not in (None, given):
+        elif in_header is not None and not _same(in_header, given):
             overruled[channel] = f"{in_header}, not {given}"
     return found, tuple(_notices(from_header, overruled))
 
@@ -87,6 +89,13 @@ def _check(table: Table, channel: str, sensor: str | None, unit: str) -> None:
         raise InputError(f"{table.source}, channel {channel}: {error}") from error
 
 
+def _same(unit: str, other: str) -> bool:
+    try:
+        return abs(factor(unit, other) - 1.0) < _SAME_UNIT
+    except InputError:
+        return False
+
+
 def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
     if sensor is None:
         return InputError(
@@ -115,5 +124,5 @@ def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> li
     if overruled:
         parts = "; ".join(f"{name} in {text}" for name, text in overruled.items())
         text = f"the names of the columns contradict the units given: {parts}"
-        notices.append(Notice("units-contradicted", "note", "", text, overruled))
+        notices.append(Notice("units-contradicted", "warning", "", text, overruled))
     return notices

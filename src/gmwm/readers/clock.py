@@ -12,9 +12,17 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.jumps import Jumps, find_jumps
+from gmwm.readers.jumps import Change, Jumps, find_change, find_jumps
 
-_UNITS = {1.0: "seconds", 1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
+_UNITS = {
+    86400.0: "days",
+    3600.0: "hours",
+    60.0: "minutes",
+    1.0: "seconds",
+    1e-3: "milliseconds",
+    1e-6: "microseconds",
+    1e-9: "nanoseconds",
+}
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
@@ -58,6 +66,8 @@ class Clock:
         In a unit of ``seconds``.
     seconds : float or None
         The unit, if it is known.
+    own_unit : str
+        The unit as the header states it.
     where : callable
         Row -> where that is in the file.
     """
@@ -66,6 +76,7 @@ class Clock:
     column: str
     stamps: FloatArray
     seconds: float | None
+    own_unit: str
     where: Callable[[int], str]
 
     @property
@@ -76,9 +87,9 @@ class Clock:
     def timing(self, expected: float | None = None) -> Timing:
         """Sampling rate over the whole recording, and the jumps.
 
-        Without a unit, the step decides: below 0.5 it is seconds, 2 to 500 milliseconds, 500 to
-        5e5 microseconds, above nanoseconds; 0.5 to 2 may be 1 Hz in seconds or 1 kHz in
-        milliseconds and is refused. With an expected rate, the unit is the one that fits it.
+        Stamps without a unit are seconds where that gives the rate of an inertial sensor; for
+        others a rate is asked for. With an expected rate, the unit is the one that fits it, or
+        where the header states a unit that is unknown here, what makes it fit.
 
         Parameters
         ----------
@@ -99,7 +110,9 @@ class Clock:
         with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
             steps = np.diff(self.stamps)
             self._check_increasing(steps)
-            self._check_not_short(steps)
+            change = find_change(self.stamps)
+            if change is None:
+                self._check_not_short(steps)
             jumps = find_jumps(self.stamps)
             jitter = float(np.std(np.delete(steps, jumps.rows - 1)))
         step = jumps.interval
@@ -107,8 +120,9 @@ class Clock:
             raise InputError(
                 f"{self.place}: steps of {step:g} are not those of a clock: {_WAY_OUT}", "clock"
             )
-        self._check_jumps(jumps)
         seconds, guessed = self._unit(step, expected)
+        self._check_change(change, seconds)
+        self._check_jumps(jumps)
         rate = 1.0 / (step * seconds)
         if expected is not None and not agree(rate, expected):
             raise InputError(
@@ -116,13 +130,16 @@ class Clock:
                 "leave out the rate to use that of the stamps, or give time=False to ignore them"
             )
         text = (
-            f"time stamps (column {self.column}, {_UNITS[seconds]}"
+            f"time stamps (column {self.column}, {_UNITS.get(seconds, self.own_unit)}"
             f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)"
         )
         values = {"rate": rate, "unit": seconds, "jitter": jitter / step}
         notice = Notice("time-stamps", "note", "", text, values)
-        return Timing(rate, jumps, (notice, *self._notices_of_jumps(jumps, seconds)), jitter / step)
+        notices = [notice, *self._notices_of_jumps(jumps, seconds)]
+        if change is not None:
+            notices.append(self._notice_of_change(change, seconds, rate))
+        return Timing(rate, jumps, tuple(notices), jitter / step)
 
     def _check_complete(self) -> None:
         bad = np.flatnonzero(np.isnan(self.stamps))
@@ -155,6 +172,26 @@ class Clock:
                 f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}",
                 "clock",
             )
+
+    def _check_change(self, change: Change | None, seconds: float) -> None:
+        if change is not None and change.ratio > tuning.SHARP_CHANGE:
+            first, then = (rate / seconds for rate in change.rates)
+            raise InputError(
+                f"{self.place}, near {self.where(change.row)}: the sampling rate goes from "
+                f"{first:.4g} to {then:.4g} Hz: use the part before or after",
+                "clock",
+            )
+
+    def _notice_of_change(self, change: Change, seconds: float, used: float) -> Notice:
+        first, then = (rate / seconds for rate in change.rates)
+        when = float(self.stamps[change.row] - self.stamps[0]) * seconds
+        text = (
+            f"the sampling rate goes from {first:.4g} to {then:.4g} Hz at about {when:.4g} s, and "
+            f"{used:.6g} Hz, its mean, is the rate of neither"
+        )
+        values = {"before": first, "after": then, "time": when, "rate": used}
+        action = f"use the part before or after ({self.where(change.row)})"
+        return Notice("rate-changes", "bad", "", text, values, action)
 
     def _check_jumps(self, jumps: Jumps) -> None:
         if jumps.are_rounding:
@@ -207,15 +244,16 @@ class Clock:
         """The unit in seconds, and whether it is a guess."""
         if self.seconds is not None:
             return self.seconds, False
+        if expected is not None and self.own_unit:
+            return 1.0 / expected / step, True
         if expected is not None:
             return min(
                 _UNITS, key=lambda unit: abs(math.log(step * unit) + math.log(expected))
             ), True
-        if step < 0.5:
-            return 1.0, True
-        if step < 2.0:
+        if not tuning.LEAST_STEP <= step < tuning.LARGEST_STEP:
             raise InputError(
-                f"{self.place}: a step of {step:.6g} may be seconds or milliseconds: name the "
-                "column time_s or time_ms, or give rate="
+                f"{self.place}: steps of {step:.6g} without a unit: name the column by its unit, "
+                "e.g. time_s or time_ms, or give the sampling rate, rate=100",
+                "time-unit",
             )
-        return (1e-3 if step < 500.0 else 1e-6 if step < 5e5 else 1e-9), True
+        return 1.0, True

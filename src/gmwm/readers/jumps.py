@@ -12,6 +12,9 @@ from gmwm.readers import tuning
 
 _Rows = npt.NDArray[np.int64]
 
+_LONG = 2.25
+"""Median steps from which a step is a jump: those of 1 and 2 of rounded stamps are none."""
+
 
 @dataclass(frozen=True)
 class Jumps:
@@ -82,6 +85,68 @@ class Jumps:
         for first, last, ahead in zip(ends[:-1], ends[1:], shift, strict=True):
             result[first + ahead : last + ahead] = values[first:last]
         return result
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the sampling rate.
+
+    Attributes
+    ----------
+    row : int
+        Where it is, to within a part of the recording.
+    rates : tuple of float
+        Before and after, in rows per unit of the stamps.
+    """
+
+    row: int
+    rates: tuple[float, float]
+
+    @property
+    def ratio(self) -> float:
+        """The larger rate over the smaller one."""
+        return max(self.rates) / min(self.rates)
+
+
+def find_change(stamps: FloatArray) -> Change | None:
+    """Find out whether some parts of a recording have another sampling rate than others.
+
+    Both the median and the mean of the steps, without jumps, must differ: rounded stamps change
+    the one from part to part, a few missing rows the other.
+
+    Parameters
+    ----------
+    stamps : (n,) ndarray
+        Increasing.
+
+    Returns
+    -------
+    Change or None
+        The largest from one part to the next.
+    """
+    steps = np.diff(stamps)
+    parts = min(tuning.RATE_PARTS, steps.size // tuning.LEAST_PART)
+    if parts < 2:
+        return None
+    rows = np.array_split(steps, parts)
+    medians = np.array([np.median(part) for part in rows])
+    usual = [part[part < _LONG * median] for part, median in zip(rows, medians, strict=True)]
+    means = np.array([np.mean(part) for part in usual])
+    if not (np.all(means > 0.0) and np.all(np.isfinite(means))):
+        return None
+    errors = np.array([np.std(part) / np.sqrt(part.size) for part in usual]) / means
+    fast, slow = int(np.argmin(means)), int(np.argmax(means))
+    limit = tuning.RATES_AGREE + tuning.RATE_ERRORS * np.hypot(errors[fast], errors[slow])
+    if min(_distance(means, fast, slow), _distance(medians, fast, slow)) <= limit:
+        return None
+    edge = int(np.argmax(np.abs(np.diff(np.log(means))))) + 1
+    row = sum(part.size for part in rows[:edge])
+    before, after = (float(1.0 / np.median(some)) for some in (means[:edge], means[edge:]))
+    return Change(row, (before, after))
+
+
+def _distance(sizes: FloatArray, small: int, large: int) -> float:
+    return float(np.log(sizes[large] / sizes[small]))
 
 
 def find_jumps(stamps: FloatArray) -> Jumps:

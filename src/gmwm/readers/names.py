@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from gmwm._core.units import auxiliary_unit, quantity_of
+from gmwm._core.units import auxiliary_unit, quantity_of, seconds_in
 from gmwm.errors import InputError
 
 AXES = ("x", "y", "z")
@@ -90,6 +90,8 @@ _SECONDS = {
     }.items()
     for word in words.split()
 }
+# After a word for time only: alone they are fields of a calendar, and t_min may be a minimum.
+_LONG_SECONDS = {"minutes": 60.0, "hours": 3600.0, "days": 86400.0}
 
 _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 _CAMEL_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
@@ -113,11 +115,32 @@ class Meaning:
         Its unit, if the name has one that is understood.
     seconds : float or None
         For a time column, its unit in seconds.
+    stated : str
+        For a time column, what stands in brackets after its name, understood or not.
     """
 
     role: str | None
     unit: str | None = None
     seconds: float | None = None
+    stated: str = ""
+
+
+def stated_seconds(source: str, name: str) -> float | None:
+    """Unit of a time column in seconds, ``None`` if its name states none.
+
+    Raises
+    ------
+    InputError
+        If the name states a unit that is not one of time.
+    """
+    found = meaning(name)
+    if found.stated and found.seconds is None:
+        raise InputError(
+            f"{source}, column {name!r}: {found.stated!r} is not a known unit of time: write s, "
+            "ms, us, ns, min, h or days in the header, or give the sampling rate, rate=100",
+            "time-unit",
+        )
+    return found.seconds
 
 
 @lru_cache(maxsize=4096)
@@ -159,7 +182,7 @@ def _split_brackets(name: str) -> tuple[str, str]:
 
 
 def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
-    seconds = _SECONDS.get(bracket.lower())
+    seconds = _SECONDS.get(bracket.lower()) or (seconds_in(bracket.lower()) if bracket else None)
     rest = list(words)
     if rest and (glued := _GLUED_UNIT.fullmatch(rest[-1])):
         rest[-1:] = glued.groups()
@@ -169,13 +192,15 @@ def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
         if not rest:
             # "s" alone may be anything, and so may "second [g]"
             return Meaning(TIME, seconds=seconds) if unit != "s" and not bracket else None
+    elif rest and rest[-1] in _LONG_SECONDS and len(rest) > 1:
+        seconds = seconds or _LONG_SECONDS[rest.pop()]
     if rest[-2:] == ["time", "stamp"]:
         rest[-2:] = ["timestamp"]
     if not rest or rest[-1] not in _TIME_WORDS or not _BEFORE_TIME.issuperset(rest[:-1]):
         return None
     if rest[-1] == "t" and bracket and seconds is None:
         return None  # "t [degC]"
-    return Meaning(TIME, seconds=seconds)
+    return Meaning(TIME, seconds=seconds, stated=bracket)
 
 
 def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:

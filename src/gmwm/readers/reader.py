@@ -20,7 +20,7 @@ from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.names import meaning
+from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
 from gmwm.readers.table import Table, label
@@ -54,8 +54,8 @@ def read(
         (with time: four) belong to the only sensor in ``units``.
     time : str, int or False, optional
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
-        header, e.g. ``time_us`` or ``t [ns]``; else the step decides: below 0.5 seconds, 2 to
-        500 milliseconds, to 5e5 microseconds, above nanoseconds.
+        header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
+        as seconds, and for others ``rate`` is needed.
 
     Returns
     -------
@@ -80,8 +80,11 @@ def read(
     stated = _stated_rate(table, rate)
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
+    # Complain before a long file is read, not after.
     if roles.time is None:
-        _required_rate(table, stated)  # complain before a long file is read, not after
+        _required_rate(table, stated)
+    elif stated is None:
+        stated_seconds(table.source, table.names[roles.time])
     unit_of, unit_notices = channel_units(table, roles, units)
 
     arrays, auxiliary, unreadable = _load(table, roles)
@@ -183,11 +186,13 @@ def _timing(
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return _required_rate(table, stated), None, ()
+    name = table.names[time]
     clock = Clock(
         source=table.source,
         column=label(table.names, time),
         stamps=arrays[time],
-        seconds=meaning(table.names[time]).seconds,
+        seconds=meaning(name).seconds,
+        own_unit=meaning(name).stated,
         where=table.where,
     )
     timing = clock.timing(stated)

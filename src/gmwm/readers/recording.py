@@ -17,7 +17,8 @@ from gmwm.readers import tuning
 READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
-    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-stated", "missing-samples"}
+    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
+    | {"missing-samples"}
 )
 """Codes of the notices about how a file was read."""
 

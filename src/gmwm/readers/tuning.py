@@ -15,6 +15,19 @@ RATES_AGREE = 0.01
 """Relative difference of two rates that are meant to be the same: sensors' clocks are off by less
 than one per cent, and stated rates are rounded."""
 
+LEAST_STEP, LARGEST_STEP = 1e-5, 0.5
+"""s: steps of a column without a unit that are taken as seconds. No IMU is faster than 100 kHz, and
+a step of 1 is more often a millisecond than a second."""
+
+RATE_PARTS, LEAST_PART = 16, 32
+"""Parts of a recording between which the sampling rate is compared, and rows of one at least."""
+
+RATE_ERRORS = 6.0
+"""Standard errors beyond which, with the 1 % above, the rates of two parts differ."""
+
+SHARP_CHANGE = 1.5
+"""Ratio of two rates in one recording from which rows that come slower look like missing ones."""
+
 SHORTEST_STEP = 0.499
 """Shortest usual step, of the median: rounded stamps come to one half, but for rounding errors."""
 

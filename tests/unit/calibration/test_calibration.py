@@ -577,3 +577,20 @@ def test_screening_can_be_left_out():
     assert "sinusoid_amplitude" not in calibration["accel_x"].params
     with pytest.raises(gmwm.InputError, match="there are events, lines, resonances, outliers"):
         gmwm.calibrate(noisy_recording(), screening=["magic"])
+
+
+def test_a_channel_of_repeated_samples_is_calibrated_at_its_own_rate():
+    rng = np.random.default_rng(8)
+    gyro, slow = rng.normal(size=20_000), rng.normal(size=10_000)
+    recording = gmwm.Recording.from_arrays(
+        {"gyro_x": gyro, "accel_x": np.repeat(slow, 2)},
+        200.0,
+        {"gyro": "rad/s", "accel": "m/s^2"},
+    )
+    found = gmwm.calibrate(recording, WhiteNoise())
+    assert not found.skipped
+    assert found["accel_x"].wv.dt == pytest.approx(0.01)
+    assert found["gyro_x"].wv.dt == pytest.approx(0.005)
+    # White noise of one sample a 10 ms: N^2 = variance dt.
+    assert found["accel_x"]["N"].value == pytest.approx(0.1, rel=0.03)
+    assert "repeated-samples" in {notice.code for notice in found.notices}

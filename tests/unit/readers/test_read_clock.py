@@ -7,6 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
+from gmwm.readers.jumps import find_change
 
 
 def texts(recording):
@@ -41,20 +42,20 @@ def problem(path, **options):
         ("time_s", 2.0, 0.5),
         ("time [s]", 1.0, 1.0),
         ("time_ms", 1.0, 1e3),
-        ("t", 5.0, 200.0),
-        ("t", 2.5, 400.0),
         ("time_us", 0.5, 2e6),
-        ("t", 2500.0, 400.0),
-        ("t", 1000.0, 1000.0),
         ("time_ns", 5e6, 200.0),
-        ("t", 5e6, 200.0),
+        ("time [min]", 0.01 / 60.0, 100.0),
+        ("t (h)", 0.01 / 3600.0, 100.0),
+        ("time [Days]", 0.01 / 86400.0, 100.0),
+        ("time_hours", 0.01 / 3600.0, 100.0),
+        ("elapsed_time [us]", 2500.0, 400.0),
     ],
 )
 @pytest.mark.parametrize("start", [0.0, 12.0])
 def test_unit(timed, name, step, rate, start):
     recording = read(timed((start + np.arange(80)) * step, name), units=UNITS)
     assert recording.rate == pytest.approx(rate, rel=1e-9)
-    assert ("inferred from the steps" in texts(recording)[-1]) == (name == "t")
+    assert ("inferred from the steps" in texts(recording)[0]) == (name == "t")
 
 
 @pytest.mark.parametrize(("step", "rate"), [(1.0, 1.0), (1.0, 1000.0), (0.8, 1.25), (4.0, 0.25)])
@@ -62,10 +63,94 @@ def test_stated_rate_tells_the_unit(timed, step, rate):
     assert read(timed(step * np.arange(80)), rate=rate, units=UNITS).rate == pytest.approx(rate)
 
 
-def test_unit_that_cannot_be_told(timed):
-    message = problem(timed(np.arange(80.0)))
-    assert "a step of 1 may be seconds or milliseconds" in message
-    assert "time_s or time_ms, or give rate=" in message
+@pytest.mark.parametrize("unit", ["10us", "ticks", "degC", "UTC"])
+def test_a_unit_that_is_not_known(timed, unit):
+    path = timed(2.5 * np.arange(80), f"time [{unit}]")
+    with pytest.raises(InputError, match=f"'{unit}' is not a known unit of time") as caught:
+        read(path, units=UNITS)
+    assert caught.value.code == "time-unit"
+    # With a rate the unit is what makes the stamps fit it.
+    stamps = np.delete(2.5 * np.arange(80), [50, 51])
+    recording = read(timed(stamps, f"time [{unit}]"), units=UNITS, rate=100.0)
+    assert recording.rate == 100.0
+    assert recording.n == 80
+    assert f", {unit}, inferred" in texts(recording)[0]
+
+
+@pytest.mark.parametrize(
+    "step", [1.0, 5.0, 250.0, 2500.0, 5e6, 0.01 / 86400.0, 0.1 / 86400.0, 0.01 / 3600.0]
+)
+def test_stamps_without_a_unit_that_no_imu_has_in_seconds(timed, step):
+    path = timed(12.0 + step * np.arange(80))
+    with pytest.raises(InputError) as caught:
+        read(path, units=UNITS)
+    assert caught.value.code == "time-unit"
+    assert "e.g. time_s or time_ms, or give the sampling rate" in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", [60.0, 3600.0, 86400.0])
+def test_a_rate_tells_long_units_too(timed, unit):
+    assert read(timed(0.01 / unit * np.arange(80)), rate=100, units=UNITS).rate == 100.0
+
+
+@pytest.fixture
+def long(tmp_path):
+    def _long(stamps):
+        path = tmp_path / "long.csv"
+        table = np.column_stack([stamps, np.sin(np.arange(len(stamps)))])
+        np.savetxt(path, table, delimiter=",", header="time_s,gx", comments="", fmt="%.9f")
+        return path
+
+    return _long
+
+
+def test_a_rate_that_changes(long):
+    stamps = np.cumsum(np.r_[np.full(6000, 0.01), np.full(6000, 1.0 / 71.0)])
+    recording = read(long(stamps), units=UNITS)
+    (found,) = [notice for notice in recording.notices if notice.code == "rate-changes"]
+    assert found.severity == "bad"
+    assert found.values["before"] == pytest.approx(100.0, rel=1e-3)
+    assert found.values["after"] == pytest.approx(71.0, rel=1e-3)
+    assert found.values["time"] == pytest.approx(60.0, abs=0.1)
+    assert "from 100 to 71 Hz at about 60 s" in found.text
+
+
+@pytest.mark.parametrize("then", [50.0, 30.0, 200.0, 300.0])
+def test_a_rate_that_changes_so_much_that_rows_seem_to_be_missing(long, then):
+    stamps = np.cumsum(np.r_[np.full(5000, 0.01), np.full(7000, 1.0 / then)])
+    with pytest.raises(InputError, match=f"from 100 to {then:g} Hz: use the part before or"):
+        read(long(stamps), units=UNITS)
+
+
+def _steady(kind):
+    rng = np.random.default_rng(3)
+    even = np.arange(20_000) / 100.0
+    if kind == "missing rows in one half":
+        return np.delete(even, rng.choice(10_000, 1500, replace=False))
+    if kind == "jitter":
+        return even + rng.uniform(-0.003, 0.003, even.size)
+    if kind == "steps of their own":
+        return np.cumsum(rng.uniform(0.006, 0.014, even.size))
+    if kind == "a pause":
+        return even + 5.0 * (np.arange(even.size) > 7000)
+    if kind == "a clock that warms up":
+        return even + 1e-6 * even**2
+    return np.round(np.arange(20_000) / float(kind), 3)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "missing rows in one half",
+        "jitter",
+        "steps of their own",
+        "a pause",
+        "a clock that warms up",
+        *("666.7", "667", "400", "390", "800", "999"),
+    ],
+)
+def test_no_change_is_seen_where_there_is_none(kind):
+    assert find_change(_steady(kind)) is None
 
 
 def test_stated_rate_is_used_and_noted(timed):

@@ -18,8 +18,9 @@ from gmwm.estimate.result import (
     Fit,
     conclude,
     misfit_notices,
-    quantile_above_zero,
+    upper_amplitude,
 )
+from gmwm.variance import WaveletVariance
 
 
 def conclude_moments(
@@ -63,8 +64,14 @@ def conclude_moments(
         processes=design.fitted_processes(point.x, point.shapes),
         covariance=_sandwich(jacobian, covariance, weights),
         absent={
-            i: _upper_amplitude(jacobian, curves[:, i], target - implied, covariance)
-            ** (1.0 / design.terms[i].linear.power)
+            i: _upper_scale(
+                design,
+                point,
+                i,
+                absent,
+                moments.wv,
+                *_unrestricted(jacobian, curves[:, i], target - implied, covariance),
+            )
             for i in absent
         },
         slope=moments.slope if moments.slope_is_free else None,
@@ -109,13 +116,10 @@ def _sandwich(jacobian: FloatArray, covariance: FloatArray, weights: Weights) ->
     return np.asarray(estimator @ covariance @ estimator.T)
 
 
-def _upper_amplitude(
+def _unrestricted(
     jacobian: FloatArray, curve: FloatArray, residual: FloatArray, covariance: FloatArray
-) -> float:
-    """95 % upper bound of a non-negative amplitude whose estimate is zero.
-
-    The quantile of the normal distribution of the unconstrained estimate, cut at zero.
-    """
+) -> tuple[float, float]:
+    """Estimate of an amplitude that came out as zero, were it free, and its standard error."""
     root = weight_root(covariance)
     column, others = root @ curve, root @ jacobian
     if others.shape[1]:
@@ -124,7 +128,25 @@ def _upper_amplitude(
         column = column - basis @ (basis.T @ column)
     information = float(column @ column)
     if information <= 0.0:
-        return float("inf")
-    deviation = 1.0 / np.sqrt(information)
-    centre = float(column @ (root @ residual)) / information
-    return quantile_above_zero(centre, deviation)
+        return 0.0, float("inf")
+    return float(column @ (root @ residual)) / information, 1.0 / float(np.sqrt(information))
+
+
+def _upper_scale(
+    design: Design,
+    point: Point,
+    term: int,
+    absent: list[int],
+    wv: WaveletVariance,
+    centre: float,
+    deviation: float,
+) -> float:
+    """95 % upper bound of the scale of a term whose amplitude came out as zero."""
+    others = [i for i in absent if i != term]
+    part = [i for i in range(len(design.terms)) if i not in others]
+    processes = design.fitted_processes(point.x, point.shapes)
+    bound = upper_amplitude(
+        design.coordinates.without(others), [processes[i] for i in part], part.index(term),
+        centre, deviation, 0.0, wv.n, wv.dt,
+    )  # fmt: skip
+    return float(bound ** (1.0 / design.terms[term].linear.power))

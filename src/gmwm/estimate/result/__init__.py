@@ -1,10 +1,10 @@
 """What an estimation found: parameters, their uncertainty, agreement with the data."""
 
+from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.conclusion import Comparison, Estimates, conclude
 from gmwm.estimate.result.estimate import Estimate, InUnit
 from gmwm.estimate.result.fit import METHOD_NAMES, Fit
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.interval import quantile_above_zero
 from gmwm.estimate.result.joint import JointFit, fit_joint
 from gmwm.estimate.result.region import Region, slope_name
 from gmwm.estimate.result.remarks import misfit_notices, no_test_notice, worst_misfit
@@ -25,7 +25,7 @@ __all__ = [
     "misfit_notices",
     "no_test_notice",
     "plain",
-    "quantile_above_zero",
     "slope_name",
+    "upper_amplitude",
     "worst_misfit",
 ]

@@ -20,8 +20,8 @@ from gmwm.estimate.problem import (
     slope_dof,
     weight_root,
 )
+from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.fit import Fit
-from gmwm.estimate.result.interval import quantile_above_zero
 from gmwm.estimate.result.remarks import (
     bound_notices,
     confounded_notices,
@@ -139,7 +139,7 @@ def conclude(
     keys = [all_keys[k] for k in found.present]
     jacobian = found.coordinates.jacobian(found.processes)[np.ix_(found.present, found.present)]
     matrix = jacobian @ found.covariance @ jacobian.T
-    upper = _upper_bounds(found, all_keys)
+    upper = _upper_bounds(found, all_keys, wv)
     growth = error_growth(model, keys, wv.n, wv.dt)
     dof = float("inf")
     if slope is not None:
@@ -178,7 +178,7 @@ def conclude(
     return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
 
 
-def _upper_bounds(found: Estimates, keys: Sequence[str]) -> dict[str, float]:
+def _upper_bounds(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:
     """95 % upper bounds of amplitudes that are zero, or have no shape and are not above zero."""
     coordinates = found.coordinates
     bounds = {}
@@ -192,6 +192,12 @@ def _upper_bounds(found: Estimates, keys: Sequence[str]) -> dict[str, float]:
             continue
         deviation = float(np.sqrt(found.covariance[rows[k], rows[k]]))
         if not term.n_shapes and deviation > 1.0 / tuning.SIGNIFICANT:
-            value = float(found.processes[i].values[term.linear.name] or 0.0)
-            bounds[keys[k]] = value * quantile_above_zero(1.0, deviation) ** (1 / term.linear.power)
+            power = term.linear.power
+            amplitude = float(found.processes[i].values[term.linear.name] or 0.0) ** power
+            part = [j for j in range(len(coordinates.terms)) if j not in found.absent]
+            bound = upper_amplitude(
+                coordinates.without(list(found.absent)), [found.processes[j] for j in part],
+                part.index(i), amplitude, deviation * amplitude, amplitude, wv.n, wv.dt,
+            )  # fmt: skip
+            bounds[keys[k]] = bound ** (1.0 / power)
     return bounds

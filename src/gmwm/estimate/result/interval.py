@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.special import lambertw
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from gmwm.estimate import tuning
 from gmwm.process import Parameter
@@ -56,12 +56,6 @@ def confidence_interval(
     dof = slope_dof if parameter.role == "slope" else np.inf
     half_width = float(t.ppf(0.5 + 0.5 * level, max(dof, 1.0))) * error
     return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
-
-
-def quantile_above_zero(centre: float, deviation: float) -> float:
-    """95 % quantile of N(centre, deviation^2) restricted to positive values."""
-    tail = norm.sf(-centre / deviation) * (1.0 - tuning.UPPER_LEVEL)
-    return centre + deviation * float(norm.isf(tail))
 
 
 def _student(parameter: Parameter, relative: float, level: float) -> float:

@@ -28,7 +28,7 @@ from gmwm.ins.logs import (
     unit_of,
     words_of,
 )
-from gmwm.readers import TIME, CsvTable, label, meaning
+from gmwm.readers import TIME, CsvTable, label, stated_seconds
 
 _POSITION = ("latitude", "longitude", "height")
 _VELOCITY = ("velocity north", "velocity east", "velocity down")
@@ -157,7 +157,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         text = f"{count} positions at 0, 0 are counted as missing"
         notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
     return FixLog(
-        time=found[TIME] * (meaning(table.names[columns[TIME]]).seconds or 1.0),
+        time=found[TIME] * (stated_seconds(table.source, table.names[columns[TIME]]) or 1.0),
         position=position,
         velocity=velocity,
         position_sd=_deviations(table, columns, found, "sd ", position),

@@ -23,7 +23,7 @@ from gmwm.ins.logs.log_columns import (
     place,
     words_of,
 )
-from gmwm.readers import TIME, CsvTable, meaning
+from gmwm.readers import TIME, CsvTable, stated_seconds
 
 _HEADER = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
 _ANGLES = ("latitude", "longitude", "roll", "pitch", "yaw")
@@ -131,7 +131,7 @@ def _interval(table: CsvTable, column: int, stamps: FloatArray) -> float:
             f"{place(table, column, row)}: time stamp {stamps[row]:.15g} is off the even spacing "
             f"of {usual:.6g}: resample the log to even steps, or use the part before or after"
         )
-    return dt * (meaning(table.names[column]).seconds or 1.0)
+    return dt * (stated_seconds(table.source, table.names[column]) or 1.0)
 
 
 def _factors(table: CsvTable, columns: Mapping[str, int], latitude: FloatArray) -> dict[str, float]:
