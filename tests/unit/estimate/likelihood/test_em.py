@@ -257,9 +257,9 @@ def test_a_drift_of_a_gauss_markov_state_is_forgotten(order):
 
 def test_a_drift_needs_a_state_and_a_ramp():
     x = WhiteNoise(1.0).simulate(100, 1.0, 1)
-    with pytest.raises(InputError, match="RateRamp.. of free slope"):
+    with pytest.raises(InputError, match="of free slope"):
         em(WhiteNoise() + RandomWalk(), x, drift="state")
-    with pytest.raises(InputError, match="RateRamp.. of free slope"):
+    with pytest.raises(InputError, match="of free slope"):
         em(WhiteNoise() + RandomWalk() + RateRamp(0.1), x, drift="state")
     with pytest.raises(InputError, match="RandomWalk or GaussMarkov"):
         em(WhiteNoise() + RateRamp(), x, drift="state")
