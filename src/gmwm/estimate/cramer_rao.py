@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-import numba
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.compiled import compiled
 from gmwm._core.documents import Document
 from gmwm._core.frozen import freeze
 from gmwm._core.text import wrapped
@@ -354,7 +354,7 @@ def _with_constant(space: StateSpace, variance: float) -> StateSpace:
     return StateSpace.stack([space, StateSpace.scalar("constant", 1.0, 0.0, variance)])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _accumulate(
     F: FloatArray,
     h: FloatArray,

@@ -17,9 +17,9 @@ import math
 from math import factorial
 from typing import Any
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 _SERIES_BELOW = 0.5
@@ -71,7 +71,7 @@ def exponential_haar(rate: complex, m: FloatArray) -> Any:
     return (2.0 * m * _sinh_minus_identity(rate) + _h(m * rate)) / denominator
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def real_haar(rate: float, m: FloatArray) -> FloatArray:
     """`exponential_haar` for a real rate and m of shape (J,): the inner loop of every fit."""
     result = np.empty(m.size)

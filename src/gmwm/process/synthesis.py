@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from scipy import fft
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.process.spectral import PSD, evaluated
 from gmwm.process.state_space import StateSpace
@@ -13,7 +13,7 @@ from gmwm.process.state_space import StateSpace
 _BLOCK = 100_000
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def first_order(innovation: FloatArray, phi: float, scale: float, start: float) -> None:
     """In place: x[0] = start * e[0], x[k] = phi x[k-1] + scale * e[k]."""
     state = start * innovation[0]
@@ -23,7 +23,7 @@ def first_order(innovation: FloatArray, phi: float, scale: float, start: float) 
         innovation[k] = state
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _propagate(
     transition: FloatArray,
     noise_root: FloatArray,

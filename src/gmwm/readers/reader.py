@@ -20,6 +20,7 @@ from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.gravity import gravity_notices
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
@@ -100,10 +101,12 @@ def read(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices),
     )
+    gravity = gravity_notices(recording, unit_of, units)
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     return replace(
         recording,
         channels=(*recording.channels, *further),
+        notices=(*gravity, *recording.notices),
         jitter=timing.jitter if timing is not None else None,
     )
 

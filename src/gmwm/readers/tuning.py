@@ -9,6 +9,10 @@ SLOWEST_RATE, FASTEST_RATE = 1e-6, 1e9
 LINES_OF_LAYOUT = 100
 """Lines from which the delimiter, the decimal mark and the header are inferred."""
 
+GRAVITY_AGREES = 0.1
+"""Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
+are a few per cent, units differ by a factor of ten."""
+
 # -- the clock ------------------------------------------------------------------------------------
 
 RATES_AGREE = 0.01

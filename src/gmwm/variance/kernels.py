@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def haar_moments(integral: FloatArray, runs: NDArray[np.int64], m: int) -> tuple[float, float]:
     """Mean and mean square of the Haar MODWT coefficients that lie within a run.
 
@@ -36,7 +36,7 @@ def haar_moments(integral: FloatArray, runs: NDArray[np.int64], m: int) -> tuple
     return total * scale / count, square * scale * scale / count
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> FloatArray:
     """Haar MODWT coefficients of the samples from ``start`` to ``stop``, free of end effects.
 
@@ -57,7 +57,7 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
     return result
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
     """Cumulative sum of ``values - mean`` with Kahan's compensation, starting with 0.
 

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from gmwm._core import checks
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as wavelet_of
@@ -46,14 +46,14 @@ class Modwt:
         return imodwt(self.detail, self.smooth, self.wavelet)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _add(out: FloatArray, values: FloatArray, factor: float) -> None:
     # On slices of equal length the loop has no index arithmetic and runs on vector registers.
     for t in range(out.size):
         out[t] += factor * values[t]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _add_circular(
     out: FloatArray, values: FloatArray, taps: FloatArray, offsets: npt.NDArray[np.int64]
 ) -> None:
@@ -68,7 +68,7 @@ def _add_circular(
             _add(out[turn:end], values[turn - offset : end - offset], taps[i])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _filtered(values: FloatArray, taps: FloatArray, step: int) -> FloatArray:
     """sum_l taps[l] values[t - step l] where all of these exist."""
     reach = step * (taps.size - 1)

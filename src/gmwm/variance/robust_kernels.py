@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 _DROPPED_BITS = 46  # of the 52 of a mantissa: bins of 1.6 %
 _BIN_MASK = (1 << 17) - 1  # without the sign
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def middle_bin(values: FloatArray) -> tuple[FloatArray, int]:
     """The absolute values next to that of rank ``values.size // 2``, and its rank among them.
 
@@ -43,7 +43,7 @@ def middle_bin(values: FloatArray) -> tuple[FloatArray, int]:
 
 
 # Sums may be taken in any order, so that they are vectorised; infinities stay what they are.
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath={"reassoc", "contract", "nsz"})
 def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, float]:
     """Means of u t^4 and of its derivative by log u, with u = (factor W)^2 and t = max(1 - u, 0).
 
@@ -66,7 +66,7 @@ def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, floa
     return value / coefficients.size, slope / coefficients.size
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath={"reassoc", "contract", "nsz"})
 def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatArray) -> float:
     """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
 

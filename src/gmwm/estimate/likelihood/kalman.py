@@ -9,15 +9,15 @@ afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-4
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 _STEADY = 1e-13  # relative change of the predicted covariance from sample to sample
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _innovation(P: FloatArray, h: FloatArray, r: float, Ph: FloatArray) -> float:
     """Variance of the innovation; ``Ph`` receives P h."""
     s = r
@@ -29,7 +29,7 @@ def _innovation(P: FloatArray, h: FloatArray, r: float, Ph: FloatArray) -> float
     return s
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _propagate(
     F: FloatArray, Q: FloatArray, P: FloatArray, half: FloatArray, new: FloatArray
 ) -> None:
@@ -49,7 +49,7 @@ def _propagate(
             new[j, i] = value
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def whiten(
     F: FloatArray, Q: FloatArray, h: FloatArray, r: float, P0: FloatArray, Y: FloatArray
 ) -> tuple[FloatArray, float, int]:
@@ -116,7 +116,7 @@ def whiten(
     return E, total, count
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def filtered(
     F: FloatArray,
     Q: FloatArray,
@@ -173,7 +173,7 @@ def filtered(
     return X, PP, G, V, S
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def smooth(
     F: FloatArray,
     Q: FloatArray,

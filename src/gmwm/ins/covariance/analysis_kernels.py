@@ -8,9 +8,9 @@ After Maybeck (1979), *Stochastic Models, Estimation, and Control* 1, sec. 6.8.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.ins.filter import (
     IS_HEIGHT,
@@ -26,7 +26,7 @@ from gmwm.ins.filter import (
 from gmwm.ins.geometry import gravity
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def update_jointly(
     J: FloatArray, h: FloatArray, estimate: int, truth: int, variance: float, gain: FloatArray,
     m: int, a: FloatArray, k: FloatArray,
@@ -73,7 +73,7 @@ def update_jointly(
             J[j, i] = J[i, j]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def run_both(
     epoch: IntArray, samples: IntArray, dt: float,
     mid_matrix: FloatArray, mid_v: FloatArray, mid_lla: FloatArray,

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -244,7 +244,7 @@ def _turned(imu: Imu, bias: FloatArray, C: FloatArray, levelled: int, epoch: int
     return result @ (turn.T if backwards else turn)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _carry(C: FloatArray, rotation: FloatArray, kept: FloatArray) -> None:
     """Turn a body by increments; ``kept`` gets the matrix after each if it has room."""
     for i in range(rotation.shape[0]):

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 
-import numba
-
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import RATE, gravity_at, radii_at
@@ -25,7 +24,7 @@ POSITION, VELOCITY, ATTITUDE, NAVIGATION = 0, 3, 6, 9
 _FAST = {"contract", "reassoc", "nsz"}
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
     """Fill F (9, 9) of the navigation errors' equation ``dx/dt = F x + ...``.
 
@@ -79,7 +78,7 @@ def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
     F[8, 8] = tangent * vn * east
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@compiled(fastmath=_FAST)
 def transition(
     v: FloatArray, lla: FloatArray, C: FloatArray, step: float, F: FloatArray, A: FloatArray,
     B: FloatArray,
@@ -131,7 +130,7 @@ def transition(
         B[5, 3 + j] += c
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@compiled(fastmath=_FAST)
 def propagate(
     P: FloatArray, A: FloatArray, B: FloatArray, axis: IntArray, partner: IntArray,
     phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
@@ -234,7 +233,7 @@ def propagate(
             P[j, i] = total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple[float, float]:
     """Allow for the square of the tilt error over a step, which a linear filter does not know.
 
@@ -270,7 +269,7 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
     return 0.5 * g * (north + east) * step, after
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_FAST)
+@compiled(fastmath=_FAST)
 def measurement_update(
     P: FloatArray, h: FloatArray, state: int, variance: float, z: float, x: FloatArray,
     K: FloatArray,

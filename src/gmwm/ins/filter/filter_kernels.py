@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.ins.filter.covariance_kernels import (
     measurement_update,
@@ -25,7 +25,7 @@ _LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
 _CLEAN_EVERY = 1000  # steps of the covariance: the attitude matrix is brought back to a rotation
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def measurement_row(
     kind: int, component: int, C: FloatArray, v: FloatArray, rate: FloatArray, lever: FloatArray,
     h: FloatArray,
@@ -71,7 +71,7 @@ def measurement_row(
         h[6], h[7] = -b, a
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def residual(
     kind: int, component: int, value: FloatArray, C: FloatArray, v: FloatArray, lla: FloatArray,
     rate: FloatArray, lever: FloatArray,
@@ -100,7 +100,7 @@ def residual(
     return (transverse + lla[2]) * math.cos(lla[0]) * east + arm
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> None:
     """Take estimated errors x off the navigation solution, and set them to zero, in place."""
     meridian, transverse = radii_at(math.sin(lla[0]))
@@ -120,7 +120,7 @@ def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> Non
         x[i] = 0.0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def sample_error(
     first: IntArray, output: FloatArray, phi: FloatArray, phi_off: FloatArray, partner: IntArray,
     paired: bool, x: FloatArray, held: FloatArray, error: FloatArray,
@@ -146,7 +146,7 @@ def sample_error(
             x[i] += phi_off[i] * held[partner[i]]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def axis_sums(
     P: FloatArray, first: IntArray, output: FloatArray, mean: FloatArray, x: FloatArray,
     covariance: FloatArray,
@@ -164,7 +164,7 @@ def axis_sums(
             covariance[a, b] = total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def run(
     rotation: FloatArray, increment: FloatArray, dt: float, stride: int,
     C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
@@ -318,7 +318,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
             return epoch
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _keep(
     k: int, C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
     first: IntArray, output: FloatArray, out_nav: FloatArray, out_C: FloatArray,

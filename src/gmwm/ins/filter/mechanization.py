@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import (
@@ -27,7 +27,7 @@ from gmwm.ins.trajectory import HIGHEST_LATITUDE, NavState, Trajectory
 _CLEAN_EVERY = 1000  # samples: rounding errors of the attitude matrix stay below 1e-13
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def step(
     C: FloatArray,
     v: FloatArray,
@@ -133,7 +133,7 @@ def step(
     return fn, fe, fd
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _run(
     C: FloatArray,
     rotation: FloatArray,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 RATE = 7.292115e-5
@@ -36,7 +36,7 @@ _CENTRIFUGAL_RATIO = (
 )
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def radii_at(sin_lat: float) -> tuple[float, float]:
     """Radii of curvature of the meridian and of the prime vertical, from the latitude's sine.
 
@@ -54,13 +54,13 @@ def radii_at(sin_lat: float) -> tuple[float, float]:
     return transverse * (1.0 - ECCENTRICITY_SQUARED) / shrink, transverse
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def radii(lat: float) -> tuple[float, float]:
     """Radii of curvature of the meridian and of the prime vertical, m, at a latitude in rad."""
     return radii_at(np.sin(lat))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def gravity_at(sin_lat: float, h: float) -> float:
     """Normal gravity, from the latitude's sine.
 
@@ -87,19 +87,19 @@ def gravity_at(sin_lat: float, h: float) -> float:
     return at_ellipsoid * (1.0 - 2.0 * slope * x + 3.0 * x * x)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def gravity(lat: float, h: float) -> float:
     """Normal gravity, m/s^2, at a latitude in rad and a height in m; see `gravity_at`."""
     return gravity_at(np.sin(lat), h)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def earth_rate(lat: float) -> tuple[float, float]:
     """North and down component of the Earth's rotation, rad/s; there is none to the east."""
     return RATE * np.cos(lat), -RATE * np.sin(lat)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def transport_rate(lat: float, h: float, v_n: float, v_e: float) -> tuple[float, float, float]:
     """Rotation of the local north-east-down frame that follows a vehicle over the Earth.
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 _SERIES_BELOW = 0.01  # rad^2: the terms left out of the series are below 1e-17
@@ -16,7 +16,7 @@ _S1, _S2, _S3, _S4, _S5 = ((-1.0) ** k / math.factorial(2 * k + 1) for k in (1, 
 _C1, _C2, _C3, _C4 = ((-1.0) ** k / math.factorial(2 * k + 2) for k in (1, 2, 3, 4))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def set_from_angles(C: FloatArray, roll: float, pitch: float, yaw: float) -> None:
     """Fill C_bn from roll, pitch and yaw (turns about z, then y, then x), rad.
 
@@ -36,7 +36,7 @@ def set_from_angles(C: FloatArray, roll: float, pitch: float, yaw: float) -> Non
     C[2, 2] = cr * cp
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def angles(C: FloatArray) -> tuple[float, float, float]:
     """Roll, pitch and yaw of C_bn, rad.
 
@@ -50,7 +50,7 @@ def angles(C: FloatArray) -> tuple[float, float, float]:
     return math.atan2(C[2, 1], C[2, 2]), pitch, math.atan2(C[1, 0], C[0, 0])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def rotation_coefficients(square: float) -> tuple[float, float, float]:
     """Factors of a rotation by an angle of which the square is given.
 
@@ -80,14 +80,14 @@ def rotation_coefficients(square: float) -> tuple[float, float, float]:
     return sine, 2.0 * half * half, (1.0 - sine) / square
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def turn_body(C: FloatArray, x: float, y: float, z: float) -> None:
     """Turn the body by a rotation vector in its own axes, rad: C <- C exp([x, y, z] cross)."""
     sine, cosine, _ = rotation_coefficients(x * x + y * y + z * z)
     rotate(C, x, y, z, sine, cosine)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def rotate(C: FloatArray, x: float, y: float, z: float, sine: float, cosine: float) -> None:
     """Turn the body by a rotation vector of which the `rotation_coefficients` are known.
 
@@ -102,7 +102,7 @@ def rotate(C: FloatArray, x: float, y: float, z: float, sine: float, cosine: flo
         C[i, 2] = c + sine * r + cosine * (p * y - q * x)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def turn_navigation(C: FloatArray, x: float, y: float, z: float) -> None:
     """Turn the navigation frame by a small rotation vector in its axes, rad.
 
@@ -118,7 +118,7 @@ def turn_navigation(C: FloatArray, x: float, y: float, z: float) -> None:
         C[2, j] = c + r + 0.5 * (y * p - x * q)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def orthonormalise(C: FloatArray) -> None:
     """Bring a matrix that is nearly a rotation back to one, in place.
 
@@ -138,19 +138,19 @@ def orthonormalise(C: FloatArray) -> None:
         C[i, 2] = 0.5 * ((3.0 - zz) * c - xz * a - yz * b)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _matrices(rpy: FloatArray, result: FloatArray) -> None:
     for i in range(rpy.shape[0]):
         set_from_angles(result[i], rpy[i, 0], rpy[i, 1], rpy[i, 2])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _all_angles(matrices: FloatArray, result: FloatArray) -> None:
     for i in range(matrices.shape[0]):
         result[i, 0], result[i, 1], result[i, 2] = angles(matrices[i])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _exponentials(vectors: FloatArray, result: FloatArray) -> None:
     for i in range(vectors.shape[0]):
         for j in range(3):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from gmwm._core.checks import sampling_interval
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_at, radii_at
@@ -131,7 +131,7 @@ def emulate(trajectory: Trajectory) -> Imu:
     return Imu(dt, rotation, velocity)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _fill(
     track: FloatArray,
     start: FloatArray,
@@ -155,7 +155,7 @@ def _fill(
             velocity[i, 2] += weight * fz
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _sensed(
     track: FloatArray, start: FloatArray, attitude: FloatArray, t: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -196,14 +196,14 @@ def _sensed(
     return wx, wy, wz, fx, fy, fz
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _polynomial(c: FloatArray, t: float) -> tuple[float, float, float]:
     """Value, first and second derivative of a cubic."""
     value = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
     return value, c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]), 2.0 * c[2] + t * 6.0 * c[3]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _to_body(
     n: float,
     e: float,

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numba
 import numpy as np
 
 from gmwm._core.checks import is_number, positive, sampling_interval, shown
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import RATE, gravity_at, radii
@@ -299,7 +299,7 @@ def _specific_force(course: _Course, lla: FloatArray) -> tuple[FloatArray, Float
     return forward, right, down
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _walk(
     speed: FloatArray,
     heading: FloatArray,
@@ -328,7 +328,7 @@ def _walk(
         lla[i + 1, 2] = h_end
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[float, float]:
     """Rates of latitude and longitude, rad/s."""
     meridian, transverse = radii(lat)

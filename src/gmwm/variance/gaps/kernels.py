@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def fill(
     values: FloatArray,
     integral: FloatArray,
@@ -54,7 +54,7 @@ def fill(
             values[k] = mean + slope * (k - centre)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) -> int:
     """Number of places t within the first intervals such that t + lag is within the second.
 
@@ -78,7 +78,7 @@ def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) 
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def neighbours(
     centre: NDArray[np.int64], kind: NDArray[np.int64], kinds: int, reach: int
 ) -> NDArray[np.int64]:
