@@ -53,7 +53,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 
 # Letters and small exponents: a unit is not a formula to be worked out.
-_EXPONENT = r"(?:\^|\*\*|(?<=[a-z]))-?[123](?!\d)"
+_EXPONENT = r"(?:\^|\*\*|(?<=[a-z]))-?[123](?!\d|\s*\^|\s*\*\*)"
 _PLAIN = re.compile(rf"(?:1/)?(?:[A-Za-zµ/·()√²]|\s|\*(?=[A-Za-z])|{_EXPONENT})+")
 
 
