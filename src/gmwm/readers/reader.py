@@ -17,10 +17,9 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
-from gmwm.readers.channel_units import channel_units
+from gmwm.readers.channel_units import channel_units, gravity_notices
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.gravity import gravity_notices
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles

@@ -13,6 +13,7 @@ from gmwm.estimate.problem import Coordinates, spectral_information
 from gmwm.process import Process
 
 _FARTHEST = 1e6  # times the bound under the noise without the term
+_STEP = 1.0  # in the logarithm, of the search for the bound
 _NEGLIGIBLE = 1e-3  # of that bound: an amplitude that changes no standard error
 
 
@@ -58,7 +59,7 @@ def upper_amplitude(
     Returns
     -------
     float
-        Infinite where the record bounds it in no way.
+        Infinite where ``deviation`` is.
     """
     plain = quantile_above_zero(centre, deviation)
     if not (np.isfinite(plain) and plain > 0.0 and all(p.has_spectrum() for p in processes)):
@@ -91,7 +92,12 @@ def upper_amplitude(
         spread = np.hypot(least, amplitude * below / tuning.SIGNIFICANT)
         return amplitude - quantile_above_zero(centre, float(spread))
 
-    low, high = np.log(plain), np.log(plain * _FARTHEST)
+    low = np.log(plain)
     if excess(low) >= 0.0:
         return plain
-    return float(np.exp(brentq(excess, low, high))) if excess(high) > 0.0 else float("inf")
+    while low < np.log(plain * _FARTHEST):
+        high = low + _STEP
+        if excess(high) > 0.0:
+            return float(np.exp(brentq(excess, low, high)))
+        low = high
+    return plain  # terms that stand in for each other leave no amplitude that the data exclude
