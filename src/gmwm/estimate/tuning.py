@@ -1,7 +1,7 @@
 """Constants of the estimation that change answers, each with its source or its reason.
 
-``python benchmarks/tuning.py`` halves and doubles every one of them; what that does stands in
-docs/method.md. Constants that only keep arithmetic safe stand where they are used.
+``python benchmarks/tuning.py`` halves and doubles every one of them and prints what that
+does. Constants that only keep arithmetic safe stand where they are used.
 """
 
 # -- what makes a fit invalid ---------------------------------------------------------------------
@@ -13,8 +13,8 @@ UPPER_LEVEL = 0.95
 """Probability of upper bounds, as of the intervals beside them."""
 
 LEAST_EFFICIENCY = 0.25
-"""Of an estimate against the information in the record, as far as upper bounds allow for it: what
-identity weights reach."""
+"""Of an estimate against the information in the record, below which upper bounds take it for this:
+they would have no degrees of freedom left."""
 
 UNDETERMINED = 1.0
 """Relative standard error of a shape above which its interval means nothing: a factor e."""
@@ -91,9 +91,12 @@ SETTLED = 1e-4
 
 # -- the rate ramp --------------------------------------------------------------------------------
 
-WALK_RATIOS = (0.03, 3000.0)
-"""Walks that a slope is judged beside: what they add to its variance, over what the noise gives.
-Below, a walk changes nothing; above, none of a thousand records would hide it."""
+LEAST_WALK = 0.03
+"""Smallest walk that a slope is judged beside, as what it adds to the variance of the slope over
+what the noise gives: below, a walk changes nothing."""
+
+LARGEST_WALK = 3000.0
+"""The largest: above, none of a thousand records would hide it."""
 
 FEWEST_BLOCKS = 8
 """Blocks of samples from which a slope is estimated."""

@@ -1,7 +1,7 @@
 """Constants of the selection that change answers, each with its source or its reason.
 
-``python benchmarks/tuning.py`` halves and doubles every one of them; what that does stands in
-docs/method.md.
+``python benchmarks/tuning.py`` halves and doubles every one of them and prints what that
+does.
 """
 
 STRICTNESS = 1.5

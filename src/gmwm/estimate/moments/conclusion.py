@@ -147,6 +147,6 @@ def _upper_scale(
     processes = design.fitted_processes(point.x, point.shapes)
     bound = upper_amplitude(
         design.coordinates.without(others), [processes[i] for i in part], part.index(term),
-        centre, deviation, 0.0, wv.n, wv.dt,
+        centre, deviation, 0.0, wv,
     )  # fmt: skip
     return float(bound ** (1.0 / design.terms[term].linear.power))

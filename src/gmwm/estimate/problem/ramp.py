@@ -109,7 +109,7 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     found = np.array(
         [
             _restricted(noise + ratio * unit * walk, apart, difference)
-            for ratio in np.geomspace(*tuning.WALK_RATIOS, _WALKS)
+            for ratio in np.geomspace(tuning.LEAST_WALK, tuning.LARGEST_WALK, _WALKS)
         ]
     )
     weight = np.exp(found[:, 2] - np.max(found[:, 2]))

@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import Coordinates, spectral_information
+from gmwm.estimate.problem import Coordinates, Scales, spectral_information
 from gmwm.process import Process
+from gmwm.variance import WaveletVariance
 
-_FARTHEST = 1e6  # times the bound under the noise without the term
-_STEP = 1.0  # in the logarithm, of the search for the bound
+_LEAST_QUANTILE = 1e-9  # keeps levels that say nothing in numbers
 _NEGLIGIBLE = 1e-3  # of that bound: an amplitude that changes no standard error
 
 
@@ -30,8 +30,7 @@ def upper_amplitude(
     centre: float,
     deviation: float,
     at: float,
-    n: int,
-    dt: float,
+    wv: WaveletVariance,
 ) -> float:
     """95 % upper bound of a term's amplitude, in the power that the spectrum is linear in.
 
@@ -52,25 +51,27 @@ def upper_amplitude(
         The estimate without the restriction to positive values, and its standard error.
     at : float
         The amplitude under which that is its standard error.
-    n : int
-    dt : float
-        Sampling interval, s.
+    wv : WaveletVariance
+        The data.
 
     Returns
     -------
     float
-        Infinite where ``deviation`` is.
+        No more than all of the variance at any level, and its error, leave room for.
     """
-    plain = quantile_above_zero(centre, deviation)
+    most = _whole(processes[term], wv)
+    plain = min(quantile_above_zero(centre, deviation), most)
     if not (np.isfinite(plain) and plain > 0.0 and all(p.has_spectrum() for p in processes)):
         return plain
-    place = coordinates.owners.index((term, True))
+    owners = coordinates.owners
+    kept = [k for k, (i, is_amplitude) in enumerate(owners) if i != term or is_amplitude]
+    place = kept.index(owners.index((term, True)))
 
     def error(amplitude: float) -> float:
-        """Standard error of the amplitude where it is the true one."""
+        """Standard error of the amplitude where it is the true one, at the present shape."""
         raised = list(processes)
         raised[term] = raised[term].with_amplitude(amplitude)
-        information = spectral_information(coordinates, raised, n, dt)
+        information = spectral_information(coordinates, raised, wv.n, wv.dt)[np.ix_(kept, kept)]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
         return float(amplitude * scale[place] * np.sqrt(inverse[place, place]))
@@ -89,15 +90,20 @@ def upper_amplitude(
         if growth > 0.0:
             dof = 2.0 / growth
             below = 1.0 - float(chi2.ppf(1.0 - tuning.UPPER_LEVEL, dof)) / dof
-        spread = np.hypot(least, amplitude * below / tuning.SIGNIFICANT)
+        spread = np.hypot(least, amplitude * below / norm.ppf(tuning.UPPER_LEVEL))
         return amplitude - quantile_above_zero(centre, float(spread))
 
-    low = np.log(plain)
-    if excess(low) >= 0.0:
+    # Terms that stand in for each other leave their amplitudes open, but not beyond the data.
+    if most <= plain or excess(np.log(plain)) >= 0.0:
         return plain
-    while low < np.log(plain * _FARTHEST):
-        high = low + _STEP
-        if excess(high) > 0.0:
-            return float(np.exp(brentq(excess, low, high)))
-        low = high
-    return plain  # terms that stand in for each other leave no amplitude that the data exclude
+    if excess(np.log(most)) <= 0.0:
+        return most
+    return float(np.exp(brentq(excess, np.log(plain), np.log(most))))
+
+
+def _whole(process: Process, wv: WaveletVariance) -> float:
+    """95 % upper bound of an amplitude to which every level is due, whichever has the least."""
+    alone = Scales.of(wv).curve(process.with_amplitude(1.0))
+    tail = (1.0 - tuning.UPPER_LEVEL) / wv.tau.size
+    upper = wv.dof * wv.variance / np.maximum(chi2.ppf(tail, wv.dof), _LEAST_QUANTILE)
+    return float(np.min(upper[alone > 0.0] / alone[alone > 0.0], initial=np.inf))

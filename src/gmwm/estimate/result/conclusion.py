@@ -197,7 +197,7 @@ def _upper_bounds(found: Estimates, keys: Sequence[str], wv: WaveletVariance) ->
             part = [j for j in range(len(coordinates.terms)) if j not in found.absent]
             bound = upper_amplitude(
                 coordinates.without(list(found.absent)), [found.processes[j] for j in part],
-                part.index(i), amplitude, deviation * amplitude, amplitude, wv.n, wv.dt,
+                part.index(i), amplitude, deviation * amplitude, amplitude, wv,
             )  # fmt: skip
             bounds[keys[k]] = bound ** (1.0 / power)
     return bounds

@@ -85,9 +85,7 @@ def align(
     InputError
         If there is no fix, no steady stretch to level by, or no way to know the heading.
     """
-    positions = _of_kind(aiding, "position")
-    if positions is None:
-        raise InputError("there is no position fix: a filter starts at one")
+    positions = _positions(aiding)
     first, last = _steady(imu)
     still, velocity, velocity_sd = _motion(aiding, imu.dt, first, last)
     mean = np.concatenate([np.mean(imu.rotation[first:last], axis=0),
@@ -158,6 +156,13 @@ def _of_kind(aiding: Aiding, kind: str) -> Fixes | None:
     return found[0] if found else None
 
 
+def _positions(aiding: Aiding) -> Fixes:
+    found = _of_kind(aiding, "position")
+    if found is None:
+        raise InputError("there is no position fix: a filter starts at one")
+    return found
+
+
 def _steady(imu: Imu) -> tuple[int, int]:
     """First stretch in which means over a window stay near the first one: rest, or steady motion.
 
@@ -213,8 +218,7 @@ def _motion(
             if np.all(np.abs(mean) < tuning.SIGMAS * sd):
                 return True, np.zeros(3), max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
             return False, None, 0.0
-    position = _of_kind(aiding, "position")
-    assert position is not None
+    position = _positions(aiding)
     inside = (position.time >= begin) & (position.time <= end)
     if np.count_nonzero(inside) < 2:
         return False, None, 0.0
@@ -293,8 +297,7 @@ def _from_velocity(aiding: Aiding, start: float) -> tuple[float, float, float, f
 
 def _from_chord(aiding: Aiding, start: float) -> tuple[float, float, float, float] | None:
     """Course between two fixes that are near in time and far apart."""
-    positions = _of_kind(aiding, "position")
-    assert positions is not None
+    positions = _positions(aiding)
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     begins = np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED))
     for i in begins:
@@ -327,8 +330,7 @@ def _first_velocity(aiding: Aiding, epoch: int, dt: float) -> tuple[FloatArray, 
         i = int(np.argmin(np.abs(velocity.time - epoch * dt)))
         if abs(velocity.time[i] - epoch * dt) < dt:
             return velocity.value[i], float(np.sqrt(np.mean(velocity.sd[i] ** 2)))
-    positions = _of_kind(aiding, "position")
-    assert positions is not None
+    positions = _positions(aiding)
     i = int(np.argmin(np.abs(positions.time - epoch * dt)))
     if i + 1 >= positions.time.size or positions.time[i + 1] - positions.time[i] > tuning.CHORD:
         raise InputError("the first position fix has no other near it: begin where fixes are dense")

@@ -10,6 +10,7 @@ from gmwm.estimate.problem import Coordinates
 from gmwm.estimate.result.bound import quantile_above_zero, upper_amplitude
 
 MODEL = WhiteNoise() + RandomWalk()
+WV = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(20_000, 1.0, 1), 1.0)
 
 
 @pytest.mark.parametrize("walk", [5e-4, 1e-3, 1.7e-3])
@@ -25,26 +26,40 @@ def test_bounds_of_a_walk_near_the_threshold_lie_above_it(walk):
 
 def bound(centre, deviation, at):
     processes = (WhiteNoise(1.0), RandomWalk(1e-3))
-    return upper_amplitude(Coordinates(MODEL), processes, 1, centre, deviation, at, 20_000, 1.0)
+    return upper_amplitude(Coordinates(MODEL), processes, 1, centre, deviation, at, WV)
 
 
 def test_it_is_no_lower_than_under_the_noise_alone():
-    for centre in (-1e-6, 0.0, 1e-6):
-        assert bound(centre, 5e-7, 0.0) > quantile_above_zero(centre, 5e-7)
+    for centre in (-5e-8, 0.0, 5e-8):
+        assert bound(centre, 3e-8, 0.0) > quantile_above_zero(centre, 3e-8)
 
 
 def test_it_rises_with_the_estimate_and_its_error():
-    bounds = [bound(centre, 5e-7, 0.0) for centre in (-1e-6, 0.0, 5e-7, 1e-6)]
-    assert bounds == sorted(bounds)
-    assert bound(0.0, 1e-6, 0.0) > bound(0.0, 5e-7, 0.0)
-
-
-def test_the_error_of_white_noise_hardly_grows():
+    # White noise beside a slow process: its error hardly grows with it.
+    x = (GaussMarkov(1.0, 20.0) + WhiteNoise(0.1)).simulate(20_000, 1.0, 1)
+    wv = gmwm.wavelet_variance(x, 1.0)
     coordinates = Coordinates(GaussMarkov() + WhiteNoise())
     processes = (GaussMarkov(1.0, 20.0), WhiteNoise(1e-3))
-    found = upper_amplitude(coordinates, processes, 1, 0.0, 1e-4, 0.0, 20_000, 1.0)
-    assert found == pytest.approx(quantile_above_zero(0.0, 1e-4), rel=0.25)
+
+    def of(centre, deviation):
+        return upper_amplitude(coordinates, processes, 1, centre, deviation, 0.0, wv)
+
+    bounds = [of(centre, 1e-4) for centre in (-1e-4, 0.0, 1e-4, 3e-4)]
+    assert bounds == sorted(set(bounds))
+    assert of(0.0, 2e-4) > 1.5 * of(0.0, 1e-4)
+    assert of(0.0, 1e-4) == pytest.approx(quantile_above_zero(0.0, 1e-4), rel=0.25)
 
 
-def test_what_nothing_bounds_stays_infinite():
-    assert bound(0.0, np.inf, 0.0) == np.inf
+def test_what_stands_in_for_a_term_leaves_it_no_more_than_the_data():
+    # A fast Gauss-Markov process and white noise: neither is excluded beside the other.
+    for seed in range(4):
+        truth = GaussMarkov(1.0, 0.2)
+        fit = gmwm.fit(WhiteNoise() + GaussMarkov(), truth.simulate(2000, 1.0, seed), 1.0)
+        for key, bound in fit.upper_bounds.items():
+            term = WhiteNoise(bound) if key == "N" else GaussMarkov(bound, fit.params["tau"])
+            assert np.isfinite(bound)
+            assert np.all(term.haar_variance(fit.wv.tau, 1.0) < 2.0 * fit.wv.upper)
+
+
+def test_what_the_fit_does_not_bound_is_bounded_by_the_data():
+    assert 0.0 < bound(0.0, np.inf, 0.0) < 0.1
