@@ -24,6 +24,10 @@ from .estimate import (
     cramer_rao as cramer_rao,
     fit as fit,
 )
+from .filter_numbers import (
+    FilterNumbers as FilterNumbers,
+    SensorNumbers as SensorNumbers,
+)
 from .process import (
     AR as AR,
     ARIMA as ARIMA,

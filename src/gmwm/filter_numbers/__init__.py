@@ -1,0 +1,14 @@
+"""What a filter of few states should believe: consistent numbers for it, and a check of given ones.
+
+A small filter has room for white noise with a random walk or a few Gauss-Markov processes on each
+axis; which numbers are right depends on how long it goes without aiding, the horizon.
+"""
+
+from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
+
+__all__ = [
+    "FORMS",
+    "FilterNumbers",
+    "Predicted",
+    "SensorNumbers",
+]

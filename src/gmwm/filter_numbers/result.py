@@ -1,0 +1,333 @@
+"""The numbers that a small filter should believe, axis by axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from html import escape
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from gmwm._core import checks
+from gmwm._core.documents import Document
+from gmwm._core.frames import frame
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
+from gmwm._core.units import SI_UNIT, si_parameter_unit
+from gmwm.errors import MissingNameError
+from gmwm.estimate.result import plain
+from gmwm.process import Model, model_from_list
+
+if TYPE_CHECKING:
+    import pandas
+
+FORMS = ("N+K", "N+GM", "N+K+GM", "N+2GM")
+"""White noise with a random walk, with one or two Gauss-Markov processes, or with both."""
+
+METHODS = ("bound", "reduce", "given")
+"""Where numbers come from: `bound`, `reduce`, or somebody who gave them."""
+
+_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """How well a filter with these numbers knows its error, after some time without aiding.
+
+    It is the expected one of the filter of `gmwm.filter_numbers.chain.Chain`, by covariance
+    analysis.
+
+    Attributes
+    ----------
+    time : float
+        Without aiding, s.
+    nees : float
+        Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it
+        is too optimistic. NaN where a term of the truth has no state-space form.
+    tightness : float
+        Predicted over true standard deviation, of the last integral of the sensor's error.
+    """
+
+    time: float
+    nees: float
+    tightness: float
+
+
+@dataclass(frozen=True, repr=False)
+class FilterNumbers(Document):
+    """What a small filter should believe of one axis.
+
+    Attributes
+    ----------
+    form : {"N+K", "N+GM", "N+K+GM", "N+2GM"}
+    model : Model
+        White noise with a random walk, Gauss-Markov processes, or both.
+    horizon : float
+        Time without aiding that the numbers are for, s.
+    initial_sd : float
+        Standard deviation at the start of the walk or, in forms without one, of a constant that
+        the Gauss-Markov processes are added to; u.
+    method : {"bound", "reduce", "given"}
+    predicted : tuple of Predicted
+        At the horizon and at ten times the horizon.
+    notices : tuple of Notice
+        What of the error model the numbers leave out, and why.
+    quantity : {"gyro", "accel", ""}
+        What the axis measures; empty if it is not known.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
+
+    form: str
+    model: Model
+    horizon: float
+    initial_sd: float
+    method: str
+    predicted: tuple[Predicted, ...] = ()
+    notices: tuple[Notice, ...] = ()
+    quantity: str = ""
+
+    def __post_init__(self) -> None:
+        checks.choice("form", self.form, FORMS)
+        checks.choice("method", self.method, METHODS)
+
+    @property
+    def unit(self) -> str:
+        """Of the axis, SI; "u" if the quantity is not known."""
+        return SI_UNIT.get(self.quantity, "u")
+
+    @property
+    def N(self) -> float:
+        """White noise, u/sqrt(Hz)."""
+        return float(self.model.params.get("N") or 0.0)
+
+    @property
+    def K(self) -> float:
+        """Random walk, u/s/sqrt(Hz); zero in a form without one."""
+        return float(self.model.params.get("K") or 0.0)
+
+    @property
+    def sigma(self) -> tuple[float, ...]:
+        """Standard deviations of the Gauss-Markov processes by rising correlation time, u."""
+        return self._values("sigma")
+
+    @property
+    def tau(self) -> tuple[float, ...]:
+        """Correlation times of the Gauss-Markov processes, rising, s."""
+        return self._values("tau")
+
+    def _values(self, name: str) -> tuple[float, ...]:
+        params = self.model.params.items()
+        return tuple(float(value or 0.0) for key, value in params if key.split("_")[0] == name)
+
+    @property
+    def nees(self) -> Mapping[float, float]:
+        """Predicted normalised error squared per degree of freedom, by time without aiding."""
+        return {each.time: each.nees for each in self.predicted}
+
+    @property
+    def tightness(self) -> Mapping[float, float]:
+        """Predicted over true standard deviation, by time without aiding."""
+        return {each.time: each.tightness for each in self.predicted}
+
+    def __repr__(self) -> str:
+        return f"<FilterNumbers {self.model!r}, {self.method} for {self.horizon:g} s>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
+        for key, value in self._shown():
+            letter = key if key in _UNITS else key.partition("_")[0]
+            unit = si_parameter_unit(_UNITS[letter], self.quantity)
+            lines.append(f"  {key:<10} {value:>11.4g} {unit}")
+        for each in self.predicted:
+            lines.append(
+                f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
+                f"freedom, predicted/true standard deviation {each.tightness:.3g}"
+            )
+        for notice in self.notices:
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join(lines)
+
+    def _shown(self) -> list[tuple[str, float]]:
+        values = [(key, float(value or 0.0)) for key, value in self.model.params.items()]
+        return [*values, ("initial_sd", self.initial_sd)]
+
+    def row(self) -> dict[str, Any]:
+        """What `to_frame` shows of it, SI."""
+        first = self.predicted[0] if self.predicted else None
+        return {
+            "form": self.form,
+            **dict(self._shown()),
+            "horizon": self.horizon,
+            "nees": first.nees if first else float("nan"),
+            "tightness": first.tightness if first else float("nan"),
+            "method": self.method,
+        }
+
+    # -- files ------------------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "form": self.form,
+            "model": [term.to_dict() for term in self.model.terms],
+            "horizon_s": self.horizon,
+            "initial_sd": self.initial_sd,
+            "method": self.method,
+            "predicted": [
+                {key: plain(value) for key, value in asdict(each).items()}
+                for each in self.predicted
+            ],
+            "notices": [notice.to_dict() for notice in self.notices],
+            "quantity": self.quantity,
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        nan = float("nan")
+        return cls(
+            form=str(content["form"]),
+            model=model_from_list(content["model"]),
+            horizon=float(content["horizon_s"]),
+            initial_sd=float(content["initial_sd"]),
+            method=str(content["method"]),
+            predicted=tuple(
+                Predicted(**{k: nan if v is None else float(v) for k, v in each.items()})
+                for each in content["predicted"]
+            ),
+            notices=tuple(map(Notice.from_dict, content["notices"])),
+            quantity=str(content["quantity"]),
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class SensorNumbers(Mapping[str, FilterNumbers], Document):
+    """What a small filter should believe of a sensor: a mapping of channels to `FilterNumbers`.
+
+    Attributes
+    ----------
+    axes : dict
+        Channel name -> `FilterNumbers`.
+    source : str
+        What was calibrated.
+    rate : float
+        Sampling rate, Hz; NaN if it is not known.
+    duration : float
+        Length of the recording, s; NaN if it is not known.
+    shared : bool
+        Whether the axes of a quantity have the same numbers.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.filter-numbers"
+
+    axes: Mapping[str, FilterNumbers]
+    source: str = ""
+    rate: float = float("nan")
+    duration: float = float("nan")
+    shared: bool = False
+
+    def __post_init__(self) -> None:
+        freeze(self, "axes")
+
+    def __getitem__(self, name: str) -> FilterNumbers:
+        if name not in self.axes:
+            raise MissingNameError(
+                f"there are no filter numbers of channel {name!r}: there are {', '.join(self.axes)}"
+            )
+        return self.axes[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.axes)
+
+    def __len__(self) -> int:
+        return len(self.axes)
+
+    def of(self, quantity: str) -> dict[str, FilterNumbers]:
+        """Those of the gyros ("gyro") or accelerometers ("accel")."""
+        return {name: each for name, each in self.items() if each.quantity == quantity}
+
+    @property
+    def horizon(self) -> float:
+        """Time without aiding that they are for, s."""
+        return next(iter(self.values())).horizon
+
+    @property
+    def form(self) -> str:
+        """Their form; see `FilterNumbers`."""
+        return next(iter(self.values())).form
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Those of all axes, with the channel as the place."""
+        return tuple(
+            replace(notice, where=name) for name, each in self.items() for notice in each.notices
+        )
+
+    def __repr__(self) -> str:
+        where = self.source or "a sensor"
+        return f"<SensorNumbers of {where}: {self.form} for {self.horizon:g} s, {', '.join(self)}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        first = next(iter(self.values()))
+        head = f"{self.form} for {self.horizon:g} s, {first.method}"
+        lines = [f"{self.source}: {head}" if self.source else head]
+        names = max(map(len, self))
+        for quantity in dict.fromkeys(each.quantity for each in self.values()):
+            group = self.of(quantity)
+            keys = [key for key, _ in next(iter(group.values()))._shown()]
+            times = [each.time for each in next(iter(group.values())).predicted]
+            columns = keys + [f"NEES {time:g} s" for time in times]
+            columns += [f"sd {time:g} s" for time in times]
+            title = f"{quantity or 'channel'} [{SI_UNIT.get(quantity, 'u')}, s]"
+            names = max(names, len(title))
+            lines += ["", f"{title:<{names}}" + "".join(f" {column:>11}" for column in columns)]
+            for name, each in group.items():
+                values = [value for _, value in each._shown()]
+                values += [c.nees for c in each.predicted]
+                values += [c.tightness for c in each.predicted]
+                lines.append(f"{name:<{names}}" + "".join(f" {value:>11.4g}" for value in values))
+        if first.predicted:
+            lines += ["", *wrapped(
+                "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
+                "predicted over true standard deviation then."
+            )]  # fmt: skip
+        for notice in self.notices:
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join(lines)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table with one row a channel, in SI units; needs pandas."""
+        rows = [{"channel": name, **each.row()} for name, each in self.items()]
+        return frame(rows, tuple(dict.fromkeys(key for row in rows for key in row)))
+
+    # -- files ------------------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "source": self.source,
+            "rate_hz": plain(self.rate),
+            "duration_s": plain(self.duration),
+            "shared": self.shared,
+            "channels": {name: each.to_dict() for name, each in self.items()},
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        def number(value: Any) -> float:
+            return float("nan") if value is None else float(value)
+
+        axes = {
+            str(name): FilterNumbers.from_dict(each) for name, each in content["channels"].items()
+        }
+        return cls(
+            axes=axes,
+            source=str(content["source"]),
+            rate=number(content["rate_hz"]),
+            duration=number(content["duration_s"]),
+            shared=bool(content["shared"]),
+        )

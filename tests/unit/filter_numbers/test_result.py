@@ -1,0 +1,107 @@
+"""Filter numbers as a result: values, tables, files."""
+
+import math
+from dataclasses import FrozenInstanceError
+
+import pytest
+
+import gmwm
+from gmwm import (
+    FilterNumbers,
+    GaussMarkov,
+    InputError,
+    RandomWalk,
+    SensorNumbers,
+    WhiteNoise,
+)
+from gmwm._core.notices import Notice
+from gmwm.filter_numbers import Predicted
+
+NOTICE = Notice("quantization-left-out", "note", "", "quantization noise is left out", {"Q": 1e-6})
+WALK = FilterNumbers(
+    "N+K", WhiteNoise(1e-4) + RandomWalk(5e-6), 60.0, 3e-5, "bound",
+    (Predicted(60.0, 0.91, 1.12), Predicted(600.0, 0.75, 1.4)), (NOTICE,), "gyro",
+)  # fmt: skip
+TWO = FilterNumbers(
+    "N+2GM", WhiteNoise(1e-3) + GaussMarkov(2e-3, 5.0) + GaussMarkov(1e-3, 500.0), 10.0, 0.0,
+    "reduce", (Predicted(10.0, math.nan, math.nan),), (), "accel",
+)  # fmt: skip
+SENSOR = SensorNumbers({"gyro_x": WALK, "accel_x": TWO}, "static.csv", 100.0, 3600.0)
+
+
+def test_numbers_that_a_form_has_and_those_that_it_lacks():
+    assert (WALK.N, WALK.K, WALK.sigma, WALK.tau) == (1e-4, 5e-6, (), ())
+    assert (TWO.N, TWO.K, TWO.sigma, TWO.tau) == (1e-3, 0.0, (2e-3, 1e-3), (5.0, 500.0))
+    assert WALK.nees == {60.0: 0.91, 600.0: 0.75}
+    assert WALK.tightness == {60.0: 1.12, 600.0: 1.4}
+    assert (WALK.unit, TWO.unit) == ("rad/s", "m/s^2")
+
+
+def test_a_sensor_is_a_mapping_of_its_channels():
+    assert list(SENSOR) == ["gyro_x", "accel_x"]
+    assert SENSOR["gyro_x"] is WALK
+    assert SENSOR.of("accel") == {"accel_x": TWO}
+    assert [notice.where for notice in SENSOR.notices] == ["gyro_x"]
+    assert (SENSOR.form, SENSOR.horizon) == ("N+K", 60.0)
+    with pytest.raises(KeyError, match="there are gyro_x, accel_x"):
+        SENSOR["gyro_z"]
+
+
+def test_it_does_not_change():
+    with pytest.raises(FrozenInstanceError):
+        WALK.horizon = 10.0
+    with pytest.raises(TypeError):
+        SENSOR.axes["gyro_x"] = TWO
+
+
+def test_files_bring_back_what_was_saved(tmp_path):
+    path = SENSOR.save(tmp_path / "numbers.json")
+    again = gmwm.load(path)
+    assert isinstance(again, SensorNumbers)
+    assert again["gyro_x"] == WALK
+    assert again.to_dict() == SENSOR.to_dict()
+    assert math.isnan(again["accel_x"].nees[10.0])
+    assert FilterNumbers.load(WALK.save(tmp_path / "axis.json")) == WALK
+    unknown = SensorNumbers({"x": WALK})
+    assert math.isnan(SensorNumbers.from_dict(unknown.to_dict()).rate)
+
+
+def test_a_damaged_file_is_refused():
+    content = WALK.to_dict()
+    for change in ({"form": "N"}, {"horizon_s": "long"}, {"model": [{"process": "X"}]}):
+        with pytest.raises(InputError, match="make it again"):
+            FilterNumbers.from_dict(content | change)
+
+
+def test_text_names_units_and_every_number():
+    lines = str(WALK).splitlines()
+    assert lines[0] == "N+K for 60 s, bound"
+    assert [line.split() for line in lines[1:4]] == [
+        ["N", "0.0001", "rad/s/sqrt(Hz)"],
+        ["K", "5e-06", "rad/s/s/sqrt(Hz)"],
+        ["initial_sd", "3e-05", "rad/s"],
+    ]
+    assert "after 600 s without aiding: NEES 0.75" in str(WALK)
+    assert str(NOTICE) in str(WALK)
+    text = str(SENSOR)
+    assert "static.csv: N+K for 60 s, bound" in text
+    for part in (
+        "gyro [rad/s, s]",
+        "accel [m/s^2, s]",
+        "sigma_2",
+        "NEES 600 s",
+        "0.91",
+        "gyro_x: ",
+    ):
+        assert part in text
+    assert "<pre>" in SENSOR._repr_html_()
+    assert repr(SENSOR) == "<SensorNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
+
+
+def test_table():
+    pandas = pytest.importorskip("pandas")
+    table = SENSOR.to_frame()
+    assert isinstance(table, pandas.DataFrame)
+    assert list(table["channel"]) == ["gyro_x", "accel_x"]
+    assert table.loc[0, "K"] == 5e-6
+    assert table.loc[1, "tau_2"] == 500.0
