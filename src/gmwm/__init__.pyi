@@ -24,6 +24,7 @@ from .estimate import (
     cramer_rao as cramer_rao,
     fit as fit,
 )
+from .export import export as export
 from .filter_numbers import (
     FilterNumbers as FilterNumbers,
     SensorNumbers as SensorNumbers,

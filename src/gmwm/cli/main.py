@@ -10,6 +10,7 @@ from gmwm import __version__
 from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.demo import demo
+from gmwm.cli.export import export
 from gmwm.cli.health import health
 from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
@@ -25,7 +26,7 @@ def cli() -> None:
     """Stochastic error models of inertial sensors from static recordings."""
 
 
-for _command in (calibrate, demo, budget, health, navigate, reproduce):
+for _command in (calibrate, demo, budget, export, health, navigate, reproduce):
     cli.add_command(_command)
 
 

@@ -1,5 +1,20 @@
-"""Calibrations in the form that other programs want, one file per consumer."""
+"""Numbers for filters in the files that other programs read, one file per consumer or format."""
 
-from gmwm.export.kalibr import write_kalibr
+import sys
+from types import ModuleType
+from typing import Any
 
-__all__ = ["write_kalibr"]
+from gmwm.export.export import TARGETS, export
+from gmwm.export.target import Target
+
+__all__ = ["TARGETS", "Target", "export"]
+
+
+class _Room(ModuleType):
+    """``gmwm.export`` is this room as well as its function, whichever was loaded first."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> str:
+        return export(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _Room

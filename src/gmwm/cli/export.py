@@ -1,0 +1,66 @@
+"""``gmwm export``: numbers for a filter in the file of the program that runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gmwm.errors import InputError
+
+
+@click.command()
+@click.argument("files", metavar="FILE...", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--to", "target", metavar="NAME", help="The program; see --list.")
+@click.option("--horizon", type=float, metavar="T",
+              help="Seconds without aiding that the numbers are for; by default 1 (keyframes, "
+                   "scans) or 60, see --list.")  # fmt: skip
+@click.option("--form", metavar="FORM",
+              help="N+K, N+GM, ...: most programs hold one; state-space holds any.")  # fmt: skip
+@click.option("-o", "--output", type=click.Path(path_type=Path),
+              help="File to write; state-space also writes .npz. By default it is printed.")  # fmt: skip
+@click.option("--list", "listed", is_flag=True, help="List the programs.")
+def export(
+    files: tuple[Path, ...],
+    target: str | None,
+    horizon: float | None,
+    form: str | None,
+    output: Path | None,
+    listed: bool,
+) -> None:
+    """Write numbers for a filter as the program wants them.
+
+    FILE is a calibration.json, or numbers that gmwm.bound or gmwm.reduce saved. Several files make
+    one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
+    the smallest that are never too optimistic for its error models; comments say what they are.
+
+    \b
+    Examples:
+      gmwm export out/calibration.json --to openvins -o kalibr_imu_chain.yaml
+      gmwm export gyro.json accel.json --to px4
+      gmwm export out/calibration.json --to kfgins --horizon 30
+      gmwm export --list
+    """
+    if listed:
+        _list()
+        return
+    if not files or target is None:
+        raise InputError(
+            "gmwm export needs files and a program: gmwm export calibration.json --to NAME "
+            "(names: gmwm export --list)"
+        )
+    from gmwm import export as written, load
+
+    text = written([load(file) for file in files], target, horizon=horizon, form=form, path=output)
+    click.echo(f"wrote {output}" if output else text, nl=output is not None)
+
+
+def _list() -> None:
+    from gmwm.cli.console import new_console, new_table, print_whole
+    from gmwm.export import TARGETS
+
+    table = new_table("name", "program", "file", "form", ">horizon")
+    for target in TARGETS.values():
+        horizon = "" if target.form == "full model" else f"{target.horizon:g} s"
+        table.add_row(target.name, target.title, target.file, target.form, horizon)
+    print_whole(new_console(), table)

@@ -1,0 +1,348 @@
+"""What a file is written from: the numbers of three gyros and three accelerometers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm.calibration import Calibration, noise_density, random_walk
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.export import tuning
+from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound
+
+SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
+"""Quantity -> how messages and most consumers call the sensor."""
+
+_LETTERS = "xyz"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The numbers of one axis.
+
+    Attributes
+    ----------
+    name : str
+        Of its channel.
+    N, K : float
+        u/sqrt(Hz) and u/s/sqrt(Hz).
+    sigma, tau : float
+        Of the Gauss-Markov process, u and s; not a number in forms without one.
+    initial_sd : float
+        Of the bias at the start, u.
+    nees : dict
+        Predicted normalised error squared by time without aiding.
+    rate : float
+        Of its samples, Hz; NaN if it is not known.
+    upper : frozenset of str
+        Which of the numbers are upper bounds of a term that was not found.
+    """
+
+    name: str
+    N: float
+    K: float
+    sigma: float
+    tau: float
+    initial_sd: float
+    nees: Mapping[float, float] = field(default_factory=dict)
+    rate: float = float("nan")
+    upper: frozenset[str] = frozenset()
+
+    def moved(self, tau: float) -> Axis:
+        """With a Gauss-Markov process of another correlation time that bounds its own.
+
+        The spectral density of (sigma, tau) is below that of (sigma', tau') at all frequencies if
+        it is at zero, sigma^2 tau, and at infinity, sigma^2/tau.
+        """
+        ratio = max(tau / self.tau, self.tau / tau)
+        return replace(self, sigma=self.sigma * float(np.sqrt(ratio)), tau=tau)
+
+
+@dataclass(frozen=True)
+class Triad:
+    """The axes of the gyros or of the accelerometers.
+
+    Attributes
+    ----------
+    quantity : {"gyro", "accel"}
+    axes : tuple of Axis
+        Each with its own numbers.
+    common : FilterNumbers or None
+        The numbers that all share, where a file has one value for them.
+    """
+
+    quantity: str
+    axes: tuple[Axis, ...]
+    common: FilterNumbers | None = None
+
+    @property
+    def N(self) -> float:
+        """For all axes, u/sqrt(Hz)."""
+        return self._for_all("N")
+
+    @property
+    def K(self) -> float:
+        """For all axes, u/s/sqrt(Hz)."""
+        return self._for_all("K")
+
+    @property
+    def initial_sd(self) -> float:
+        return max(axis.initial_sd for axis in self.axes)
+
+    def is_upper(self, letter: str) -> bool:
+        """Whether no axis has the term."""
+        return all(letter in axis.upper for axis in self.axes)
+
+    def _for_all(self, letter: str) -> float:
+        """The bound over the axes; the largest of their upper bounds if no axis has the term."""
+        if self.common is not None and not self.is_upper(letter):
+            return float(getattr(self.common, letter))
+        found = [axis for axis in self.axes if letter not in axis.upper]
+        return max(getattr(axis, letter) for axis in found or self.axes)
+
+    @property
+    def rate(self) -> float:
+        return self.axes[0].rate
+
+    def xyz(self) -> tuple[Axis, ...]:
+        """Axes x, y, z; one that was not calibrated has the largest numbers of the others."""
+        by_letter = dict(zip(_letters([axis.name for axis in self.axes]), self.axes, strict=True))
+        tau = common_tau(self.axes)
+        moved = [axis.moved(tau) if axis.tau > 0.0 else axis for axis in self.axes]
+        largest = Axis(
+            "", self.N, self.K, max(axis.sigma for axis in moved), tau, self.initial_sd,
+            rate=self.rate, upper=frozenset().union(*(axis.upper for axis in self.axes)),
+        )  # fmt: skip
+        return tuple(
+            by_letter.get(letter, replace(largest, name=f"{self.quantity}_{letter}"))
+            for letter in _LETTERS
+        )
+
+
+@dataclass(frozen=True)
+class Imu:
+    """Gyros and accelerometers, and what the numbers are for.
+
+    Attributes
+    ----------
+    gyro, accel : Triad
+    form : str
+    horizon : float
+        Time without aiding, s.
+    method : str
+        "bound", "reduce" or "given".
+    sources : tuple of str
+        One line about each recording.
+    outlook : dict
+        Quantity -> horizon in s -> N and K for it.
+    remarks : tuple of str
+        What the numbers leave out.
+    """
+
+    gyro: Triad
+    accel: Triad
+    form: str
+    horizon: float
+    method: str
+    sources: tuple[str, ...] = ()
+    outlook: Mapping[str, Mapping[float, tuple[float, float]]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def triads(self) -> tuple[Triad, Triad]:
+        return self.gyro, self.accel
+
+    @property
+    def rate(self) -> float:
+        """The higher of the two sensors' rates, Hz, at which a common message is sent.
+
+        Raises
+        ------
+        InputError
+            If it is not known.
+        """
+        rate = max(self.gyro.rate, self.accel.rate)
+        if not rate > 0.0:
+            raise InputError(
+                "the numbers hold no sampling rate, which this file needs: export the calibration"
+            )
+        return rate
+
+
+def common_tau(axes: Sequence[Axis]) -> float:
+    """The correlation time to which all can be moved at the least cost to the one it costs most."""
+    known = [axis.tau for axis in axes if axis.tau > 0.0]
+    return float(np.sqrt(min(known) * max(known))) if known else float("nan")
+
+
+def imu_of(
+    given: Sequence[Any], form: str, horizon: float | None, usual: float, shared: bool
+) -> Imu:
+    """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
+
+    Parameters
+    ----------
+    given : sequence of Calibration or SensorNumbers
+        Together they have gyros and accelerometers.
+    form : str
+    horizon : float or None
+        s; by default that of the numbers or, of calibrations, the usual one.
+    usual : float
+    shared : bool
+        Whether the axes of a sensor have one value in the file.
+
+    Raises
+    ------
+    InputError
+        If a sensor is missing or given twice, or numbers are of another form or horizon.
+    """
+    if horizon is not None:
+        horizon = checks.positive("horizon", horizon, "give a positive time in seconds")
+    numbers = [numbers_of(each, form, horizon, usual) for each in given]
+    names = Counter(name for each in numbers for name in each)
+    twice = [name for name, count in names.items() if count > 1]
+    if twice:
+        raise InputError(f"{twice[0]} is given twice: give each sensor once")
+    horizons = sorted({each.horizon for each in numbers})
+    if len(horizons) > 1:
+        times = ", ".join(f"{each:g} s" for each in horizons)
+        raise InputError(f"the numbers are for {times}: give numbers for one horizon")
+    triads = {
+        quantity: _triad(quantity, given, numbers, form, horizons[0], shared)
+        for quantity in SENSORS
+    }
+    return Imu(
+        triads["gyro"], triads["accel"], form, horizons[0],
+        next(iter(numbers[0].values())).method,
+        sources=tuple(map(_source, numbers)),
+        outlook=_outlook(given),
+        remarks=_remarks(numbers),
+    )  # fmt: skip
+
+
+def _triad(
+    quantity: str,
+    given: Sequence[Any],
+    numbers: Sequence[SensorNumbers],
+    form: str,
+    horizon: float,
+    shared: bool,
+) -> Triad:
+    axes: list[Axis] = []
+    common = None
+    for source, each in zip(given, numbers, strict=True):
+        own = each.of(quantity)
+        fits = source.fits if isinstance(source, Calibration) else {}
+        found = [_axis(name, one, each.rate, fits.get(name)) for name, one in own.items()]
+        if found and fits and shared:
+            # The axes are judged by the numbers that the file has.
+            by_name = bound(source, form, horizon=horizon, shared=True).of(quantity)
+            common = next(iter(by_name.values()))
+            found = [replace(axis, nees=dict(by_name[axis.name].nees)) for axis in found]
+        axes += found
+    sensor = SENSORS[quantity]
+    if not axes:
+        raise InputError(
+            f"the file needs gyro and accelerometer, there is no {sensor}: calibrate both, or "
+            "give a second file that has it"
+        )
+    if len(axes) > len(_LETTERS):
+        raise InputError(
+            f"{', '.join(axis.name for axis in axes)} are more than three axes: export one IMU at "
+            "a time"
+        )
+    triad = Triad(quantity, tuple(axes), common)
+    letter = "K" if "K" in form else "N"
+    for key in ("N", letter):
+        if not getattr(triad, key) > 0.0:
+            raise InputError(
+                f"{key} of the {sensor} is zero, by which filters divide: give numbers with one, "
+                "or export the calibration, which knows an upper bound"
+            )
+    return triad
+
+
+def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:
+    """Numbers of a form: those of a calibration, or given ones if they have it.
+
+    Raises
+    ------
+    InputError
+        If they have not.
+    """
+    if isinstance(given, Calibration):
+        return bound(given, form, horizon=usual if horizon is None else horizon)
+    if not isinstance(given, SensorNumbers):
+        raise InputError(
+            f"{checks.shown(given)} has no numbers to export: give a calibration, or what "
+            "gmwm.bound or gmwm.reduce made of one"
+        )
+    if given.form != form:
+        raise InputError(f"the numbers have the form {given.form}, the file holds {form}: make "
+                         f"numbers of that form, or export the calibration")  # fmt: skip
+    if horizon is not None and horizon != given.horizon:
+        raise InputError(
+            f"the numbers are for {given.horizon:g} s: leave the horizon out, or export the "
+            "calibration"
+        )
+    return given
+
+
+def _axis(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) -> Axis:
+    sigma, tau = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
+    axis = Axis(
+        name, numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate
+    )
+    if fitted is None:
+        return axis
+    # A term that the model does not have is given by its upper bound: consumers refuse zeros.
+    if axis.N <= 0.0:
+        axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
+    if "K" in numbers.form and axis.K <= 0.0:
+        return replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
+    if "GM" in numbers.form and not axis.sigma > 0.0:
+        tau = numbers.horizon
+        # The random walk of this K rises at high frequencies as this process does.
+        sigma = random_walk(fitted).value * float(np.sqrt(tau / 2.0))
+        return replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
+    return axis
+
+
+def _outlook(given: Sequence[Any]) -> dict[str, dict[float, tuple[float, float]]]:
+    """N and K for all axes at other horizons, where the models are known."""
+    if not all(isinstance(each, Calibration) for each in given):
+        return {}
+    found: dict[str, dict[float, tuple[float, float]]] = {quantity: {} for quantity in SENSORS}
+    for horizon in tuning.OUTLOOK:
+        numbers = [bound(each, "N+K", horizon=horizon, shared=True) for each in given]
+        for quantity, by_horizon in found.items():
+            own = [one for each in numbers for one in each.of(quantity).values()]
+            by_horizon[horizon] = (max(one.N for one in own), max(one.K for one in own))
+    return found
+
+
+def _remarks(numbers: Sequence[SensorNumbers]) -> tuple[str, ...]:
+    """Each notice once, after the channels that it is about."""
+    places: dict[str, list[str]] = {}
+    for each in numbers:
+        for notice in each.notices:
+            places.setdefault(str(replace(notice, where="")), []).append(notice.where)
+    return tuple(f"{', '.join(where)}: {text}" for text, where in places.items())
+
+
+def _source(numbers: SensorNumbers) -> str:
+    source = numbers.source or "recording"
+    return f"{source}, {numbers.duration:.0f} s static" if numbers.duration > 0.0 else source
+
+
+def _letters(names: Sequence[str]) -> list[str]:
+    """The axis of each channel: the last letter of its name, or its place."""
+    ends = [name[-1:].lower() for name in names]
+    named = set(ends) <= set(_LETTERS) and len(set(ends)) == len(ends)
+    return ends if named else list(_LETTERS[: len(names)])

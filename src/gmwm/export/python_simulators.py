@@ -1,0 +1,72 @@
+"""Python packages: pyins and gnss-ins-sim.
+
+``pyins/inertial_sensor.py``, ``EstimationModel.__init__`` and ``Parameters.apply``: ``noise`` and
+``bias_walk`` are root densities; a walk needs a positive ``bias_sd``.
+
+``gnss_ins_sim/pathgen/pathgen.py``, ``bias_drift``: b' = (1 - dt/tau) b + sd sqrt(1 - exp(-2
+dt/tau)) n from zero; white samples without a finite correlation time. Units in
+``gnss_ins_sim/sim/imu_model.py``, ``IMU.__init__``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import sqrt
+
+from gmwm._core.units import factor
+from gmwm.export.imu import Axis, Imu, Triad
+from gmwm.export.target import Target
+
+
+def _three(triad: Triad, value: Callable[[Axis], float]) -> str:
+    return f"[{', '.join(f'{value(axis):.6e}' for axis in triad.xyz())}]"
+
+
+def _pyins(imu: Imu) -> list[str]:
+    def start(axis: Axis) -> float:
+        # As far as it walks within the horizon where nothing is known of the start.
+        return axis.initial_sd or axis.K * sqrt(imu.horizon)
+
+    lines = ["from pyins.inertial_sensor import EstimationModel", ""]
+    for name, triad in (("gyro_model", imu.gyro), ("accel_model", imu.accel)):
+        lines += [
+            f"{name} = EstimationModel(",
+            f"    noise={_three(triad, lambda axis: axis.N)},",
+            f"    bias_walk={_three(triad, lambda axis: axis.K)},",
+            f"    bias_sd={_three(triad, start)},  # add the bias at switch-on",
+            ")",
+        ]
+    return lines
+
+
+def _gnss_ins_sim(imu: Imu) -> list[str]:
+    per_root_hour, per_hour = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s")
+    gyro, accel = imu.triads
+    rows = (
+        ("gyro_b", "[0.0, 0.0, 0.0]", "deg/h"),
+        ("gyro_arw", _three(gyro, lambda axis: axis.N / per_root_hour), "deg/sqrt(h)"),
+        ("gyro_b_stability", _three(gyro, lambda axis: axis.sigma / per_hour), "deg/h"),
+        ("gyro_b_corr", _three(gyro, lambda axis: axis.tau), "s"),
+        ("accel_b", "[0.0, 0.0, 0.0]", "m/s^2"),
+        ("accel_vrw", _three(accel, lambda axis: 60.0 * axis.N), "m/s/sqrt(h)"),
+        ("accel_b_stability", _three(accel, lambda axis: axis.sigma), "m/s^2"),
+        ("accel_b_corr", _three(accel, lambda axis: axis.tau), "s"),
+    )
+    lines = [f'    "{key}": np.array({value}),  # {unit}' for key, value, unit in rows]
+    return ["import numpy as np", "", "imu_err = {", *lines, "}"]
+
+
+PYTHON_SIMULATORS = (
+    Target(
+        "pyins", "pyins", "estimation models of the inertial sensors",
+        "N and K of each axis, continuous time; a walk counts only where bias_sd is positive",
+        "pyins/inertial_sensor.py: EstimationModel.__init__, Parameters.apply", _pyins,
+    ),
+    Target(
+        "gnss-ins-sim", "gnss-ins-sim", "the IMU's error model",
+        "N, sigma and tau of each axis; its process starts at zero, and without a correlation "
+        "time it is white",
+        "gnss_ins_sim/pathgen/pathgen.py: bias_drift; gnss_ins_sim/sim/imu_model.py: IMU.__init__",
+        _gnss_ins_sim, form="N+GM",
+    ),
+)  # fmt: skip

@@ -1,0 +1,231 @@
+"""Matrices of the full model of every channel, continuous and discrete, as JSON or NPZ.
+
+Discrete: x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k] with covariances Q of w and R of v.
+Continuous: dx/dt = F x + G w, y = H x + v with spectral densities Q and R.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag, expm, logm
+
+from gmwm._core import checks
+from gmwm._core.files import moved_into_place
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.export.imu import numbers_of
+from gmwm.export.target import Target
+from gmwm.filter_numbers import FORMS, SensorNumbers
+from gmwm.process import Model, Process, StateSpace
+
+Matrices = dict[str, FloatArray]
+"""F, G, H, Q, R, mean x0 and covariance P0 of the start."""
+
+
+class StateSpaceTarget(Target):
+    """Needs one sensor at least, holds any model; a form makes the numbers of that form."""
+
+    def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
+        channels = self._channels(given, horizon, form)
+        content = {
+            "comment": [f"{self.title}: {self.convention}", *self.warnings],
+            "channels": {name: _plain(each) for name, each in channels.items()},
+        }
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        given: Sequence[Any],
+        horizon: float | None,
+        form: str | None,
+    ) -> str:
+        if Path(path).suffix != ".npz":
+            return super().save(path, given, horizon, form)
+        text = self.export(given, horizon, form)
+        arrays: dict[str, Any] = {}
+        for name, each in self._channels(given, horizon, form).items():
+            arrays[f"{name}/dt"] = each["dt"]
+            arrays[f"{name}/states"] = np.array(each["states"], dtype=np.str_)
+            for kind in ("discrete", "continuous"):
+                for key, value in (each[kind] or {}).items():
+                    arrays[f"{name}/{kind}/{key}"] = value
+        with moved_into_place(path) as temporary, open(temporary, "wb") as stream:
+            np.savez(stream, **arrays)
+        return text
+
+    def _channels(
+        self, given: Sequence[Any], horizon: float | None, form: str | None
+    ) -> dict[str, dict[str, Any]]:
+        if form is not None:
+            checks.choice("form", form, FORMS)
+        found: dict[str, dict[str, Any]] = {}
+        for each in given:
+            for name, (model, dt, quantity, initial_sd) in self._models(each, horizon, form).items():
+                if name in found:
+                    raise InputError(f"{name} is given twice: give each sensor once")
+                try:
+                    found[name] = channel(model, dt, quantity, initial_sd)
+                except InputError as error:
+                    raise InputError(f"{name}: {error}") from None
+        return found
+
+    def _models(
+        self, given: Any, horizon: float | None, form: str | None
+    ) -> dict[str, tuple[Model, float, str, float]]:
+        """Model, sampling interval, quantity and standard deviation at the start by channel."""
+        if isinstance(given, Calibration) and form is None:
+            if horizon is not None:
+                raise InputError(
+                    "the full model has no horizon: leave the horizon out, or give a form too"
+                )
+            return {
+                name: (fit.model, fit.wv.dt, fit.wv.quantity or "", 0.0)
+                for name, fit in given.items()
+            }
+        if form is None and isinstance(given, SensorNumbers):
+            form = given.form
+        numbers = numbers_of(given, form or "", horizon, self.horizon)
+        if not numbers.rate > 0.0:
+            raise InputError(
+                "the numbers hold no sampling rate, which this file needs: export the calibration"
+            )
+        return {
+            name: (one.model, 1.0 / numbers.rate, one.quantity, one.initial_sd)
+            for name, one in numbers.items()
+        }
+
+
+def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> dict[str, Any]:
+    """Matrices of one channel.
+
+    Parameters
+    ----------
+    model : Model
+        With given parameters.
+    dt : float
+        Sampling interval, s.
+    quantity : str
+    initial_sd : float, optional
+        Standard deviation at the start of a random walk, u.
+
+    Returns
+    -------
+    dict
+        ``continuous`` is ``None`` where a term is defined for samples only.
+
+    Raises
+    ------
+    InputError
+        If a term has no state space.
+    """
+    parts = [term.state_space(dt) for term in model.terms]
+    starts = [
+        part.initial_covariance + (initial_sd**2 if term.is_walk else 0.0)
+        for term, part in zip(model.terms, parts, strict=True)
+    ]
+    whole = StateSpace.stack(parts)
+    common: Matrices = {
+        "H": whole.output[None, :],
+        "x0": whole.initial_mean,
+        "P0": _diagonal(starts),
+    }
+    discrete = {
+        **_driven(whole.transition, whole.process_noise),
+        **common,
+        "R": np.array([[whole.measurement_noise]]),
+    }
+    pairs = [continuous(term, part, dt) for term, part in zip(model.terms, parts, strict=True)]
+    rates: Matrices | None = None
+    known = [pair for pair in pairs if pair is not None]
+    if len(known) == len(pairs):
+        drift, density = (_diagonal([pair[i] for pair in known]) for i in (0, 1))
+        rates = {
+            **_driven(drift, density),
+            **common,
+            "R": np.array([[model.white_density()]]),
+        }
+    return {
+        "unit": SI_UNIT.get(quantity, "u"),
+        "model": repr(model),
+        "dt": dt,
+        "states": list(whole.names),
+        "approximate": not all(term.has_finite_state_space for term in model.terms),
+        "discrete": discrete,
+        "continuous": rates,
+    }
+
+
+def continuous(
+    term: Process, part: StateSpace, dt: float
+) -> tuple[FloatArray, FloatArray] | None:
+    """F and G Q G' in continuous time that give a term's samples, if there are any.
+
+    F = log(transition)/dt, and Q solves transition noise = integral of exp(F s) Q exp(F' s) over
+    a step, linear in Q: vec(noise) = integral of exp((F + F) s) ds vec(Q) with the Kronecker sum
+    (Van Loan 1978, *IEEE Trans. Autom. Control* 23(3), 395-404).
+    """
+    p = part.n_states
+    if p == 0:
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    roots = np.linalg.eigvals(part.transition)
+    if np.any((roots.real <= 0.0) & (np.abs(roots.imag) < 1e-12)):
+        return None  # a difference or an alternating sequence: it lives on samples
+    drift = np.real(logm(part.transition)) / dt
+    total = np.kron(drift, np.eye(p)) + np.kron(np.eye(p), drift)
+    block = np.block([[total, np.eye(p * p)], [np.zeros((p * p, 2 * p * p))]])
+    integral = expm(block * dt)[: p * p, p * p :]
+    density = np.linalg.solve(integral, part.process_noise.ravel()).reshape(p, p)
+    density = 0.5 * (density + density.T)
+    scale = float(np.max(np.abs(density)))
+    lowest = float(np.linalg.eigvalsh(density)[0])
+    if lowest < -1e-6 * scale:
+        return None
+    # Rounding leaves traces where nothing drives.
+    return drift, np.where(np.abs(density) < 1e-9 * scale, 0.0, density)
+
+
+def _driven(transition: FloatArray, noise: FloatArray) -> Matrices:
+    """F, and the noise of those states only that have some."""
+    driven = np.diag(noise) > 0.0
+    return {
+        "F": transition,
+        "G": np.eye(len(noise))[:, driven],
+        "Q": noise[np.ix_(driven, driven)],
+    }
+
+
+def _diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
+    kept = [block for block in blocks if block.size]
+    return np.asarray(block_diag(*kept)) if kept else np.zeros((0, 0))
+
+
+def _plain(each: dict[str, Any]) -> dict[str, Any]:
+    def lists(matrices: Matrices | None) -> dict[str, Any] | None:
+        if matrices is None:
+            return None
+        return {key: value.tolist() for key, value in matrices.items()}
+
+    return {
+        **each,
+        "discrete": lists(each["discrete"]),
+        "continuous": lists(each["continuous"]),
+    }
+
+
+STATE_SPACE = StateSpaceTarget(
+    "state-space", "state space", "matrices by channel, JSON or NPZ",
+    "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
+    "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance P0; "
+    "SI units",
+    "this file", list, form="full model",
+    warnings=("the bias at switch-on is in no static recording: add its variance to P0",),
+)  # fmt: skip

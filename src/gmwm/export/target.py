@@ -1,0 +1,97 @@
+"""A consumer of the numbers, and how its file is put together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from gmwm._core import checks
+from gmwm._core.files import written
+from gmwm.errors import InputError
+from gmwm.export import tuning
+from gmwm.export.comments import about, comment
+from gmwm.export.imu import Imu, imu_of
+from gmwm.filter_numbers import FORMS
+
+
+@dataclass(frozen=True)
+class Target:
+    """A file that some program reads.
+
+    Attributes
+    ----------
+    name : str
+        As users write it.
+    title : str
+        The program.
+    file : str
+        The file, or the place in it, where the numbers go.
+    convention : str
+        What the values are, in N, K, sigma, tau and the rate f of the samples.
+    source : str
+        Where the program's own source, or its manual, defines that.
+    body : callable
+        Lines below the comments, of an `Imu`; of files in JSON, the object.
+    form : str
+        The form of the numbers that it holds.
+    horizon : float
+        Time without aiding unless another is given, s.
+    mark : str
+        What a comment begins with.
+    shared : bool
+        Whether the axes of a sensor have one value.
+    head : tuple of str
+        Lines that must stand first.
+    warnings : tuple of str
+        What to know before use.
+    """
+
+    name: str
+    title: str
+    file: str
+    convention: str
+    source: str
+    body: Callable[[Imu], Any]
+    form: str = "N+K"
+    horizon: float = tuning.HORIZON
+    mark: str = "#"
+    shared: bool = False
+    head: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def comments(self, imu: Imu) -> list[str]:
+        """Lines of comment, without the mark."""
+        lines = about(imu, f"{self.title}, {self.file}", f"{self.convention} ({self.source})")
+        return [*lines, *self.warnings]
+
+    def text(self, imu: Imu) -> str:
+        """The whole file."""
+        comments = comment(self.comments(imu), self.mark)
+        return "\n".join([*self.head, *comments, *self.body(imu)]) + "\n"
+
+    def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
+        """The file of calibrations or of numbers.
+
+        Raises
+        ------
+        InputError
+            If they do not hold what it needs.
+        """
+        if form is not None and checks.choice("form", form, FORMS) != self.form:
+            raise InputError(f"form {form}: {self.title} holds {self.form} only")
+        return self.text(imu_of(given, self.form, horizon, self.horizon, self.shared))
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        given: Sequence[Any],
+        horizon: float | None,
+        form: str | None,
+    ) -> str:
+        """Write the file whole or not at all; returns its text."""
+        text = self.export(given, horizon, form)
+        with written(path) as stream:
+            stream.write(text)
+        return text

@@ -1,0 +1,13 @@
+"""Constants of exported files, each with its reason."""
+
+HORIZON = 60.0
+"""s without aiding: a tunnel or an underpass for an INS/GNSS filter."""
+
+KEYFRAME = 1.0
+"""s between the keyframes or scans that visual and lidar odometry relate to each other."""
+
+OUTLOOK = (10.0, 60.0, 600.0)
+"""s: horizons that comments compare."""
+
+EKF2_INTERVAL = 0.01
+"""s, the update interval of PX4's EKF2: its parameter EKF2_PREDICT_US is 10000 by default."""
