@@ -27,6 +27,7 @@ from .estimate import (
 from .filter_numbers import (
     FilterNumbers as FilterNumbers,
     SensorNumbers as SensorNumbers,
+    bound as bound,
 )
 from .process import (
     AR as AR,
