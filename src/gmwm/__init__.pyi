@@ -28,6 +28,7 @@ from .export import export as export
 from .filter_numbers import (
     FilterNumbers as FilterNumbers,
     SensorNumbers as SensorNumbers,
+    bound as bound,
 )
 from .process import (
     AR as AR,

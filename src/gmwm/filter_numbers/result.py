@@ -296,8 +296,11 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
                 "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
                 "predicted over true standard deviation then."
             )]  # fmt: skip
+        places: dict[str, list[str]] = {}
         for notice in self.notices:
-            lines += wrapped(str(notice), first="- ", indent=2)
+            places.setdefault(str(replace(notice, where="")), []).append(notice.where)
+        for text, names_of in places.items():
+            lines += wrapped(f"{', '.join(names_of)}: {text}", first="- ", indent=2)
         return "\n".join(lines)
 
     def to_frame(self) -> pandas.DataFrame:

@@ -1,0 +1,143 @@
+"""The axes that filter numbers are made of, from a model, a fit or a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from gmwm._core import checks
+from gmwm._core.units import SI_UNIT
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
+from gmwm.process import Model, Process, as_model
+
+One = Process | Model | Fit
+Several = Calibration | Mapping[str, Process | Model] | Mapping[str, Fit]
+Sd = float | Mapping[str, float]
+"""For every axis, or by the name of an axis or its kind (gyro, accel)."""
+
+DT = 0.01
+"""s, sampling interval of models that are not fitted; slow terms and horizons are far above it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of a sensor.
+
+    Attributes
+    ----------
+    name : str
+        Of the channel; empty if there is none.
+    model : Model
+        With given parameters.
+    dt : float
+        Sampling interval, s.
+    quantity : {"gyro", "accel", ""}
+    bias_sd : float
+        Of a constant bias, u.
+    fit : Fit or None
+        Where the model is from.
+    """
+
+    name: str
+    model: Model
+    dt: float
+    quantity: str
+    bias_sd: float
+    fit: Fit | None
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """Axes, and where they are from.
+
+    Attributes
+    ----------
+    axes : tuple of Axis
+    source : str
+    rate, duration : float
+        Hz and s; NaN if they are not known.
+    single : bool
+        Whether one axis was given, not a mapping.
+    """
+
+    axes: tuple[Axis, ...]
+    source: str
+    rate: float
+    duration: float
+    single: bool
+
+    @classmethod
+    def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> Axes:
+        """Axes of a model, a fit, a calibration or a mapping.
+
+        Raises
+        ------
+        InputError
+            If the source is something else, or a parameter is open.
+        """
+        if isinstance(source, Process | Model | Fit):
+            name = (source.wv.name or "") if isinstance(source, Fit) else ""
+            axis = _axis(name, source, dt, bias_sd)
+            duration = source.wv.n_all * axis.dt if isinstance(source, Fit) else float("nan")
+            return cls((axis,), "", 1.0 / axis.dt, duration, True)
+        if isinstance(source, Mapping) and len(source) > 0:
+            axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
+            if isinstance(source, Calibration):
+                return cls(axes, source.source, source.rate, source.duration, False)
+            return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
+        raise InputError(
+            f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, or "
+            "models by channel name"
+        )
+
+    @property
+    def groups(self) -> tuple[tuple[Axis, ...], ...]:
+        """The axes of each quantity."""
+        kinds = dict.fromkeys(axis.quantity for axis in self.axes)
+        return tuple(tuple(a for a in self.axes if a.quantity == kind) for kind in kinds)
+
+    def numbers(
+        self, found: Callable[[tuple[Axis, ...]], list[FilterNumbers]], shared: bool
+    ) -> FilterNumbers | SensorNumbers:
+        """The result, from a function that gives axes that share their numbers their results."""
+        groups = self.groups if shared else tuple((axis,) for axis in self.axes)
+        pairs = [
+            (axis.name, each)
+            for group in groups
+            for axis, each in zip(group, found(group), strict=True)
+        ]
+        if self.single:
+            return pairs[0][1]
+        by_name = dict(pairs)
+        ordered = {axis.name: by_name[axis.name] for axis in self.axes}
+        return SensorNumbers(ordered, self.source, self.rate, self.duration, shared)
+
+
+def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> Axis:
+    fit = item if isinstance(item, Fit) else None
+    if not isinstance(item, Process | Model | Fit):
+        raise InputError(f"{name}: {checks.shown(item)} is not an error model")
+    model = item.model if isinstance(item, Fit) else as_model(item)
+    if model.is_open:
+        missing = [key for key, value in model.params.items() if value is None]
+        raise InputError(
+            f"{name or 'the model'} has free parameters ({', '.join(missing)}): give them a "
+            "value, or estimate them with gmwm.fit"
+        )
+    if fit is not None:
+        step, quantity = fit.wv.dt, fit.wv.quantity or ""
+    else:
+        step = checks.sampling_interval(DT if dt is None else dt)
+        quantity = name.partition("_")[0]
+    quantity = quantity if quantity in SI_UNIT else ""
+    return Axis(name, model, step, quantity, _sd(name, quantity, bias_sd), fit)
+
+
+def _sd(name: str, quantity: str, given: Sd) -> float:
+    value = given.get(name, given.get(quantity, 0.0)) if isinstance(given, Mapping) else given
+    if not checks.is_number(value) or value < 0.0:
+        raise InputError(f"bias_sd = {checks.shown(value)}: give a number, zero or more")
+    return float(value)

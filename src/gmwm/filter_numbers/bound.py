@@ -1,0 +1,178 @@
+"""Numbers with which a small filter is never too optimistic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.notices import Notice
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.dominance import KINDS, Problem, dominating
+from gmwm.filter_numbers.region import region_envelope
+from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
+from gmwm.filter_numbers.target import Target
+from gmwm.process import Model
+
+
+@overload
+def bound(
+    source: One,
+    form: str = ...,
+    horizon: float = ...,
+    *,
+    level: float | None = ...,
+    bias_sd: Sd = ...,
+    dt: float | None = ...,
+) -> FilterNumbers: ...
+@overload
+def bound(
+    source: Several,
+    form: str = ...,
+    horizon: float = ...,
+    *,
+    level: float | None = ...,
+    bias_sd: Sd = ...,
+    shared: bool = ...,
+    dt: float | None = ...,
+) -> SensorNumbers: ...
+def bound(
+    source: One | Several,
+    form: str = "N+K",
+    horizon: float = 60.0,
+    *,
+    level: float | None = None,
+    bias_sd: Sd = 0.0,
+    shared: bool = False,
+    dt: float | None = None,
+) -> FilterNumbers | SensorNumbers:
+    """The smallest numbers of a form with which a linear filter is never too optimistic.
+
+    Parameters
+    ----------
+    source : Process, Model, Fit, Calibration or mapping
+        The error model of an axis, or of several by channel name.
+    form : {"N+K", "N+GM", "N+K+GM"}
+        White noise with a random walk, a Gauss-Markov process, or both.
+    horizon : float, optional
+        Time without aiding for which they are to be small, s. For relative poses, the interval of
+        keyframes. They dominate at any time.
+    level : float, optional
+        Of the confidence region of a fit, e.g. 0.95, all of which is dominated. By default the
+        estimate is, and the uncertainty of its parameters is not covered.
+    bias_sd : float or mapping, optional
+        Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind
+        ("gyro", "accel") if a mapping.
+    shared : bool, optional
+        Whether axes of a kind have the same numbers.
+    dt : float, optional
+        Sampling interval of models that are not fitted, s; 0.01 s by default.
+
+    Returns
+    -------
+    FilterNumbers or SensorNumbers
+        Of one axis, or by channel.
+
+    Raises
+    ------
+    InputError
+        If a parameter is open, a term is known by simulation only, the form cannot dominate the
+        model, or ``level`` is given without a fit.
+
+    Notes
+    -----
+    S_b(f) >= S(f) at every frequency f > 0, with the limits K_b >= K and N_b >= N; among those, the
+    mean of AVAR_b(t)/AVAR(t) over t from a tenth of the horizon to the horizon is least. The
+    covariance of the believed error is then at least that of the true one, and so is that of what
+    any linear filter makes of it. That is a theorem for N+GM, stationary; with K it also takes the
+    start of the walk, whose variance is ``bias_sd^2`` and twice that of the slow terms, as measured
+    on many models (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not
+    in the model. Quantization noise and resonances above ten over the horizon count by their
+    density at low frequencies, lines not at all, and a ramp R is a constant of standard deviation
+    ``|R| horizon``; notices report them.
+    """
+    checks.choice("form", form, list(KINDS))
+    horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
+    axes = Axes.of(source, dt, bias_sd)
+    for axis in axes.axes:
+        if 2.0 * axis.dt > horizon:
+            raise InputError(
+                f"horizon = {horizon:g} s: give two sampling intervals or more, {2.0 * axis.dt:g} s"
+            )
+        if level is not None and axis.fit is None:
+            raise InputError("level is that of a fit: a model has no confidence region")
+    if level is not None:
+        level = checks.share("level", level, 0.95)
+
+    def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
+        return _bounded(group, form, horizon, level)
+
+    return axes.numbers(found, shared)
+
+
+def _bounded(
+    group: Sequence[Axis], form: str, horizon: float, level: float | None
+) -> list[FilterNumbers]:
+    targets = tuple(Target.of(axis.model, axis.dt, horizon) for axis in group)
+    envelope = None
+    if level is not None:
+        envelope = region_envelope([(t, axis.fit) for t, axis in zip(targets, group, strict=True)
+                                    if axis.fit is not None], level)  # fmt: skip
+    model = dominating(Problem(targets, horizon, envelope), form)
+    starts = [_start(axis, target, model) for axis, target in zip(group, targets, strict=True)]
+    sd = max(starts)
+    return [
+        FilterNumbers(
+            form=form,
+            model=model,
+            horizon=horizon,
+            initial_sd=sd,
+            method="bound",
+            predicted=predicted(axis, model, sd, horizon),
+            notices=(*target.notices, *uncertainty(axis, level)),
+            quantity=axis.quantity,
+        )
+        for axis, target in zip(group, targets, strict=True)
+    ]
+
+
+def _start(axis: Axis, target: Target, model: Model) -> float:
+    """Standard deviation of the walk at the start, or of a constant where there is no walk."""
+    variance = axis.bias_sd**2 + target.constant_sd**2
+    stationary = [term for term in model.terms if not term.is_walk]
+    if len(stationary) < len(model.terms):
+        variance += tuning.INITIAL_SHARE * target.slow_variance(Model(tuple(stationary)))
+    return float(np.sqrt(variance))
+
+
+def predicted(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Predicted, ...]:
+    """What a filter with these numbers knows of its error at one and ten horizons."""
+    times = (horizon, 10.0 * horizon)
+    try:
+        errors = Chain.usual(axis.quantity).errors(
+            axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
+        )
+    except InputError:
+        nan = float("nan")
+        return tuple(Predicted(time, nan, nan) for time in times)
+    rows = zip(times, errors.nees(), errors.tightness(), strict=True)
+    return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
+
+
+def uncertainty(axis: Axis, level: float | None) -> tuple[Notice, ...]:
+    """What there is to know of the fit that numbers are made from."""
+    if axis.fit is None:
+        return ()
+    found = []
+    if not axis.fit.valid:
+        text = "the fit is not valid, nor are numbers from it"
+        found.append(Notice("fit-not-valid", "warning", "", text, {}, "read its notices first"))
+    if level is None:
+        text = "the uncertainty of the fitted parameters is not covered"
+        found.append(Notice("uncertainty-not-covered", "note", "", text))
+    return tuple(found)

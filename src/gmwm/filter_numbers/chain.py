@@ -1,0 +1,233 @@
+"""A filter of one axis: a chain of integrators that is aided, then not, by covariance analysis.
+
+The error of a sensor is integrated once (heading), twice (velocity, position) or three times (tilt,
+velocity, position). A filter with given numbers estimates it from fixes of the last integral, and
+goes on without them. Transitions and noise over any number of samples are those of the sampled
+processes, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+from scipy.linalg import block_diag, eigh
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.process import Model, StateSpace
+
+
+@dataclass(frozen=True, eq=False)
+class ChainErrors:
+    """Errors of the integrals at T times.
+
+    Attributes
+    ----------
+    time : (T,) ndarray
+        Since the last fix, s.
+    predicted, actual : (T, n, n) ndarray
+        Covariance of the errors of the n integrals, the filter's own and the true one.
+    """
+
+    time: FloatArray
+    predicted: FloatArray
+    actual: FloatArray
+
+    def nees(self) -> FloatArray:
+        """Expected normalised error squared per degree of freedom, (T,)."""
+        ratio = np.linalg.solve(self.predicted, self.actual)
+        return np.asarray(np.trace(ratio, axis1=1, axis2=2) / self.predicted.shape[1])
+
+    def worst(self) -> FloatArray:
+        """Largest eigenvalue of P_predicted^-1 P_actual: the worst direction, (T,)."""
+        pairs = zip(self.actual, self.predicted, strict=True)
+        return np.array([eigh(a, p, eigvals_only=True)[-1] for a, p in pairs])
+
+    def tightness(self) -> FloatArray:
+        """Predicted over true standard deviation of the last integral, (T,)."""
+        return np.sqrt(self.predicted[:, -1, -1] / self.actual[:, -1, -1])
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What is integrated, and how it is aided.
+
+    Attributes
+    ----------
+    order : int
+        Number n of integrals.
+    fix_sd : float
+        Of a fix of the last integral, in its unit.
+    settled : float
+        Time with fixes before they end, s; zero for none.
+    interval : float
+        Between fixes, s.
+    initial_sd : tuple of float
+        Of the integrals at the start.
+    """
+
+    order: int
+    fix_sd: float
+    settled: float = tuning.SETTLING
+    interval: float = tuning.FIX_INTERVAL
+    initial_sd: tuple[float, ...] = tuning.INITIAL_SD
+
+    @classmethod
+    def usual(cls, quantity: str) -> Chain:
+        """That of a gyro, an accelerometer or an unknown axis."""
+        return cls(tuning.ORDER[quantity], tuning.FIX_SD[quantity])
+
+    def errors(
+        self,
+        truth: Model,
+        believed: Model,
+        dt: float,
+        times: Sequence[float],
+        *,
+        true_sd: float = 0.0,
+        believed_sd: float = 0.0,
+        every_fix: bool = False,
+    ) -> ChainErrors:
+        """Predicted and true errors of the integrals after some times without aiding.
+
+        Parameters
+        ----------
+        truth, believed : Model
+            Of the sensor, and in the filter.
+        dt : float
+            Sampling interval, s.
+        times : sequence of float
+            Rising, s.
+        true_sd, believed_sd : float
+            Standard deviation of a constant bias, or of the start of a walk.
+        every_fix : bool
+            Whether the errors after every fix come first, with negative times.
+
+        Raises
+        ------
+        InputError
+            If a term has no state-space form.
+        """
+        real, own = _with_constant(truth, true_sd, dt), _with_constant(believed, believed_sd, dt)
+        n, q = self.order, own.n_states
+        start = np.diag(np.square(self.initial_sd[:n]))
+        P = block_diag(start, _moments(own))
+        J = block_diag(start, np.zeros((q, q)), _moments(real))
+        kept: list[tuple[float, FloatArray, FloatArray]] = []
+
+        def keep(time: float) -> None:
+            kept.append((time, P[:n, :n].copy(), J[:n, :n].copy()))
+
+        step = _Step.of(real, own, dt, n, self.interval)
+        fixes = int(self.settled / self.interval)
+        for fix in range(fixes):
+            P, J = step.over(P, J)
+            P, J = _updated(P, J, n, q, self.fix_sd)
+            if every_fix and fix < fixes - 1:
+                keep((fix + 1 - fixes) * self.interval)
+        before = 0.0
+        for time in times:
+            P, J = _Step.of(real, own, dt, n, time - before).over(P, J)
+            before = time
+            keep(time)
+        time, predicted, actual = (np.array(each) for each in zip(*kept, strict=True))
+        return ChainErrors(time, predicted, actual)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Some samples of the filter's errors (integrals, bias), and of the joint vector.
+
+    The joint vector holds the errors of the integrals, the filter's estimates of its states, and
+    the true states.
+    """
+
+    filter: tuple[FloatArray, FloatArray]
+    joint: tuple[FloatArray, FloatArray]
+
+    @classmethod
+    def of(cls, real: StateSpace, own: StateSpace, dt: float, n: int, duration: float) -> _Step:
+        samples = max(round(duration / dt), 0)
+        true_M, true_Q = _power(*_integrated(real, dt, n), samples)
+        own_M, own_Q = _power(*_integrated(own, dt, n), samples)
+        q, p = own.n_states, real.n_states
+        M, Q = np.zeros((n + q + p, n + q + p)), np.zeros((n + q + p, n + q + p))
+        where = np.r_[:n, n + q : n + q + p]
+        M[np.ix_(where, where)], Q[np.ix_(where, where)] = true_M, true_Q
+        M[:n, n : n + q] = -own_M[:n, n:]
+        M[n : n + q, n : n + q] = own_M[n:, n:]
+        return cls((own_M, own_Q), (M, Q))
+
+    def over(self, P: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
+        (A, Q), (B, R) = self.filter, self.joint
+        return A @ P @ A.T + Q, B @ J @ B.T + R
+
+
+def _updated(
+    P: FloatArray, J: FloatArray, n: int, q: int, sd: float
+) -> tuple[FloatArray, FloatArray]:
+    """After a fix of the last integral."""
+    gain = P[:, n - 1] / (P[n - 1, n - 1] + sd**2)
+    own = np.eye(len(P))
+    own[:, n - 1] -= gain
+    both = np.eye(len(J))
+    # Feedback: the integrals are corrected, and the estimates take what their errors lose.
+    added = np.concatenate([-gain[:n], gain[n:], np.zeros(len(J) - n - q)])
+    both[:, n - 1] += added
+    return (
+        own @ P @ own.T + sd**2 * np.outer(gain, gain),
+        both @ J @ both.T + sd**2 * np.outer(added, added),
+    )
+
+
+def _with_constant(model: Model, sd: float, dt: float) -> StateSpace:
+    """State-space form of a model and of a constant, which is the start of a walk if it has one."""
+    forms = []
+    variance = sd**2
+    for term in model.terms:
+        if not term.has_spectrum():
+            raise InputError(f"{type(term).__name__} is known by simulation only")
+        form = term.state_space(dt)
+        if term.is_walk and variance > 0.0:
+            form = StateSpace.scalar("walk", 1.0, float(form.process_noise[0, 0]), variance)
+            variance = 0.0
+        forms.append(form)
+    if variance > 0.0:
+        forms.append(StateSpace.scalar("constant", 1.0, 0.0, variance))
+    return StateSpace.stack(forms)
+
+
+def _moments(form: StateSpace) -> FloatArray:
+    """Second moments at the start: a mean that the filter does not know counts as error."""
+    return form.initial_covariance + np.outer(form.initial_mean, form.initial_mean)
+
+
+def _integrated(form: StateSpace, dt: float, n: int) -> tuple[FloatArray, FloatArray]:
+    """Transition and noise of n integrals and the states over one sample."""
+    size = n + form.n_states
+    lag = np.subtract.outer(np.arange(n), np.arange(n))
+    powers = np.array([dt**k / factorial(k) for k in range(n + 1)])
+    M, Q = np.zeros((size, size)), np.zeros((size, size))
+    M[:n, :n] = np.where(lag >= 0, powers[np.maximum(lag, 0)], 0.0)
+    M[:n, n:] = np.outer(powers[1:], form.output)
+    M[n:, n:] = form.transition
+    Q[:n, :n] = form.measurement_noise * np.outer(powers[1:], powers[1:])
+    Q[n:, n:] = form.process_noise
+    return M, Q
+
+
+def _power(M: FloatArray, Q: FloatArray, times: int) -> tuple[FloatArray, FloatArray]:
+    """Transition and noise over several samples, by doubling."""
+    result, noise = np.eye(len(M)), np.zeros_like(Q)
+    while times:
+        if times & 1:
+            noise = M @ noise @ M.T + Q
+            result = M @ result
+        Q = M @ Q @ M.T + Q
+        M = M @ M
+        times >>= 1
+    return result, noise

@@ -1,0 +1,193 @@
+"""The smallest spectrum of a form that lies above a given one at every frequency.
+
+If S_b(f) >= S(f) for all f, the covariance of any linear functional of the error is at most that
+which the larger spectrum predicts: the difference of the two is itself the spectrum of a process.
+So a filter with such numbers is never too optimistic, in any direction, aided or not. Variances
+enter spectra linearly: the smallest mean of AVAR_b/AVAR over the averaging times of interest is a
+linear program, for each correlation time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import linprog, minimize_scalar
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.filter_numbers.target import Target
+from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
+
+KINDS = {"N+K": "NK", "N+GM": "NG", "N+K+GM": "NKG"}
+"""Forms that `dominating` knows, with the kinds of their terms."""
+
+Envelope = Callable[[FloatArray], FloatArray]
+"""Spectral density to dominate at frequencies in Hz, u^2/Hz."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Spectra to dominate by one set of numbers, and how it is judged.
+
+    Attributes
+    ----------
+    targets : tuple of Target
+        Of one axis, or of several that share the numbers.
+    horizon : float
+        s.
+    envelope : callable
+        The largest of the spectra; by default that of the targets.
+    """
+
+    targets: tuple[Target, ...]
+    horizon: float
+    envelope: Envelope | None = None
+    f: FloatArray = field(init=False)
+    need: FloatArray = field(init=False)
+    _averaging: FloatArray = field(init=False)
+    _allan: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        def put(**values: FloatArray) -> None:
+            for name, value in values.items():
+                object.__setattr__(self, name, value)
+
+        put(f=self.frequencies(tuning.POINTS))
+        put(need=self.largest(self.f))
+        times = np.geomspace(0.1 * self.horizon, self.horizon, tuning.AVERAGING_TIMES)
+        put(_averaging=np.unique(np.maximum(np.rint(times / self.dt), 1.0)) * self.dt)
+        put(_allan=np.array([t.allan_variance(self._averaging) for t in self.targets]))
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval, s."""
+        return self.targets[0].dt
+
+    def frequencies(self, points: int) -> FloatArray:
+        """Those of all targets, some a decade; Hz."""
+        return np.unique(np.concatenate([t.frequencies(points) for t in self.targets]))
+
+    def largest(self, f: FloatArray) -> FloatArray:
+        """Largest of the spectra at frequencies (Hz), u^2/Hz."""
+        if self.envelope is not None:
+            return self.envelope(f)
+        return np.max([target.psd(f) for target in self.targets], axis=0)
+
+    def cost(self, process: Process) -> float:
+        """Mean over averaging times and axes of its Allan variance over that of the truth."""
+        variance = 2.0 * process.haar_variance(self._averaging, self.dt)
+        return float(np.mean(variance / self._allan))
+
+
+def dominating(problem: Problem, form: str) -> Model:
+    """The smallest model of a form whose spectrum lies above those of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    form : {"N+K", "N+GM", "N+K+GM"}
+
+    Raises
+    ------
+    InputError
+        If the form cannot dominate: "N+GM" where a spectrum has no limit at zero frequency.
+    """
+    kinds = KINDS[form]
+    if "K" not in kinds and not all(target.is_stationary for target in problem.targets):
+        raise InputError(
+            f"{form} cannot dominate a model that walks off: its spectrum rises without limit "
+            "towards zero frequency; use N+K or N+K+GM"
+        )
+    plain: list[Process] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in kinds)
+    columns = _columns(problem, plain)
+    if "G" not in kinds:
+        return _scaled(problem, plain, _solved(problem, columns)[1])
+
+    def at(log_tau: float) -> tuple[float, list[Process], FloatArray]:
+        processes = [*plain, GaussMarkov(1.0, float(np.exp(log_tau)))]
+        extended = np.column_stack([columns, _columns(problem, processes[-1:])])
+        least, variances = _solved(problem, extended)
+        return least, processes, variances
+
+    grid = _correlation_times(problem)
+    costs = np.array([at(each)[0] for each in grid])
+    # Of several that are as good, the shortest: a slower one would only have a larger variance.
+    best = int(np.argmax(costs <= np.min(costs) * (1.0 + tuning.AS_GOOD)))
+    chosen = float(grid[best])
+    around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
+    found = minimize_scalar(
+        lambda x: at(x)[0], bounds=around, method="bounded", options={"xatol": 1e-3}
+    )
+    if found.fun < costs[best] * (1.0 - tuning.AS_GOOD):
+        chosen = float(found.x)
+    _, processes, variances = at(chosen)
+    return _scaled(problem, processes, variances)
+
+
+def _correlation_times(problem: Problem) -> FloatArray:
+    """Logarithms of those that are tried: a grid, and those of the truth."""
+    high = np.log(1.0 / problem.f[0])
+    low = min(max(np.log(problem.horizon / tuning.SHORTEST_TAU), np.log(problem.dt)), high - 1.0)
+    number = int(np.ceil((high - low) / np.log(10.0) * tuning.TAU_POINTS)) + 1
+    own = [
+        np.log(term.values[p.name] or 1.0)
+        for target in problem.targets
+        for term in target.terms
+        for p in term.shape_parameters
+        if p.unit == "s"
+    ]
+    inside = [each for each in own if low < each < high]
+    return np.unique(np.append(np.linspace(low, high, number), inside))
+
+
+def _columns(problem: Problem, processes: Sequence[Process]) -> FloatArray:
+    """Spectra of processes of unit amplitude over what is needed, per unit of their cost."""
+    return np.column_stack(
+        [p.psd(problem.f, problem.dt) / problem.need / problem.cost(p) for p in processes]
+    )
+
+
+def _solved(problem: Problem, columns: FloatArray) -> tuple[float, FloatArray]:
+    """Least cost, and the share of it that each process has."""
+    rows = columns / np.max(columns, axis=1, keepdims=True)
+    right = 1.0 / np.max(columns, axis=1)
+    least = [0.0] * columns.shape[1]
+    least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.targets)
+    walk = max(target.walk for target in problem.targets)
+    if walk > 0.0:
+        least[1] = problem.cost(RandomWalk(1.0)) * walk
+    found = linprog(
+        np.ones(columns.shape[1]), A_ub=-rows, b_ub=-right,
+        bounds=[(value, None) for value in least], method="highs",
+    )  # fmt: skip
+    if found.x is None:
+        raise InputError(
+            "no numbers of this form dominate the model to the precision of the computer: its "
+            "parameters are too far apart"
+        )
+    # Limits may lie below the tolerance of the program.
+    return float(found.fun), np.maximum(found.x, least)
+
+
+def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) -> Model:
+    """A model from shares of the cost, above the spectrum on a finer grid too."""
+    costs = np.array([problem.cost(process) for process in processes])
+    variances = np.maximum(shares, 0.0) / costs
+
+    def short(f: FloatArray) -> FloatArray:
+        spectra = np.column_stack([p.psd(f, problem.dt) for p in processes])
+        return np.asarray(problem.largest(f) / (spectra @ variances))
+
+    fine = problem.frequencies(tuning.CHECKED_POINTS)
+    ratio = short(fine)
+    most = float(np.max(ratio))
+    # A maximum lies between two of the points.
+    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most):
+        ends = fine[max(place - 1, 0)], fine[min(place + 1, fine.size - 1)]
+        most = max(most, float(np.max(short(np.geomspace(*ends, tuning.REFINED)))))
+    variances = variances * max(most, 1.0) * tuning.SAFETY
+    terms = (p.with_amplitude(float(v)) for p, v in zip(processes, variances, strict=True))
+    return Model(tuple(terms))

@@ -1,0 +1,203 @@
+"""What of an error model the numbers of a small filter dominate, and what they leave out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.process import Model, Process, evaluated
+
+LEFT_OUT = ("fast-peak-left-out", "line-left-out", "ramp-as-constant")
+"""Codes of notices of terms that no random walk or Gauss-Markov process stands for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """The part of an error model that is dominated.
+
+    Attributes
+    ----------
+    terms : tuple of Process
+        Those that count with their whole spectrum.
+    foot : float
+        Low-frequency density of terms that are peaks at high frequencies, u^2/Hz.
+    constant_sd : float
+        Of ramps over the horizon, u.
+    dt, horizon : float
+        Sampling interval and horizon, s.
+    lowest : float
+        Frequency below which nothing changes, Hz.
+    floor : float
+        Frequency above which a spectrum without a limit is bounded in time: that of the horizon.
+    slope : float
+        Of the spectrum against 1/f at the lowest frequency, on logarithmic axes: 0 if it is flat,
+        2 of a random walk.
+    notices : tuple of Notice
+    """
+
+    terms: tuple[Process, ...]
+    foot: float
+    constant_sd: float
+    dt: float
+    horizon: float
+    lowest: float
+    floor: float
+    slope: float
+    notices: tuple[Notice, ...]
+
+    @classmethod
+    def of(cls, model: Model, dt: float, horizon: float) -> Target:
+        """Sort the terms of a model with given parameters.
+
+        Raises
+        ------
+        InputError
+            If a term is known by simulation only, or nothing is left.
+        """
+        nyquist = 0.5 / dt
+        fast = min(tuning.FAST / horizon, 0.25 * nyquist)
+        floor = 1.0 / (tuning.LOWEST * np.pi * max(10.0 * horizon, tuning.SHORTEST_MEMORY))
+        floor = min(floor, 1e-3 * nyquist)
+        band = np.geomspace(floor, nyquist, 400)
+        kept: list[Process] = []
+        notices: list[Notice] = []
+        foot = constant = 0.0
+        for label, term in zip(model.term_labels(), model.terms, strict=True):
+            if not term.has_spectrum():
+                raise InputError(
+                    f"{label} is known by simulation only: give it a spectrum, or leave it out"
+                )
+            if term.is_drift:
+                constant = abs(term.drift_rate()) * horizon
+                notices.append(_ramp(label, term.drift_rate(), constant))
+            elif term.is_line:
+                notices += [_line(label, f, a, fast) for f, a in term.lines()]
+            else:
+                density = evaluated(term.psd, band, dt)
+                high, low = np.max(density[band >= fast]), np.max(density[band < fast])
+                if high > tuning.PEAK * low:
+                    foot += float(density[0]) if density[0] > tuning.NO_FOOT * high else 0.0
+                    notices.append(_peak(label, term, band, density, fast))
+                elif high + low > 0.0:
+                    kept.append(term)
+        lowest, slope = _limit(kept, floor, dt)
+        if slope > tuning.STEEPEST:
+            raise InputError(
+                f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
+                "than that of a random walk: no form dominates it"
+            )
+        target = cls(tuple(kept), foot, constant, dt, horizon, lowest, floor, slope, tuple(notices))
+        if not kept and foot == 0.0:
+            raise InputError(
+                f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
+                "stands for: add the white noise of the sensor"
+            )
+        return target
+
+    @property
+    def is_stationary(self) -> bool:
+        """Whether its spectrum has a limit at zero frequency."""
+        return self.slope < tuning.RISING
+
+    def psd(self, f: FloatArray) -> FloatArray:
+        """Spectral density, u^2/Hz."""
+        return self.foot + sum((term.psd(f, self.dt) for term in self.terms), np.zeros_like(f))
+
+    def allan_variance(self, tau: FloatArray) -> FloatArray:
+        """At averaging times (s), u^2."""
+        curves = (2.0 * term.haar_variance(tau, self.dt) for term in self.terms)
+        return sum(curves, self.foot / tau)
+
+    @property
+    def white(self) -> float:
+        """Density of its white terms and of the feet of peaks, u^2/Hz."""
+        one = np.ones(1)
+        return self.foot + sum(float(term.psd(one, 1.0)[0]) for term in self.terms if term.is_white)
+
+    @property
+    def walk(self) -> float:
+        """K^2 of the walk that its spectrum is in the limit of zero frequency, u^2/s."""
+        if self.slope < 2.0 - tuning.RISING:
+            return 0.0
+        return float((2.0 * np.pi * self.lowest) ** 2 * self.psd(np.array([self.lowest]))[0])
+
+    def frequencies(self, points: int) -> FloatArray:
+        """From the lowest to 1/(2 dt), some a decade, and more where a resonance is (Hz)."""
+        nyquist = 0.5 / self.dt
+        own = [
+            np.linspace(0.9, 1.1, tuning.PEAK_POINTS) * (term.values[p.name] or 0.0)
+            for term in self.terms
+            for p in term.shape_parameters
+            if p.unit == "Hz"
+        ]
+        f = np.concatenate([_grid(self.lowest, nyquist, points), *own])
+        return np.unique(f[(f >= self.lowest) & (f <= nyquist)])
+
+    def slow_variance(self, stationary: Model) -> float:
+        """Variance of what lies above a stationary spectrum and is not a random walk, u^2.
+
+        What has no variance counts from the frequency of the horizon on.
+        """
+        f = self.frequencies(tuning.CHECKED_POINTS)
+        total = self.foot - stationary.psd(f, self.dt)
+        for term in self.terms:
+            if term.is_walk:
+                continue
+            density = term.psd(f, self.dt)
+            rises = density[0] > (1.0 + tuning.RISING) * term.psd(2.0 * f[:1], self.dt)[0]
+            total += np.where(f >= self.floor, density, 0.0) if rises else density
+        return float(2.0 * np.trapezoid(np.maximum(total, 0.0) * f, np.log(f)))
+
+
+def _grid(low: float, high: float, points: int) -> FloatArray:
+    return np.geomspace(low, high, int(np.ceil(np.log10(high / low) * points)) + 1)
+
+
+def _limit(terms: list[Process], start: float, dt: float) -> tuple[float, float]:
+    """Frequency where every spectrum has reached its limit, and the slope there."""
+    if not terms:
+        return start, 0.0
+    f = start * 10.0 ** -np.arange(tuning.DECADES + 1)
+    lowest, steepest = 0, 0.0
+    for term in terms:
+        density = np.maximum(evaluated(term.psd, f, dt), np.finfo(float).tiny)
+        slopes = np.diff(np.log10(density))
+        changes = np.abs(np.diff(slopes, prepend=np.inf))
+        settled = (np.abs(slopes) < tuning.SETTLED) | (changes < tuning.SETTLED)
+        place = int(np.argmax(settled)) if np.any(settled) else slopes.size - 1
+        lowest, steepest = max(lowest, place), max(steepest, float(slopes[place]))
+    return float(f[lowest]), steepest
+
+
+def _ramp(label: str, rate: float, sd: float) -> Notice:
+    text = f"the {label} counts as a constant of standard deviation {sd:.3g}: |R| times the horizon"
+    return Notice(
+        "ramp-as-constant", "note", "", text, {"R": rate, "sd": sd}, "a filter that lasts longer "
+        "needs a state for it"
+    )  # fmt: skip
+
+
+def _line(label: str, frequency: float, amplitude: float, fast: float) -> Notice:
+    slow = frequency < fast
+    text = f"the {label} at {frequency:.4g} Hz, amplitude {amplitude:.3g}, is left out"
+    values = {"frequency": frequency, "amplitude": amplitude}
+    if slow:
+        text += ": it is slow for this horizon, and errors are larger than the numbers say"
+    return Notice("line-left-out", "warning" if slow else "note", "", text, values)
+
+
+def _peak(label: str, term: Process, f: FloatArray, density: FloatArray, fast: float) -> Notice:
+    place = float(f[int(np.argmax(density))])
+    high = f >= fast
+    variance = 2.0 * float(np.trapezoid((density * f)[high], np.log(f[high])))
+    text = (
+        f"the {label} is left out but for its density at low frequencies: it lies above "
+        f"{fast:.3g} Hz and averages out"
+    )
+    values = {"density": float(density[0]), "frequency": place, "variance": variance}
+    return Notice("fast-peak-left-out", "note", "", text, values)

@@ -1,0 +1,100 @@
+"""Constants of filter numbers that change answers, each with its source or its reason."""
+
+# -- dominance ------------------------------------------------------------------------------------
+
+POINTS = 15
+"""Frequencies a decade of the linear program: between them the spectra of a bound and of a truth
+differ by less than 1 %, which the check repairs."""
+
+CHECKED_POINTS = 120
+"""Frequencies a decade of the check, by which a bound is scaled up."""
+
+NEAR, REFINED = 3e-3, 41
+"""Of the largest ratio, within which a maximum is refined, and by how many points."""
+
+LOWEST = 100.0
+"""Times pi and the longest time of a problem, over which lies the lowest frequency: a spectrum is
+flat there to 4 parts in ten thousand."""
+
+SHORTEST_MEMORY = 100.0
+"""s, the least such time."""
+
+DECADES = 14
+"""Below that, in which a spectrum that still rises is followed to its limit."""
+
+SETTLED = 1e-3
+"""Of the slope of a spectrum on logarithmic axes, from one decade to the next: its limit is
+reached."""
+
+RISING = 0.05
+"""Slope at the lowest frequency above which a spectrum has no limit there: it walks off."""
+
+STEEPEST = 2.05
+"""Slope above which no random walk dominates."""
+
+FAST = 10.0
+"""Over the horizon: the frequency above which a peak of a spectrum is gone within the shortest
+averaging time of the objective, a tenth of the horizon."""
+
+PEAK = 2.0
+"""Times the largest density below that frequency, above which a term is such a peak."""
+
+NO_FOOT = 1e-6
+"""Of the density of a peak, below which its foot is none, as that of quantization noise."""
+
+PEAK_POINTS = 401
+"""Frequencies within 10 % of that of a resonance: a damping ratio of 0.001 is resolved."""
+
+AVERAGING_TIMES = 12
+"""Of the objective, from a tenth of the horizon to the horizon."""
+
+TAU_POINTS = 6
+"""Correlation times a decade that are tried before the best is refined."""
+
+SHORTEST_TAU = 600.0
+"""Of the horizon, the shortest correlation time that is tried: it is white noise to the horizon."""
+
+AS_GOOD = 1e-4
+"""Of the objective, below which a difference is none."""
+
+SAFETY = 1.0 + 1e-9
+"""Times every variance of a bound: arithmetic of the linear program."""
+
+INITIAL_SHARE = 2.0
+"""Times the variance of the slow terms, for that of the walk at the start. For one Gauss-Markov
+process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a half-line takes:
+(1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
+(NEES 1.07); see docs/filter-numbers.md."""
+
+# -- confidence regions ---------------------------------------------------------------------------
+
+REGION_DRAWS = 300
+"""Models drawn from a region, from which the searches for the largest densities start."""
+
+REGION_POINTS = 3
+"""Frequencies a decade at which the largest density is searched."""
+
+REGION_SEED = 1
+"""Of those draws: the same region has the same numbers."""
+
+ENVELOPE = 1.02
+"""Times the largest density that was found, for what lies between the points of the search."""
+
+# -- the filter by which numbers are judged -------------------------------------------------------
+
+SETTLING = 120.0
+"""s of aiding before it ends: as long as between the outages of `gmwm.ins.reduce`."""
+
+FIX_INTERVAL = 1.0
+"""s between fixes, as of GNSS."""
+
+FIX_SD = {"gyro": 1.0 / 9.80665, "accel": 1.0, "": 0.01}
+"""Of a fix of the last integral: 1 m of position (per unit of gravity for the tilt of a gyro),
+or 0.01 rad."""
+
+ORDER = {"gyro": 3, "accel": 2, "": 1}
+"""Integrals of the sensor's error: tilt, velocity and position; velocity and position; the first
+where the quantity is not known."""
+
+INITIAL_SD = (0.01, 0.1, 1.0)
+"""Of the integrals at the start, in order."""

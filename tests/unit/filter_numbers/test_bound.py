@@ -1,0 +1,339 @@
+"""Bounds: never too optimistic, no looser than need be, and honest about what they leave out."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from error_models import DT, TRUTHS
+from gmwm import (
+    ARIMA,
+    MA,
+    FilterNumbers,
+    GaussMarkov,
+    InputError,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    Resonance,
+    SensorNumbers,
+    Sinusoid,
+    WhiteNoise,
+)
+from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.region import ParameterRegion
+from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
+
+ONE = TRUTHS["one"]
+WORST = 1.001
+STATIONARY = [name for name in TRUTHS if name not in ("walk", "flicker")]
+FREQUENCIES = np.geomspace(1e-10, 50.0, 3000)
+
+
+def worst_direction(truth, numbers, settled, every_fix=False, dt=DT):
+    """Largest eigenvalue of P_predicted^-1 P_true over chains of one to three integrals."""
+    T = numbers.horizon
+    found = [
+        Chain(order, 1.0, settled).errors(
+            truth, numbers.model, dt, (0.1 * T, T, 10.0 * T), believed_sd=numbers.initial_sd,
+            every_fix=every_fix,
+        ).worst()
+        for order in (1, 2, 3)
+    ]  # fmt: skip
+    return max(each.max() for each in found)
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+@pytest.mark.parametrize("horizon", [1.0, 10.0, 60.0, 600.0])
+def test_no_direction_of_any_chain_is_too_optimistic_with_a_walk(name, horizon):
+    numbers = gmwm.bound(TRUTHS[name], "N+K", horizon)
+    assert worst_direction(TRUTHS[name], numbers, 0.0) < WORST
+    assert worst_direction(TRUTHS[name], numbers, 60.0, every_fix=True) < WORST
+
+
+@pytest.mark.parametrize("name", ["one", "three", "flicker"])
+def test_nor_after_a_long_time_with_aiding(name):
+    numbers = gmwm.bound(TRUTHS[name], "N+K", 60.0)
+    assert worst_direction(TRUTHS[name], numbers, 1200.0) < WORST
+
+
+@pytest.mark.parametrize("name", STATIONARY)
+def test_nor_with_a_gauss_markov_process(name):
+    numbers = gmwm.bound(TRUTHS[name], "N+GM", 60.0)
+    assert numbers.initial_sd == 0.0
+    assert worst_direction(TRUTHS[name], numbers, 60.0, every_fix=True) < WORST
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_nor_with_both(name):
+    numbers = gmwm.bound(TRUTHS[name], "N+K+GM", 60.0)
+    assert worst_direction(TRUTHS[name], numbers, 60.0, every_fix=True) < WORST
+
+
+@pytest.mark.parametrize("form", ["N+K", "N+K+GM"])
+@pytest.mark.parametrize("name", TRUTHS)
+def test_spectra_are_dominated_at_every_frequency(name, form):
+    truth = TRUTHS[name]
+    numbers = gmwm.bound(truth, form, 60.0)
+    ratio = numbers.model.psd(FREQUENCIES, DT) / truth.psd(FREQUENCIES, DT)
+    assert np.min(ratio) > 1.0 - 1e-6
+    assert truth.white_density() <= numbers.N**2
+    assert truth.params.get("K", 0.0) <= numbers.K
+
+
+def test_a_smaller_bound_does_not_dominate():
+    """Every number counts: a little less of one, and the spectrum sticks out."""
+    for form in ("N+K", "N+GM", "N+K+GM"):
+        numbers = gmwm.bound(TRUTHS["two"], form, 60.0)
+        for key, value in numbers.model.params.items():
+            less = numbers.model.with_params({key: 0.97 * value})
+            ratio = less.psd(FREQUENCIES, DT) / TRUTHS["two"].psd(FREQUENCIES, DT)
+            assert np.min(ratio) < 1.0 - 1e-3, (form, key)
+
+
+def test_no_other_walk_that_dominates_is_smaller_over_the_horizon():
+    """Against a search of another kind: K for each N on a grid."""
+    truth, horizon = TRUTHS["three"], 60.0
+    found = gmwm.bound(truth, "N+K", horizon)
+    f = np.geomspace(1e-9, 50.0, 4000)
+    tau = np.rint(np.geomspace(6.0, 60.0, 12) / DT) * DT
+
+    def cost(model):
+        return np.mean(model.haar_variance(tau, DT) / truth.haar_variance(tau, DT))
+
+    need = truth.psd(f, DT)
+    for N in np.geomspace(1e-4, 1e-2, 60):
+        if need[-1] > N**2:
+            continue
+        K = np.sqrt(max(np.max((need - N**2) / RandomWalk(1.0).psd(f, DT)), 0.0))
+        assert cost(WhiteNoise(N) + RandomWalk(K)) > 0.999 * cost(found.model)
+
+
+@pytest.mark.parametrize("form", ["N+K", "N+K+GM"])
+def test_a_model_that_has_the_form_comes_back(form):
+    truth = WhiteNoise(1e-3) + RandomWalk(1e-5)
+    found = gmwm.bound(truth, form, 30.0)
+    assert pytest.approx(1e-3, rel=1e-5) == found.N
+    assert pytest.approx(1e-5, rel=1e-5) == found.K
+    assert found.tightness[30.0] == pytest.approx(1.0, abs=1e-3)
+    gauss = gmwm.bound(ONE, "N+GM", 30.0)
+    assert (gauss.N, gauss.sigma[0], gauss.tau[0]) == pytest.approx((8e-5, 4e-5, 60.0), rel=1e-4)
+
+
+def test_white_noise_alone_needs_no_walk():
+    found = gmwm.bound(WhiteNoise(1e-3), "N+K", 60.0)
+    assert pytest.approx(1e-3) == found.N
+    assert found.K < 1e-12
+    assert found.nees[60.0] == pytest.approx(1.0)
+
+
+def test_time_constants_in_a_range_meet_in_the_geometric_mean():
+    """For tau somewhere in [t1, t2] at one sigma: sqrt(t1 t2), and variance times sqrt(t2/t1)."""
+    t1, t2 = 30.0, 120.0
+    several = {
+        f"gyro_{axis}": WhiteNoise(1e-9) + GaussMarkov(1e-4, tau)
+        for axis, tau in zip("xyz", (t1, 60.0, t2), strict=True)
+    }
+    found = gmwm.bound(several, "N+GM", 60.0, shared=True)["gyro_x"]
+    # White noise takes a little of it.
+    assert found.tau[0] == pytest.approx(np.sqrt(t1 * t2), rel=0.05)
+    assert found.sigma[0] ** 2 == pytest.approx(1e-8 * np.sqrt(t2 / t1), rel=0.05)
+
+
+def test_the_full_navigation_filter_is_not_too_optimistic_either():
+    truth = {"gyro": TRUTHS["two"], "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 40.0)}
+    by_axis = {f"{kind}_{axis}": model for kind, model in truth.items() for axis in "xyz"}
+    numbers = gmwm.bound(by_axis, "N+K", 60.0, dt=0.1)
+    flight = fixed_wing_loiter(duration=250.0, dt=0.1)
+    outages = (Outage(120.0, 60.0), Outage(240.0, 10.0))
+    scenario = Scenario(flight, gnss(flight), outages, interval=10.0, step=0.5, second_order=False)
+    believed = SensorModels.of(
+        {name: each.model for name, each in numbers.items()},
+        {name: each.initial_sd for name, each in numbers.items()},
+    )
+    analysis = covariance_analysis(scenario, SensorModels.of(truth), believed)
+    ratio = np.linalg.solve(analysis.predicted, analysis.actual)
+    assert np.max(np.linalg.eigvals(ratio).real) < WORST
+    at = analysis.index(180.0)
+    assert np.hypot(*analysis.predicted_sd[at, :2]) < 1.3 * np.hypot(*analysis.sd[at, :2])
+
+
+# ---- The length of the record does not matter ----
+
+
+def test_numbers_do_not_shrink_as_the_record_grows():
+    """A random walk that is bounded from data does: to a half for each four times of length."""
+    found = []
+    for hours, seed in ((1, 3), (16, 4)):
+        series = ONE.simulate(hours * 3600, 1.0, seed)
+        fit = gmwm.fit(WhiteNoise() + GaussMarkov(), series, 1.0)
+        found.append(gmwm.bound(fit, "N+K", 60.0).K)
+    right = gmwm.bound(ONE, "N+K", 60.0, dt=1.0).K
+    # sigma^2/tau of one hour has a standard error of some 25 %, so K half of that.
+    assert found[0] == pytest.approx(right, rel=0.4)
+    assert found[1] == pytest.approx(right, rel=0.1)
+
+
+# ---- A whole confidence region ----
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(7200, 1.0, 11), 1.0)
+
+
+@pytest.mark.parametrize("form", ["N+K", "N+GM"])
+def test_models_of_the_region_are_dominated(fitted, form):
+    numbers = gmwm.bound(fitted, form, 60.0, level=0.95)
+    plain = gmwm.bound(fitted, form, 60.0)
+    region = ParameterRegion.of(fitted, 0.95)
+    f = np.geomspace(1e-8, 0.5, 500)
+    outside = 0
+    for point in region.draws(200, np.random.default_rng(99)):
+        model = region.model_at(point)
+        assert np.all(numbers.model.psd(f, 1.0) > model.psd(f, 1.0))
+        outside += np.any(plain.model.psd(f, 1.0) < model.psd(f, 1.0))
+    assert outside > 50
+    assert 1.0 < numbers.tightness[60.0] / plain.tightness[60.0] < 2.0
+
+
+def test_the_region_reaches_to_the_joint_interval(fitted):
+    region = ParameterRegion.of(fitted, 0.95)
+    points = region.draws(4000, np.random.default_rng(1))
+    values = np.array([list(region.model_at(p).params.values()) for p in points])
+    wide, narrow = fitted.interval(0.99), fitted.interval(0.95)
+    for i, key in enumerate(region.keys):
+        assert values[:, i].min() < narrow[key][0]
+        assert values[:, i].max() > narrow[key][1]
+        assert values[:, i].max() < 1.1 * wide[key][1]
+
+
+def test_the_default_reports_what_it_does_not_cover(fitted):
+    codes = [notice.code for notice in gmwm.bound(fitted).notices]
+    assert "uncertainty-not-covered" in codes
+    codes = [notice.code for notice in gmwm.bound(fitted, level=0.95).notices]
+    assert "uncertainty-not-covered" not in codes
+
+
+# ---- What no walk stands for ----
+
+
+def notices_of(*terms, horizon=60.0):
+    found = gmwm.bound(ONE + Model(terms), "N+K", horizon)
+    return found, {notice.code: notice for notice in found.notices}
+
+
+def test_quantization_lines_and_fast_peaks_are_left_out_with_a_notice():
+    plain = gmwm.bound(ONE, "N+K", 60.0)
+    for term, code in (
+        (QuantizationNoise(1e-3), "fast-peak-left-out"),
+        (Sinusoid(0.01, 7.0), "line-left-out"),
+        (MA([-0.999], 1e-4), "fast-peak-left-out"),
+    ):
+        found, notices = notices_of(term)
+        assert pytest.approx(plain.N, rel=0.01) == found.N
+        assert pytest.approx(plain.K, rel=0.01) == found.K
+        assert notices[code].severity == "note"
+
+
+def test_a_resonance_counts_by_its_low_frequency_density():
+    resonance = Resonance(0.02, 15.0, 0.2)
+    found, notices = notices_of(resonance)
+    foot = float(resonance.psd(np.array([1e-3]), DT)[0])
+    assert notices["fast-peak-left-out"].values["density"] == pytest.approx(foot, rel=1e-3)
+    assert notices["fast-peak-left-out"].values["variance"] == pytest.approx(4e-4, rel=0.02)
+    assert pytest.approx(8e-5**2 + foot, rel=0.05) == found.N**2
+
+
+def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
+    slow = Resonance(1e-3, 0.01, 0.003)
+    found = gmwm.bound(ONE + slow, "N+K", 60.0)
+    assert not found.notices
+    f = np.geomspace(1e-8, 50.0, 3000)
+    assert np.min(found.model.psd(f, DT) / (ONE + slow).psd(f, DT)) > 1.0 - 1e-4
+    _, notices = notices_of(Sinusoid(1e-4, 1e-3))
+    assert notices["line-left-out"].severity == "warning"
+
+
+def test_a_ramp_is_a_constant_of_what_it_does_over_the_horizon():
+    plain = gmwm.bound(ONE, "N+K", 60.0)
+    found, notices = notices_of(RateRamp(-1e-5))
+    assert notices["ramp-as-constant"].values == {"R": -1e-5, "sd": pytest.approx(6e-4)}
+    assert found.initial_sd == pytest.approx(np.hypot(plain.initial_sd, 6e-4))
+
+
+def test_a_turn_on_bias_is_part_of_the_start():
+    plain = gmwm.bound(ONE, "N+K", 60.0)
+    found = gmwm.bound(ONE, "N+K", 60.0, bias_sd=1e-3)
+    assert found.initial_sd == pytest.approx(np.hypot(plain.initial_sd, 1e-3))
+    assert plain.initial_sd == pytest.approx(np.sqrt(2.0) * 4e-5, rel=0.05)
+    assert gmwm.bound(ONE, "N+GM", 60.0, bias_sd=1e-3).initial_sd == 1e-3
+    each = gmwm.bound({"gyro_x": ONE, "accel_x": ONE}, bias_sd={"gyro": 1e-3})
+    assert each["gyro_x"].initial_sd > each["accel_x"].initial_sd
+
+
+# ---- Sensors ----
+
+
+def test_axes_may_share_their_numbers():
+    models = {"gyro_x": ONE, "gyro_y": TRUTHS["two"], "accel_x": TRUTHS["three"]}
+    own, shared = gmwm.bound(models), gmwm.bound(models, shared=True)
+    assert isinstance(own, SensorNumbers)
+    assert list(shared) == list(models)
+    assert shared["gyro_x"].model == shared["gyro_y"].model
+    assert shared["accel_x"].model == own["accel_x"].model
+    assert own["gyro_x"].K < own["gyro_y"].K
+    f = FREQUENCIES
+    for name in ("gyro_x", "gyro_y"):
+        ratio = shared[name].model.psd(f, DT) / models[name].psd(f, DT)
+        assert np.min(ratio) > 1.0 - 1e-6
+    assert shared["gyro_x"].nees[60.0] < own["gyro_x"].nees[60.0]
+
+
+def test_a_calibration_gives_numbers_by_channel():
+    n = 5000
+    recording = gmwm.Recording.from_arrays(
+        {"gyro_x": ONE.simulate(n, DT, 1), "accel_x": TRUTHS["far"].simulate(n, DT, 2)},
+        100.0,
+        {"gyro": "rad/s", "accel": "m/s^2"},
+    )
+    calibration = gmwm.calibrate(recording, WhiteNoise(), screening=())
+    found = gmwm.bound(calibration)
+    assert (found.rate, found.duration) == (100.0, 50.0)
+    assert [each.quantity for each in found.values()] == ["gyro", "accel"]
+    single = gmwm.bound(calibration["gyro_x"])
+    assert isinstance(single, FilterNumbers)
+    assert single == found["gyro_x"]
+
+
+class Drawn(Process):
+    def draw(self, n, dt, rng):
+        return rng.standard_normal(n)
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "message"),
+    [
+        (ONE, {"form": "N"}, r"form = 'N': known are N\+K, N\+GM, N\+K\+GM"),
+        (ONE, {"form": "N+2GM"}, "known are"),
+        (ONE, {"horizon": 0.0}, "horizon = 0.0"),
+        (ONE, {"horizon": 0.015}, "two sampling intervals"),
+        (ONE, {"horizon": "60"}, "horizon = '60'"),
+        (ONE, {"level": 0.9}, "a model has no confidence region"),
+        (ONE, {"bias_sd": -1.0}, "bias_sd = -1.0"),
+        (ONE, {"dt": -1.0}, "dt = -1.0"),
+        (WhiteNoise(), {}, r"free parameters \(N\)"),
+        (Model((QuantizationNoise(1e-3),)), {}, "nothing that white noise"),
+        (Drawn(), {}, "known by simulation only"),
+        (ARIMA(d=2, sigma2=1.0), {}, "no form dominates it"),
+        (TRUTHS["walk"], {"form": "N+GM"}, "walks off"),
+        (TRUTHS["flicker"], {"form": "N+GM"}, "walks off"),
+        ({}, {}, "has no error model"),
+        ("calibration.json", {}, "has no error model"),
+        ({"gyro_x": 3.0}, {}, "gyro_x: 3.0 is not an error model"),
+    ],
+)
+def test_what_cannot_be_used(source, options, message):
+    with pytest.raises(InputError, match=message):
+        gmwm.bound(source, **options)
