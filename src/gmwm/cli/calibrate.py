@@ -144,7 +144,7 @@ def _table(result: Calibration) -> Table:
 def write_files(result: Calibration, folder: Path) -> str:
     """Write the files; returns what to say of them."""
     from gmwm._core.files import replaceable
-    from gmwm.export import write_kalibr
+    from gmwm.export import export
 
     paths = [replaceable(folder / name) for name in ("calibration.json", "report.html")]
     kalibr = replaceable(folder / "imu.yaml")
@@ -152,7 +152,8 @@ def write_files(result: Calibration, folder: Path) -> str:
     lines = []
     if {"gyro", "accel"} <= quantities:
         try:
-            paths.append(write_kalibr(result, kalibr))
+            export(result, "kalibr", path=kalibr)
+            paths.append(kalibr)
         except InputError as error:
             lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     elif kalibr.exists():

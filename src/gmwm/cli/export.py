@@ -18,7 +18,7 @@ from gmwm.errors import InputError
 @click.option("--form", metavar="FORM",
               help="N+K, N+GM, ...: most programs hold one; state-space holds any.")  # fmt: skip
 @click.option("-o", "--output", type=click.Path(path_type=Path),
-              help="File to write; state-space also writes .npz. By default it is printed.")  # fmt: skip
+              help="File to write instead of printing; .npz for state-space.")  # fmt: skip
 @click.option("--list", "listed", is_flag=True, help="List the programs.")
 def export(
     files: tuple[Path, ...],

@@ -44,9 +44,12 @@ def about(imu: Imu, title: str, convention: str) -> list[str]:
     """What stands above the numbers: source, convention, values by axis, consistency."""
     lines = [plain(source) for source in imu.sources]
     lines += _wrapped(f"{title}: {convention}")
-    lines += _wrapped(
-        f"{imu.form} for {imu.horizon:g} s without aiding, {_HOW[imu.method]}"
-    )
+    lines += _wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, {_HOW[imu.method]}")
+    if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
+        lines += _wrapped(
+            f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "
+            "below is the higher, of a message that holds both"
+        )
     for triad in imu.triads:
         lines += _table(imu, triad)
     if any(axis.nees for triad in imu.triads for axis in triad.axes):
@@ -91,15 +94,15 @@ def _table(imu: Imu, triad: Triad) -> list[str]:
 
 
 def _row(axis: Axis, keys: Sequence[str], times: Sequence[float]) -> list[str]:
-    cells = [
-        f"{'< ' if key in axis.upper else ''}{getattr(axis, key):.3e}" for key in (*keys,)
-    ]
+    cells = [f"{'< ' if key in axis.upper else ''}{getattr(axis, key):.3e}" for key in (*keys,)]
     return [*cells, f"{axis.initial_sd:.3e}", *(f"{axis.nees[t]:.3g}" for t in times)]
 
 
 def _unit(unit: str, quantity: str) -> str:
-    return si_parameter_unit(unit, quantity).replace("rad/s/s/", "rad/s^2/").replace(
-        "m/s^2/s/", "m/s^3/"
+    return (
+        si_parameter_unit(unit, quantity)
+        .replace("rad/s/s/", "rad/s^2/")
+        .replace("m/s^2/s/", "m/s^3/")
     )
 
 

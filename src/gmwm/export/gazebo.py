@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import sqrt
 
 from gmwm.export.imu import Axis, Imu, Triad
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 
 def _axis(letter: str, axis: Axis, rate: float) -> list[str]:
@@ -43,7 +43,7 @@ def _body(imu: Imu) -> list[str]:
     ]
 
 
-GAZEBO = Target(
+GAZEBO = ImuFile(
     "gazebo", "Gazebo", "the imu element of a sensor in SDF",
     "stddev N sqrt(f), dynamic_bias_stddev sigma sqrt(2/tau), dynamic_bias_correlation_time tau, "
     "of each axis, with f the update_rate of the sensor",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gmwm.export.imu import Imu
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 _COVARIANCES = (
     ("AccelerometerCovariance", "accel", "N", "(m/s^2)^2/Hz"),
@@ -43,7 +43,7 @@ def _python(imu: Imu) -> Sequence[str]:
         lines.append(f"params.set{name}(np.diag([{values}]))  # {unit}")
     return [
         *lines,
-        'if hasattr(params, "setBiasAccOmegaInit"):  # up to GTSAM 4.2: its default swamps the rest',
+        'if hasattr(params, "setBiasAccOmegaInit"):  # up to GTSAM 4.2, by default a huge noise',
         "    params.setBiasAccOmegaInit(np.zeros((6, 6)))",
     ]
 
@@ -58,9 +58,7 @@ def _cpp(imu: Imu) -> Sequence[str]:
     for name, quantity, letter, unit in _COVARIANCES:
         values = ", ".join(_squares(imu, quantity, letter))
         member = name[0].lower() + name[1:]
-        lines.append(
-            f"params->{member} = gtsam::Vector3({values}).asDiagonal();  // {unit}"
-        )
+        lines.append(f"params->{member} = gtsam::Vector3({values}).asDiagonal();  // {unit}")
     return [
         *lines,
         "// Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz), swamps the rest:",
@@ -75,8 +73,8 @@ _SOURCE = (
 )
 
 GTSAM = (
-    Target("gtsam", "GTSAM", "parameters of combined preintegration, Python", _CONVENTION, _SOURCE,
+    ImuFile("gtsam", "GTSAM", "parameters of combined preintegration, Python", _CONVENTION, _SOURCE,
            _python, horizon=1.0),
-    Target("gtsam-cpp", "GTSAM", "parameters of combined preintegration, C++", _CONVENTION,
+    ImuFile("gtsam-cpp", "GTSAM", "parameters of combined preintegration, C++", _CONVENTION,
            _SOURCE, _cpp, horizon=1.0, mark="//"),
 )  # fmt: skip

@@ -206,10 +206,12 @@ def imu_of(
         horizon = checks.positive("horizon", horizon, "give a positive time in seconds")
     numbers = [numbers_of(each, form, horizon, usual) for each in given]
     names = Counter(name for each in numbers for name in each)
+    if not names:
+        raise InputError("there are no numbers to export: give a calibration")
     twice = [name for name, count in names.items() if count > 1]
     if twice:
         raise InputError(f"{twice[0]} is given twice: give each sensor once")
-    horizons = sorted({each.horizon for each in numbers})
+    horizons = sorted({one.horizon for each in numbers for one in each.values()})
     if len(horizons) > 1:
         times = ", ".join(f"{each:g} s" for each in horizons)
         raise InputError(f"the numbers are for {times}: give numbers for one horizon")
@@ -219,7 +221,7 @@ def imu_of(
     }
     return Imu(
         triads["gyro"], triads["accel"], form, horizons[0],
-        next(iter(numbers[0].values())).method,
+        next(one.method for each in numbers for one in each.values()),
         sources=tuple(map(_source, numbers)),
         outlook=_outlook(given),
         remarks=_remarks(numbers),
@@ -277,6 +279,15 @@ def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> Se
         If they have not.
     """
     if isinstance(given, Calibration):
+        walks = [
+            name for name, fit in given.items() if any(term.is_walk for term in fit.model.terms)
+        ]
+        if walks and form == "N+GM":
+            raise InputError(
+                f"the slow errors of {', '.join(walks)} grow without limit, which {form} cannot "
+                "bound: give numbers that gmwm.reduce makes in this form, or choose a program that "
+                "holds a random walk"
+            )
         return bound(given, form, horizon=usual if horizon is None else horizon)
     if not isinstance(given, SensorNumbers):
         raise InputError(

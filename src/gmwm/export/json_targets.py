@@ -1,10 +1,10 @@
 """JSON files, whose comments are an entry of their own: Basalt and GLIM.
 
 Basalt, ``basalt-headers/include/basalt/calibration/calibration.hpp``, ``Calibration``: samples have
-N sqrt(rate) (``dicrete_time_gyro_noise_std``); ``linearization/imu_block.hpp``, ``ImuBlock``, divides the
-weight of a bias step, 1/K, by sqrt(dt).
+N sqrt(rate) (``dicrete_time_gyro_noise_std``); ``include/basalt/linearization/imu_block.hpp``,
+``ImuBlock::linearizeImu``, divides the weight of a bias step, 1/K, by sqrt(dt).
 
-GLIM, ``src/glim/common/imu_integration.cpp``, ``IMUIntegration``: N, squared into GTSAM's densities.
+GLIM, ``src/glim/common/imu_integration.cpp``, ``IMUIntegration``: N, squared to GTSAM's densities.
 ``src/glim/odometry/odometry_estimation_imu.cpp``: ``imu_bias_noise`` is the standard deviation of
 the step of all six biases from scan to scan, rad/s and m/s^2 alike, which no K can be.
 """
@@ -16,14 +16,27 @@ from typing import Any
 
 from gmwm.export import tuning
 from gmwm.export.imu import Imu
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 
-class JsonTarget(Target):
-    """A file in JSON: `Target.body` gives the object but for the comments."""
+class JsonFile(ImuFile):
+    """A file in JSON: `ImuFile.body` gives the object but for the comments."""
 
     def text(self, imu: Imu) -> str:
-        return json.dumps({"comment": self.comments(imu), **self.body(imu)}, indent=2) + "\n"
+        return json_text({"comment": self.comments(imu), **self.body(imu)}) + "\n"
+
+
+def json_text(value: Any, indent: str = "") -> str:
+    """JSON with an entry, or a line of text, on each line; matrices on one."""
+    inner = indent + "  "
+    if isinstance(value, dict):
+        lines = [
+            f"{inner}{json.dumps(key)}: {json_text(each, inner)}" for key, each in value.items()
+        ]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and value and all(isinstance(each, str) for each in value):
+        return "[\n" + ",\n".join(inner + json.dumps(each) for each in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False)
 
 
 def _number(value: float) -> float:
@@ -46,14 +59,14 @@ def _glim(imu: Imu) -> dict[str, Any]:
 
 
 JSON_TARGETS = (
-    JsonTarget(
+    JsonFile(
         "basalt", "Basalt", "noise of its calibration, to be copied into value0",
         "N and K of each axis, continuous time; Basalt multiplies by sqrt(imu_update_rate) itself",
         "basalt-headers/include/basalt/calibration/calibration.hpp: Calibration; "
         "include/basalt/linearization/imu_block.hpp: ImuBlock::linearizeImu",
         _basalt, horizon=tuning.KEYFRAME,
     ),
-    JsonTarget(
+    JsonFile(
         "glim", "GLIM", "sensors of config_sensors.json",
         "N for all axes, continuous time",
         "src/glim/common/imu_integration.cpp: IMUIntegration",

@@ -13,7 +13,7 @@ from math import sqrt
 from gmwm.export import tuning
 from gmwm.export.comments import by_axis
 from gmwm.export.imu import Axis, Imu, Triad
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 _UNITS = {
     ("gyro", "N"): "rad/s/sqrt(Hz)",
@@ -150,7 +150,7 @@ def _ekf2(value: float, letter: str, rate: float) -> float:
     return value / sqrt(tuning.EKF2_INTERVAL)
 
 
-KALIBR = Target(
+KALIBR = ImuFile(
     "kalibr", "Kalibr", "imu.yaml",
     f"{_CONTINUOUS}; zeros are refused",
     "kalibr_common/ConfigReader.py: ImuParameters.getAccelerometerStatistics, getGyroStatistics; "
@@ -160,7 +160,7 @@ KALIBR = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-OPENVINS = Target(
+OPENVINS = ImuFile(
     "openvins", "OpenVINS", "kalibr_imu_chain.yaml",
     f"{_CONTINUOUS}; scale, misalignment and g-sensitivity are those of an ideal IMU",
     "ov_msckf/src/state/Propagator.cpp: predict_and_compute; core/VioManagerOptions.h",
@@ -181,7 +181,7 @@ OPENVINS = Target(
     horizon=tuning.KEYFRAME, shared=True, head=("%YAML:1.0",),
 )  # fmt: skip
 
-VINS = Target(
+VINS = ImuFile(
     "vins", "VINS-Mono and VINS-Fusion", "the IMU block of the configuration",
     "N sqrt(2 f), since the mid-point step takes the two samples at its ends as independent, and "
     "K sqrt(f), f the rate of the IMU; for all axes",
@@ -190,7 +190,7 @@ VINS = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-ORBSLAM3 = Target(
+ORBSLAM3 = ImuFile(
     "orbslam3", "ORB-SLAM3", "the IMU block of the settings",
     f"{_CONTINUOUS}; ORB-SLAM3 multiplies and divides by sqrt(IMU.Frequency) itself",
     "src/Tracking.cc: newParameterLoader (IMU::Calib); src/ImuTypes.cc: IntegrateNewMeasurement",
@@ -199,7 +199,7 @@ ORBSLAM3 = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-FASTLIO = Target(
+FASTLIO = ImuFile(
     "fastlio", "FAST-LIO2", "the mapping block of the configuration",
     "N^2 f and K^2 f, variances of one sample at the rate f of the IMU; for all axes",
     "include/IKFoM_toolkit/esekfom/esekfom.hpp: predict; src/IMU_Processing.hpp: UndistortPcl",
@@ -208,7 +208,7 @@ FASTLIO = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-LIOSAM = Target(
+LIOSAM = ImuFile(
     "liosam", "LIO-SAM", "the IMU settings of params.yaml", _CONTINUOUS,
     "src/imuPreintegration.cpp: IMUPreintegration",
     Keys(_named("imuGyrNoise", "imuAccNoise", "imuGyrBiasN", "imuAccBiasN"),
@@ -216,7 +216,7 @@ LIOSAM = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-KIMERA = Target(
+KIMERA = ImuFile(
     "kimera", "Kimera-VIO", "noise of ImuParams.yaml", f"{_CONTINUOUS}; zeros are refused",
     "src/imu-frontend/ImuFrontend.cpp: convertVioImuParamsToGtsam; src/backend/VioBackend.cpp: "
     "addImuFactor",
@@ -224,7 +224,7 @@ KIMERA = Target(
     horizon=tuning.KEYFRAME, shared=True, head=("%YAML:1.0",),
 )  # fmt: skip
 
-OKVIS2 = Target(
+OKVIS2 = ImuFile(
     "okvis2", "OKVIS2", "imu_parameters of the configuration",
     f"{_CONTINUOUS}; sigma_bg and sigma_ba, the biases at switch-on, are not in a static recording",
     "okvis_ceres/src/ImuError.cpp: ImuError::propagation; okvis_common/src/ViParametersReader.cpp",
@@ -233,7 +233,7 @@ OKVIS2 = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-MAPLAB = Target(
+MAPLAB = ImuFile(
     "maplab", "maplab", "the IMU in the sensors file", _CONTINUOUS,
     "map-structure/sensors/src/imu.cc; algorithms/imu-integrator-rk4/include/imu-integrator/"
     "imu-integrator-inl.h: getCovarianceTransitionDerivatives",
@@ -243,7 +243,7 @@ MAPLAB = Target(
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
 
-PX4 = Target(
+PX4 = ImuFile(
     "px4", "PX4 EKF2", "a parameter file for QGroundControl",
     "N/sqrt(dt) and K/sqrt(dt) for all axes, dt = "
     f"{tuning.EKF2_INTERVAL:g} s the interval of the filter (EKF2_PREDICT_US), not of the IMU",
@@ -254,10 +254,11 @@ PX4 = Target(
     ),
     shared=True,
     warnings=(
-        "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench does",
-        "  not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer 0.35",
-        "  m/s^2) stand for it. Record in flight or keep the larger of the two. PX4 takes gyro noise",
-        "  of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, bias noise up to 0.01.",
+        "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench",
+        "  does not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer",
+        "  0.35 m/s^2) stand for it. Record in flight, or keep the larger of the two. PX4 takes",
+        "  gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, and bias",
+        "  noise up to 0.01.",
     ),
 )  # fmt: skip
 

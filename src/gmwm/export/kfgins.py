@@ -12,7 +12,7 @@ from math import sqrt
 
 from gmwm._core.units import factor
 from gmwm.export.imu import Axis, Imu, common_tau
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 _MGAL = 1e-5  # m/s^2
 _HOUR = 3600.0
@@ -42,7 +42,7 @@ def _list(axes: Sequence[Axis], value: Callable[[Axis], float]) -> str:
     return f"[{', '.join(f'{value(axis):.6e}' for axis in axes)}]"
 
 
-KFGINS = Target(
+KFGINS = ImuFile(
     "kfgins", "KF-GINS", "imunoise of kf-gins.yaml",
     "N, sigma and tau of each axis; there is one tau for all six, and each axis has the sigma "
     "with which it bounds its own process",

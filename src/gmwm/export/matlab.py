@@ -9,7 +9,7 @@ Sensor Noise Analysis Using Allan Variance" sets "single-sided" for the same rea
 from __future__ import annotations
 
 from gmwm.export.imu import Imu, Triad
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 
 def _parameters(name: str, make: str, triad: Triad) -> list[str]:
@@ -33,7 +33,7 @@ def _body(imu: Imu) -> list[str]:
     ]
 
 
-MATLAB = Target(
+MATLAB = ImuFile(
     "matlab", "MATLAB", "gyroparams and accelparams of imuSensor",
     "N and K of each axis with NoiseType single-sided; releases before R2022b have no NoiseType "
     "and the default's scale: multiply NoiseDensity by sqrt(2), divide RandomWalk by sqrt(2)",

@@ -15,7 +15,7 @@ from math import sqrt
 
 from gmwm._core.units import factor
 from gmwm.export.imu import Axis, Imu, Triad
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 
 def _three(triad: Triad, value: Callable[[Axis], float]) -> str:
@@ -57,12 +57,12 @@ def _gnss_ins_sim(imu: Imu) -> list[str]:
 
 
 PYTHON_SIMULATORS = (
-    Target(
+    ImuFile(
         "pyins", "pyins", "estimation models of the inertial sensors",
         "N and K of each axis, continuous time; a walk counts only where bias_sd is positive",
         "pyins/inertial_sensor.py: EstimationModel.__init__, Parameters.apply", _pyins,
     ),
-    Target(
+    ImuFile(
         "gnss-ins-sim", "gnss-ins-sim", "the IMU's error model",
         "N, sigma and tau of each axis; its process starts at zero, and without a correlation "
         "time it is white",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from gmwm.errors import InputError
 from gmwm.export.imu import Imu, Triad
-from gmwm.export.target import Target
+from gmwm.export.target import ImuFile
 
 
 def _covariance(key: str, triad: Triad, unit: str) -> list[str]:
@@ -33,7 +33,7 @@ def _body(imu: Imu) -> list[str]:
     ]
 
 
-ROS = Target(
+ROS = ImuFile(
     "ros-covariance", "ROS", "covariances of sensor_msgs/Imu",
     "N^2 f of each axis, the variance of the white noise of one sample at the rate f, on the "
     "diagonal of a row-major 3 x 3 matrix; slow errors have no place in it",

@@ -6,7 +6,6 @@ Continuous: dx/dt = F x + G w, y = H x + v with spectral densities Q and R.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +21,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.imu import numbers_of
+from gmwm.export.json_targets import json_text
 from gmwm.export.target import Target
 from gmwm.filter_numbers import FORMS, SensorNumbers
 from gmwm.process import Model, Process, StateSpace
@@ -39,7 +39,7 @@ class StateSpaceTarget(Target):
             "comment": [f"{self.title}: {self.convention}", *self.warnings],
             "channels": {name: _plain(each) for name, each in channels.items()},
         }
-        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+        return json_text(content) + "\n"
 
     def save(
         self,
@@ -69,7 +69,9 @@ class StateSpaceTarget(Target):
             checks.choice("form", form, FORMS)
         found: dict[str, dict[str, Any]] = {}
         for each in given:
-            for name, (model, dt, quantity, initial_sd) in self._models(each, horizon, form).items():
+            for name, (model, dt, quantity, initial_sd) in self._models(
+                each, horizon, form
+            ).items():
                 if name in found:
                     raise InputError(f"{name} is given twice: give each sensor once")
                 try:
@@ -164,9 +166,7 @@ def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> 
     }
 
 
-def continuous(
-    term: Process, part: StateSpace, dt: float
-) -> tuple[FloatArray, FloatArray] | None:
+def continuous(term: Process, part: StateSpace, dt: float) -> tuple[FloatArray, FloatArray] | None:
     """F and G Q G' in continuous time that give a term's samples, if there are any.
 
     F = log(transition)/dt, and Q solves transition noise = integral of exp(F s) Q exp(F' s) over
@@ -226,6 +226,6 @@ STATE_SPACE = StateSpaceTarget(
     "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
     "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance P0; "
     "SI units",
-    "this file", list, form="full model",
+    "the full model, nothing reduced", form="full model",
     warnings=("the bias at switch-on is in no static recording: add its variance to P0",),
 )  # fmt: skip

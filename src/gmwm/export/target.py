@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from gmwm._core import checks
@@ -17,7 +18,7 @@ from gmwm.filter_numbers import FORMS
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(ABC):
     """A file that some program reads.
 
     Attributes
@@ -32,18 +33,10 @@ class Target:
         What the values are, in N, K, sigma, tau and the rate f of the samples.
     source : str
         Where the program's own source, or its manual, defines that.
-    body : callable
-        Lines below the comments, of an `Imu`; of files in JSON, the object.
     form : str
         The form of the numbers that it holds.
     horizon : float
         Time without aiding unless another is given, s.
-    mark : str
-        What a comment begins with.
-    shared : bool
-        Whether the axes of a sensor have one value.
-    head : tuple of str
-        Lines that must stand first.
     warnings : tuple of str
         What to know before use.
     """
@@ -53,24 +46,12 @@ class Target:
     file: str
     convention: str
     source: str
-    body: Callable[[Imu], Any]
+    _: KW_ONLY
     form: str = "N+K"
     horizon: float = tuning.HORIZON
-    mark: str = "#"
-    shared: bool = False
-    head: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
-    def comments(self, imu: Imu) -> list[str]:
-        """Lines of comment, without the mark."""
-        lines = about(imu, f"{self.title}, {self.file}", f"{self.convention} ({self.source})")
-        return [*lines, *self.warnings]
-
-    def text(self, imu: Imu) -> str:
-        """The whole file."""
-        comments = comment(self.comments(imu), self.mark)
-        return "\n".join([*self.head, *comments, *self.body(imu)]) + "\n"
-
+    @abstractmethod
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         """The file of calibrations or of numbers.
 
@@ -79,9 +60,6 @@ class Target:
         InputError
             If they do not hold what it needs.
         """
-        if form is not None and checks.choice("form", form, FORMS) != self.form:
-            raise InputError(f"form {form}: {self.title} holds {self.form} only")
-        return self.text(imu_of(given, self.form, horizon, self.horizon, self.shared))
 
     def save(
         self,
@@ -95,3 +73,45 @@ class Target:
         with written(path) as stream:
             stream.write(text)
         return text
+
+
+@dataclass(frozen=True)
+class ImuFile(Target):
+    """Numbers of gyros and accelerometers, under comments that say what they are.
+
+    Attributes
+    ----------
+    body : callable
+        Lines below the comments, of an `Imu`; of files in JSON, the object.
+    shared : bool
+        Whether the axes of a sensor have one value.
+    mark : str
+        What a comment begins with.
+    head : tuple of str
+        Lines that must stand first.
+    """
+
+    body: Callable[[Imu], Any]
+    _: KW_ONLY
+    shared: bool = False
+    mark: str = "#"
+    head: tuple[str, ...] = ()
+
+    def comments(self, imu: Imu) -> list[str]:
+        """Lines of comment, without the mark."""
+        lines = about(imu, f"{self.title}, {self.file}", f"{self.convention} ({self.source})")
+        return [*lines, *self.warnings]
+
+    def text(self, imu: Imu) -> str:
+        """The whole file."""
+        comments = comment(self.comments(imu), self.mark)
+        return "\n".join([*self.head, *comments, *self.body(imu)]) + "\n"
+
+    def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
+        if form is not None and checks.choice("form", form, FORMS) != self.form:
+            raise InputError(f"form {form}: {self.title} holds {self.form} only")
+        try:
+            imu = imu_of(given, self.form, horizon, self.horizon, self.shared)
+        except InputError as error:
+            raise InputError(f"{self.title}: {error}", error.code) from None
+        return self.text(imu)

@@ -6,8 +6,8 @@ import pytest
 
 import gmwm
 from gmwm.export import TARGETS
+from imu_numbers import FORMS, numbers
 from places import GOLDEN
-from sensors import FORMS, numbers
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 SOURCE = "bench.csv, a name\nof two lines: {\\"

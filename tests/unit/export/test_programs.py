@@ -17,7 +17,7 @@ import yaml
 
 import gmwm
 from gmwm.export import TARGETS
-from sensors import FORMS, RATE, SIGMA, TAU, K, N, numbers
+from imu_numbers import FORMS, RATE, SIGMA, TAU, K, N, numbers
 
 DT = 1.0 / RATE
 STEPS = 2000
@@ -61,9 +61,7 @@ def kalibr(q):
     sample = content[f"{sensor}_noise_density"] / sqrt(1.0 / content["update_rate"])
     # IccSensors.py addBiasMotionTerms: the integral of (db/dt)^2/walk^2
     walk = content[f"{sensor}_random_walk"]
-    return Step(
-        np.array([[1.0, DT], [0.0, 1.0]]), np.diag([sample**2 * DT**2, walk**2 * DT])
-    )
+    return Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([sample**2 * DT**2, walk**2 * DT]))
 
 
 def openvins(q):
@@ -82,9 +80,7 @@ def vins(q):
     noise, walk = content[f"{letter}_n"], content[f"{letter}_w"]
     # integration_base.h midPointIntegration: V has dt/2 for each end of the step, dt for the walk
     v = np.array([[0.5 * DT, 0.5 * DT, 0.0], [0.0, 0.0, DT]])
-    return Step(
-        np.array([[1.0, DT], [0.0, 1.0]]), v @ np.diag([noise**2, noise**2, walk**2]) @ v.T
-    )
+    return Step(np.array([[1.0, DT], [0.0, 1.0]]), v @ np.diag([noise**2, noise**2, walk**2]) @ v.T)
 
 
 def orbslam3(q):

@@ -19,7 +19,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.export.state_space import channel
-from sensors import RATE, numbers
+from imu_numbers import RATE, numbers
 
 DT = 0.005
 MODEL = (

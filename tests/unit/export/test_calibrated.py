@@ -1,0 +1,379 @@
+"""Files of calibrations: the numbers of `gmwm.bound`, and files that programs can use."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+import gmwm
+from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound
+from gmwm.export import TARGETS
+from gmwm.process import as_model
+from imu_numbers import numbers
+
+DT = 0.005
+N_GYRO, K_GYRO, N_ACCEL = 4e-4, 3e-4, 1.2e-3
+
+KEYS = {
+    "accelerometer_noise_density",
+    "accelerometer_random_walk",
+    "gyroscope_noise_density",
+    "gyroscope_random_walk",
+    "rostopic",
+    "update_rate",
+}
+UNITS = {
+    "accelerometer_noise_density": "m/s^2/sqrt(Hz)",
+    "accelerometer_random_walk": "m/s^3/sqrt(Hz)",
+    "gyroscope_noise_density": "rad/s/sqrt(Hz)",
+    "gyroscope_random_walk": "rad/s^2/sqrt(Hz)",
+}
+
+
+def recording(gyro, accel, axes="xy", n=20_000, seed=3, dt=DT):
+    rng = np.random.default_rng(seed)
+    kinds = (("gyro", "rad/s", gyro), ("accel", "m/s^2", accel))
+    return Recording(
+        tuple(
+            Channel(f"{quantity}_{axis}", model.simulate(n, dt, rng), dt, quantity, unit)
+            for quantity, unit, model in kinds
+            for axis in axes
+        ),
+        "bench.csv",
+    )
+
+
+def kalibr_text(calibration):
+    return gmwm.export(calibration, "kalibr")
+
+
+def walk_where_it_is(name):
+    return WhiteNoise() + RandomWalk() if name.startswith("gyro") else WhiteNoise()
+
+
+@pytest.fixture(scope="module")
+def calibration():
+    rec = recording(WhiteNoise(N_GYRO) + RandomWalk(K_GYRO), WhiteNoise(N_ACCEL))
+    return gmwm.calibrate(rec, {name: walk_where_it_is(name) for name in rec.names})
+
+
+@pytest.fixture(scope="module")
+def text(calibration):
+    return kalibr_text(calibration)
+
+
+@pytest.fixture(scope="module")
+def content(text):
+    return yaml.safe_load(text)
+
+
+def assert_usable(content):
+    assert content.keys() == KEYS
+    for key in UNITS:
+        assert isinstance(content[key], float), f"{key}: {content[key]!r}"
+        assert 0.0 < content[key] < np.inf, f"{key}: {content[key]!r}"
+
+
+def test_six_keys_and_positive_numbers(content):
+    assert_usable(content)
+    assert content["update_rate"] == 200
+    assert content["rostopic"].startswith("/")
+
+
+def test_noise_density_is_that_of_the_noisiest_axis(calibration, content):
+    for sensor, quantity, truth in (
+        ("gyroscope", "gyro", N_GYRO),
+        ("accelerometer", "accel", N_ACCEL),
+    ):
+        fits = [fit for name, fit in calibration.fits.items() if name.startswith(quantity)]
+        noisiest = max(fits, key=lambda fit: fit.params["N"])
+        value = content[f"{sensor}_noise_density"]
+        assert value == pytest.approx(noisiest.params["N"], rel=1e-5)
+        low, high = noisiest.interval(0.999)["N"]
+        assert low < truth < high
+        assert low < value < high
+
+
+def test_random_walk_is_that_of_the_walkiest_axis(calibration, content):
+    fits = [calibration[name] for name in ("gyro_x", "gyro_y")]
+    walkiest = max(fits, key=lambda fit: fit.params["K"])
+    assert content["gyroscope_random_walk"] == pytest.approx(walkiest.params["K"], rel=1e-5)
+    low, high = walkiest.interval(0.999)["K"]
+    assert low < K_GYRO < high
+
+
+def test_fast_terms_count_as_white_noise():
+    # A correlation time of 20 ms averages out at 1 s, with a density of sigma sqrt(2 tau).
+    fast = WhiteNoise(N_ACCEL) + GaussMarkov(2e-2, 0.02)
+    rec = recording(WhiteNoise(N_GYRO), fast, axes="x")
+    models = {"gyro_x": WhiteNoise(), "accel_x": fast.opened()}
+    content = yaml.safe_load(kalibr_text(gmwm.calibrate(rec, models)))
+    expected = np.sqrt(N_ACCEL**2 + 2.0 * 2e-2**2 * 0.02)
+    assert content["accelerometer_noise_density"] == pytest.approx(expected, rel=0.05)
+
+
+def line_of(text, key):
+    return next(line for line in text.splitlines() if line.startswith(key))
+
+
+def block_of(text, key):
+    """The line of a key and the comments under it."""
+    lines = text.splitlines()
+    start = lines.index(line_of(text, key))
+    end = start + 1
+    while lines[end].startswith("#"):
+        end += 1
+    return "\n".join(lines[start:end])
+
+
+def test_each_value_has_its_unit_and_its_axes_beside_it(text, calibration):
+    for key, unit in UNITS.items():
+        assert line_of(text, key).endswith(f"# {unit}")
+        for name in calibration:
+            kind = "gyro" if key.startswith("gyro") else "accel"
+            assert (name in block_of(text, key)) is name.startswith(kind)
+    assert "# Hz" in line_of(text, "update_rate")
+
+
+def test_a_walk_that_was_not_found_is_called_an_upper_bound(text):
+    # Only where the model has no slow term.
+    assert "upper bound" in block_of(text, "accelerometer_random_walk")
+    assert "no random walk was found" in block_of(text, "accelerometer_random_walk")
+    assert "upper bound" not in block_of(text, "gyroscope_random_walk")
+    assert "upper bound" not in block_of(text, "accelerometer_noise_density")
+
+
+def test_bounds_of_pure_white_noise_are_numbers():
+    # Six axes: where one of them leaves K all but undetermined, the file must still be usable.
+    for seed in range(3):
+        rec = recording(WhiteNoise(N_GYRO), WhiteNoise(N_ACCEL), axes="xyz", n=4000, seed=seed)
+        content = yaml.safe_load(kalibr_text(gmwm.calibrate(rec, WhiteNoise())))
+        assert_usable(content)
+
+
+def test_a_bound_grows_tighter_with_a_longer_record():
+    values = []
+    for n in (2000, 64_000):
+        rec = recording(WhiteNoise(N_GYRO), WhiteNoise(N_ACCEL), axes="x", n=n, seed=13)
+        content = yaml.safe_load(kalibr_text(gmwm.calibrate(rec, WhiteNoise())))
+        values.append(content["accelerometer_random_walk"])
+    assert values[1] < 0.2 * values[0]
+
+
+def test_kalibr_never_gets_a_zero():
+    # A channel of a walk alone has no white noise; Kalibr refuses zeros.
+    rec = recording(WhiteNoise(N_GYRO), RandomWalk(1e-2), axes="x", n=4000)
+    models = {"gyro_x": WhiteNoise(), "accel_x": RandomWalk()}
+    assert_usable(yaml.safe_load(kalibr_text(gmwm.calibrate(rec, models))))
+
+
+@pytest.mark.parametrize(("kept", "missing"), [("gyro", "accelerometer"), ("accel", "gyroscope")])
+def test_both_sensors_are_needed(calibration, tmp_path, kept, missing):
+    fits = {name: fit for name, fit in calibration.fits.items() if name.startswith(kept)}
+    with pytest.raises(InputError, match=f"there is no {missing}: calibrate both"):
+        gmwm.export(replace(calibration, fits=fits), "kalibr", path=tmp_path / "imu.yaml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_file(calibration, text, tmp_path):
+    path = tmp_path / "imu.yaml"
+    assert gmwm.export(calibration, "kalibr", path=path) == text
+    assert path.read_text() == text
+    assert text.startswith("# bench.csv, 100 s static\n")
+
+
+def test_a_folder_that_is_not_there(calibration, tmp_path):
+    with pytest.raises(InputError, match=r"imu\.yaml: cannot be written"):
+        gmwm.export(calibration, "kalibr", path=tmp_path / "nowhere" / "imu.yaml")
+
+
+@pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c"])
+def test_the_name_of_the_source_cannot_break_the_file(calibration, source):
+    assert_usable(yaml.safe_load(kalibr_text(replace(calibration, source=source))))
+
+
+@pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c", "x\u2028y\x00\x1b[3m"])
+@pytest.mark.parametrize("name", ["gtsam", "gtsam-cpp", "matlab", "gazebo", "basalt", "px4"])
+def test_names_cannot_break_any_file(name, source):
+    given = numbers(TARGETS[name].form, source=source + "\\")
+    hostile = {f'{key}\n*/ --> %}}"\\': each for key, each in given.items()}
+    text = gmwm.export(replace(given, axes=hostile), name)
+    clean = gmwm.export(given, name)
+    # One line more or less would be one that the program reads.
+    assert all(c.isprintable() or c in "\n\t" for c in text)
+    marks = {"gtsam-cpp": "//", "matlab": "%"}
+    if name == "basalt":
+        assert json.loads(text)["value0"] == json.loads(clean)["value0"]
+        return
+    if name == "gazebo":
+        ElementTree.fromstring(text)
+        parts = [part.partition("-->")[2] for part in (text, clean)]
+        assert parts[0] == parts[1]
+        return
+    read = [
+        [line for line in part.splitlines() if not line.startswith(marks.get(name, "#"))]
+        for part in (text, clean)
+    ]
+    assert read[0] == read[1]
+    assert not any(line.endswith("\\") for line in text.splitlines())
+
+
+# -- the numbers are those of a bound -------------------------------------------------------------
+
+SLOW = {"gyro": WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0),
+        "accel": WhiteNoise(1e-3) + GaussMarkov(5e-4, 20.0)}  # fmt: skip
+
+
+def fitted(gyro, accel, axes="xy", **changes):
+    rec = recording(gyro, accel, axes=axes, **changes)
+    return gmwm.calibrate(rec, {n: (gyro if n[0] == "g" else accel).opened() for n in rec.names})
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return fitted(SLOW["gyro"], SLOW["accel"], n=60_000, seed=5)
+
+
+@pytest.mark.parametrize("horizon", [None, 10.0])
+def test_slow_terms_count_as_a_random_walk(slow, horizon):
+    content = yaml.safe_load(gmwm.export(slow, "kalibr", horizon=horizon))
+    found = bound(slow, "N+K", horizon or 1.0, shared=True)
+    for sensor, quantity in (("gyroscope", "gyro"), ("accelerometer", "accel")):
+        one = next(iter(found.of(quantity).values()))
+        assert content[f"{sensor}_noise_density"] == pytest.approx(one.N, rel=1e-6)
+        assert content[f"{sensor}_random_walk"] == pytest.approx(one.K, rel=1e-6)
+        # Not below what the model itself does at high frequencies.
+        model = slow[f"{quantity}_x"].params
+        assert 0.5 * model["sigma"] * np.sqrt(2.0 / model["tau"]) < one.K
+    text = gmwm.export(slow, "kalibr", horizon=horizon)
+    assert "upper bound" not in text
+
+
+def test_comments_hold_consistency_and_other_horizons(slow):
+    text = gmwm.export(slow, "openvins")
+    found = bound(slow, "N+K", 1.0, shared=True)
+    assert "NEES 1 s" in text
+    assert "NEES 10 s" in text
+    for name, one in found.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"# {name} "))
+        values = [float(cell) for cell in row.split()[-2:]]
+        assert values == pytest.approx(list(one.nees.values()), rel=5e-3)
+    joined = " ".join(line.lstrip("# ") for line in text.splitlines())
+    for horizon in (10, 60, 600):
+        one = next(iter(bound(slow, "N+K", horizon, shared=True).of("gyro").values()))
+        assert f"{horizon} s: {one.N:.3e}, {one.K:.3e}" in joined
+
+
+def test_per_axis_files_have_the_bound_of_each_axis(slow):
+    found = bound(slow, "N+GM", 60.0)
+    root = ElementTree.fromstring(gmwm.export(slow, "gazebo"))
+    for axis in "xy":
+        noise = root.find(f"angular_velocity/{axis}/noise")
+        one = found[f"gyro_{axis}"]
+        tau = float(noise.find("dynamic_bias_correlation_time").text)
+        assert tau == pytest.approx(one.tau[0], rel=1e-6)
+    # Axis z was not calibrated: its numbers bound those of the others.
+    z = root.find("angular_velocity/z/noise")
+    assert float(z.find("stddev").text) == pytest.approx(
+        max(found[f"gyro_{axis}"].N for axis in "xy") * np.sqrt(1.0 / DT), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_k_does_not_depend_on_the_length_of_the_record(seed):
+    # It would fall with the square root of it if slow terms were left out.
+    values = []
+    for n in (72_000, 288_000):  # 1 and 4 h
+        rec = recording(SLOW["gyro"], as_model(WhiteNoise(1e-3)), "x", n, seed, dt=0.05)
+        models = {"gyro_x": SLOW["gyro"].opened(), "accel_x": WhiteNoise()}
+        content = yaml.safe_load(kalibr_text(gmwm.calibrate(rec, models)))
+        values.append(content["gyroscope_random_walk"])
+    assert values[1] == pytest.approx(values[0], rel=0.15)
+    assert values[1] == pytest.approx(4e-5 * np.sqrt(2.0 / 60.0), rel=0.15)
+
+
+def test_two_recordings_of_different_rates(slow):
+    gyro, accel = (
+        replace(slow, fits={n: f for n, f in slow.items() if n.startswith(q)}, rate=rate)
+        for q, rate in (("gyro", 200.0), ("accel", 100.0))
+    )
+    content = yaml.safe_load(gmwm.export([gyro, accel], "kalibr"))
+    assert content["update_rate"] == 200.0
+    text = gmwm.export((gyro, accel), "vins")
+    assert "gyros at 200 Hz, accelerometers at 100 Hz" in text
+    one = next(iter(bound(accel, "N+K", 1.0, shared=True).values()))
+    assert yaml.safe_load(text)["acc_n"] == pytest.approx(one.N * np.sqrt(400.0), rel=1e-6)
+
+
+def test_numbers_that_were_found_before():
+    given = numbers("N+K")
+    assert gmwm.export(given, "kalibr", horizon=60.0) == gmwm.export(given, "kalibr")
+    with pytest.raises(InputError, match="the numbers are for 60 s: leave the horizon out"):
+        gmwm.export(given, "kalibr", horizon=1.0)
+    with pytest.raises(InputError, match=r"the numbers have the form N\+K, the file holds N\+GM"):
+        gmwm.export(given, "gazebo")
+
+
+def test_without_a_rate():
+    # Only files that depend on it need it.
+    given = numbers("N+K", rate=float("nan"))
+    for name in ("px4", "liosam", "okvis2", "maplab", "gtsam", "glim", "pyins"):
+        gmwm.export(given, name)
+    for name in ("kalibr", "vins", "fastlio", "ros-covariance", "matlab", "basalt"):
+        with pytest.raises(InputError, match="hold no sampling rate"):
+            gmwm.export(given, name)
+
+
+def test_nothing_that_a_filter_divides_by_is_zero():
+    given = numbers("N+K")
+    no_walk = {
+        name: replace(each, model=WhiteNoise(each.N) + RandomWalk(0.0), initial_sd=0.0)
+        for name, each in given.items()
+    }
+    with pytest.raises(InputError, match="K of the gyroscope is zero"):
+        gmwm.export(replace(given, axes=no_walk), "kalibr")
+
+
+@pytest.mark.parametrize("name", ["gazebo", "kfgins", "gnss-ins-sim"])
+def test_a_walk_has_no_bound_of_a_stationary_process(calibration, name):
+    with pytest.raises(InputError, match="gyro_x, gyro_y grow without limit"):
+        gmwm.export(calibration, name)
+
+
+@pytest.mark.parametrize(
+    ("given", "target", "options", "message"),
+    [
+        (None, "ros", {}, "target = 'ros': known are kalibr, openvins"),
+        (None, "kalibr", {"form": "N+GM"}, r"form N\+GM: Kalibr holds N\+K only"),
+        (None, "kalibr", {"form": "N"}, "form = 'N': known are"),
+        (None, "kalibr", {"horizon": 0.0}, "horizon = 0.0: give a positive time"),
+        (3, "kalibr", {}, "3 has no numbers to export"),
+        ([], "kalibr", {}, "no numbers to export"),
+    ],
+)
+def test_bad_input(given, target, options, message):
+    with pytest.raises(InputError, match=message):
+        gmwm.export(numbers("N+K") if given is None else given, target, **options)
+
+
+def test_the_full_model_has_no_horizon(slow):
+    with pytest.raises(InputError, match="the full model has no horizon"):
+        gmwm.export(slow, "state-space", horizon=3.0)
+    small = json.loads(gmwm.export(slow, "state-space", horizon=3.0, form="N+K+GM"))
+    states = small["channels"]["gyro_x"]["states"]
+    assert states in (["random walk", "Gauss-Markov"], ["Gauss-Markov", "random walk"])
+
+
+def test_a_sensor_that_is_given_twice():
+    with pytest.raises(InputError, match="gyro_x is given twice"):
+        gmwm.export([numbers("N+K"), numbers("N+K", quantities=("gyro",))], "kalibr")
+
+
+def test_the_room_is_its_function():
+    # Whichever was imported first.
+    import gmwm.export as room
+
+    assert room(numbers("N+K"), "glim") == gmwm.export(numbers("N+K"), "glim")
