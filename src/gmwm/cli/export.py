@@ -59,8 +59,8 @@ def _list() -> None:
     from gmwm.cli.console import new_console, new_table, print_whole
     from gmwm.export import TARGETS
 
-    table = new_table("name", "program", "file", "form", ">horizon")
+    table = new_table("name", "program", "form", ">horizon")
     for target in TARGETS.values():
         horizon = "" if target.form == "full model" else f"{target.horizon:g} s"
-        table.add_row(target.name, target.title, target.file, target.form, horizon)
+        table.add_row(target.name, target.title, target.form, horizon)
     print_whole(new_console(), table)

@@ -215,8 +215,15 @@ def imu_of(
     if len(horizons) > 1:
         times = ", ".join(f"{each:g} s" for each in horizons)
         raise InputError(f"the numbers are for {times}: give numbers for one horizon")
+    # The axes of a file that has one value for them are judged by that.
+    together = [
+        bound(each, form, horizon=horizons[0], shared=True)
+        if shared and isinstance(each, Calibration)
+        else None
+        for each in given
+    ]
     triads = {
-        quantity: _triad(quantity, given, numbers, form, horizons[0], shared)
+        quantity: _triad(quantity, list(zip(given, numbers, together, strict=True)), form)
         for quantity in SENSORS
     }
     return Imu(
@@ -229,25 +236,19 @@ def imu_of(
 
 
 def _triad(
-    quantity: str,
-    given: Sequence[Any],
-    numbers: Sequence[SensorNumbers],
-    form: str,
-    horizon: float,
-    shared: bool,
+    quantity: str, sources: Sequence[tuple[Any, SensorNumbers, SensorNumbers | None]], form: str
 ) -> Triad:
+    """The axes of a quantity, of what was given, its numbers and those that its axes share."""
     axes: list[Axis] = []
     common = None
-    for source, each in zip(given, numbers, strict=True):
-        own = each.of(quantity)
+    for source, numbers, together in sources:
         fits = source.fits if isinstance(source, Calibration) else {}
-        found = [_axis(name, one, each.rate, fits.get(name)) for name, one in own.items()]
-        if found and fits and shared:
-            # The axes are judged by the numbers that the file has.
-            by_name = bound(source, form, horizon=horizon, shared=True).of(quantity)
-            common = next(iter(by_name.values()))
-            found = [replace(axis, nees=dict(by_name[axis.name].nees)) for axis in found]
-        axes += found
+        for name, one in numbers.of(quantity).items():
+            axis = _axis(name, one, numbers.rate, fits.get(name))
+            if together is not None:
+                common = together[name]
+                axis = replace(axis, nees=dict(common.nees))
+            axes.append(axis)
     sensor = SENSORS[quantity]
     if not axes:
         raise InputError(

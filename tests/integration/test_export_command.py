@@ -1,0 +1,131 @@
+"""``gmwm export``: files from calibrations, and how it refuses what it cannot use."""
+
+import sys
+
+import numpy as np
+import pytest
+import yaml
+
+import gmwm
+from gmwm import Channel, GaussMarkov, Recording, WhiteNoise, cli
+from gmwm.export import TARGETS
+from imu_numbers import numbers
+
+DT = 0.01
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was reported."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code
+        return code, *capsys.readouterr()
+
+    return _run
+
+
+@pytest.fixture(scope="module")
+def calibration():
+    rng = np.random.default_rng(4)
+    model = WhiteNoise(1e-4) + GaussMarkov(2e-4, 1.0)
+    channels = (("gyro", "rad/s"), ("accel", "m/s^2"))
+    recording = Recording(
+        tuple(
+            Channel(f"{q}_x", model.simulate(20_000, DT, rng), DT, q, unit) for q, unit in channels
+        ),
+        "bench.csv",
+    )
+    return gmwm.calibrate(recording, model.opened())
+
+
+@pytest.fixture
+def file(calibration, tmp_path):
+    return calibration.save(tmp_path / "calibration.json")
+
+
+def test_it_is_printed_or_written(run, file, calibration, tmp_path):
+    code, printed, reported = run("export", file, "--to", "openvins")
+    assert (code, reported) == (0, "")
+    assert printed == gmwm.export(calibration, "openvins")
+    code, said, _ = run("export", file, "--to", "openvins", "-o", "chain.yaml")
+    assert code == 0
+    assert said == "wrote chain.yaml\n"
+    assert (tmp_path / "chain.yaml").read_text() == printed
+
+
+def test_horizon_and_form(run, file, calibration):
+    code, printed, _ = run("export", file, "--to", "kalibr", "--horizon", "30", "--form", "N+K")
+    assert code == 0
+    assert printed == gmwm.export(calibration, "kalibr", horizon=30.0)
+    code, printed, _ = run("export", file, "--to", "state-space", "--form", "N+K+GM")
+    assert code == 0
+    assert printed == gmwm.export(calibration, "state-space", form="N+K+GM")
+
+
+def test_numbers_and_two_files(run, tmp_path):
+    for q, rate in (("gyro", 400.0), ("accel", 100.0)):
+        numbers("N+K", quantities=(q,), rate=rate).save(tmp_path / f"{q}.json")
+    code, printed, _ = run("export", "gyro.json", "accel.json", "--to", "kalibr")
+    assert code == 0
+    assert yaml.safe_load(printed)["update_rate"] == 400.0
+
+
+def test_arrays(run, file, tmp_path):
+    code, _, _ = run("export", file, "--to", "state-space", "-o", "model.npz")
+    assert code == 0
+    assert "gyro_x/discrete/F" in np.load(tmp_path / "model.npz")
+
+
+def test_the_list_has_every_program(run):
+    code, printed, _ = run("export", "--list")
+    assert code == 0
+    for name in TARGETS:
+        assert f"\n{name} " in printed, name
+
+
+def test_calibrate_writes_the_same_file(run, tmp_path):
+    rng = np.random.default_rng(7)
+    rows = rng.normal(size=(3000, 2)) * [1e-3, 1e-2]
+    lines = ["gyro_x,accel_x", *(f"{a:.9g},{b:.9g}" for a, b in rows), ""]
+    (tmp_path / "bench.csv").write_text("\n".join(lines))
+    units = ("--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
+    code, _, _ = run("calibrate", "bench.csv", "--rate", "100", *units, "-o", "out")
+    assert code == 0
+    code, printed, _ = run("export", "out/calibration.json", "--to", "kalibr")
+    assert code == 0
+    assert (tmp_path / "out" / "imu.yaml").read_text() == printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("calibration.json",), "needs files and a program"),
+        (("--to", "kalibr"), "needs files and a program"),
+        (("calibration.json", "--to", "rosbag"), "known are kalibr, openvins"),
+        (("nowhere.json", "--to", "kalibr"), "cannot be read"),
+        (("calibration.json", "--to", "kalibr", "--horizon", "0"), "give a positive time"),
+        (("calibration.json", "--to", "kalibr", "--form", "N+GM"), r"holds N+K only"),
+        (("calibration.json", "calibration.json", "--to", "vins"), "is given twice"),
+        (("calibration.json", "--to", "vins", "-o", "no/a.yaml"), "cannot be written"),
+        (("gyro.json", "--to", "vins"), "there is no accelerometer"),
+        (("fit.json", "--to", "vins"), "has no numbers to export"),
+    ],
+)
+def test_bad_input(run, file, calibration, tmp_path, arguments, message):
+    numbers("N+K", quantities=("gyro",)).save(tmp_path / "gyro.json")
+    calibration["gyro_x"].save(tmp_path / "fit.json")
+    before = sorted(path.name for path in tmp_path.iterdir())
+    code, printed, reported = run("export", *arguments)
+    assert code == 2
+    assert printed == ""
+    assert message in reported
+    assert reported.startswith("gmwm: ")
+    assert reported.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
