@@ -48,6 +48,12 @@ class ChainErrors:
         pairs = zip(self.actual, self.predicted, strict=True)
         return np.array([eigh(a, p, eigvals_only=True)[-1] for a, p in pairs])
 
+    def score(self) -> FloatArray:
+        """Expected negative logarithm of the predicted density at the truth, (T,)."""
+        size = self.predicted.shape[1]
+        log_det = np.linalg.slogdet(self.predicted)[1]
+        return np.asarray(0.5 * (size * self.nees() + log_det + size * np.log(2.0 * np.pi)))
+
     def tightness(self) -> FloatArray:
         """Predicted over true standard deviation of the last integral, (T,)."""
         return np.sqrt(self.predicted[:, -1, -1] / self.actual[:, -1, -1])
