@@ -29,6 +29,7 @@ from .filter_numbers import (
     FilterNumbers as FilterNumbers,
     SensorNumbers as SensorNumbers,
     bound as bound,
+    reduce as reduce,
 )
 from .process import (
     AR as AR,

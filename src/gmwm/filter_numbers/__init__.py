@@ -6,6 +6,7 @@ axis; which numbers are right depends on how long it goes without aiding, the ho
 
 from gmwm.filter_numbers.bound import bound
 from gmwm.filter_numbers.chain import Chain, ChainErrors
+from gmwm.filter_numbers.reduce import reduce
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "Predicted",
     "SensorNumbers",
     "bound",
+    "reduce",
 ]

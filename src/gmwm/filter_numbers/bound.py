@@ -133,7 +133,7 @@ def _bounded(
             horizon=horizon,
             initial_sd=sd,
             method="bound",
-            predicted=predicted(axis, model, sd, horizon),
+            predicted=predicted(axis, model, sd, (horizon, 10.0 * horizon)),
             notices=(*target.notices, *uncertainty(axis, level)),
             quantity=axis.quantity,
         )
@@ -150,9 +150,8 @@ def _start(axis: Axis, target: Target, model: Model) -> float:
     return float(np.sqrt(variance))
 
 
-def predicted(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Predicted, ...]:
-    """What a filter with these numbers knows of its error at one and ten horizons."""
-    times = (horizon, 10.0 * horizon)
+def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tuple[Predicted, ...]:
+    """What a filter with these numbers knows of its error after some times without aiding."""
     try:
         errors = Chain.usual(axis.quantity).errors(
             axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd

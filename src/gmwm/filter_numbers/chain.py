@@ -18,6 +18,7 @@ from scipy.linalg import block_diag, eigh
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
+from gmwm.filter_numbers.chain_kernels import settle
 from gmwm.process import Model, StateSpace
 
 
@@ -46,6 +47,12 @@ class ChainErrors:
         """Largest eigenvalue of P_predicted^-1 P_actual: the worst direction, (T,)."""
         pairs = zip(self.actual, self.predicted, strict=True)
         return np.array([eigh(a, p, eigvals_only=True)[-1] for a, p in pairs])
+
+    def score(self) -> FloatArray:
+        """Expected negative logarithm of the predicted density at the truth, (T,)."""
+        size = self.predicted.shape[1]
+        log_det = np.linalg.slogdet(self.predicted)[1]
+        return np.asarray(0.5 * (size * self.nees() + log_det + size * np.log(2.0 * np.pi)))
 
     def tightness(self) -> FloatArray:
         """Predicted over true standard deviation of the last integral, (T,)."""
@@ -119,21 +126,21 @@ class Chain:
         J = block_diag(start, np.zeros((q, q)), _moments(real))
         kept: list[tuple[float, FloatArray, FloatArray]] = []
 
-        def keep(time: float) -> None:
-            kept.append((time, P[:n, :n].copy(), J[:n, :n].copy()))
-
-        step = _Step.of(real, own, dt, n, self.interval)
         fixes = int(self.settled / self.interval)
-        for fix in range(fixes):
-            P, J = step.over(P, J)
-            P, J = _updated(P, J, n, q, self.fix_sd)
-            if every_fix and fix < fixes - 1:
-                keep((fix + 1 - fixes) * self.interval)
+        if fixes > 0:
+            step = _Step.of(real, own, dt, n, self.interval)
+            shape = (fixes - 1 if every_fix else 0, n, n)
+            after_P, after_J = np.empty(shape), np.empty(shape)
+            P, J = settle(
+                P, J, *step.filter, *step.joint, n, q, self.fix_sd**2, fixes, after_P, after_J
+            )
+            ages = (np.arange(shape[0]) + 1 - fixes) * self.interval
+            kept = list(zip(ages, after_P, after_J, strict=True))
         before = 0.0
         for time in times:
             P, J = _Step.of(real, own, dt, n, time - before).over(P, J)
             before = time
-            keep(time)
+            kept.append((time, P[:n, :n], J[:n, :n]))
         time, predicted, actual = (np.array(each) for each in zip(*kept, strict=True))
         return ChainErrors(time, predicted, actual)
 
@@ -165,23 +172,6 @@ class _Step:
     def over(self, P: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
         (A, Q), (B, R) = self.filter, self.joint
         return A @ P @ A.T + Q, B @ J @ B.T + R
-
-
-def _updated(
-    P: FloatArray, J: FloatArray, n: int, q: int, sd: float
-) -> tuple[FloatArray, FloatArray]:
-    """After a fix of the last integral."""
-    gain = P[:, n - 1] / (P[n - 1, n - 1] + sd**2)
-    own = np.eye(len(P))
-    own[:, n - 1] -= gain
-    both = np.eye(len(J))
-    # Feedback: the integrals are corrected, and the estimates take what their errors lose.
-    added = np.concatenate([-gain[:n], gain[n:], np.zeros(len(J) - n - q)])
-    both[:, n - 1] += added
-    return (
-        own @ P @ own.T + sd**2 * np.outer(gain, gain),
-        both @ J @ both.T + sd**2 * np.outer(added, added),
-    )
 
 
 def _with_constant(model: Model, sd: float, dt: float) -> StateSpace:

@@ -127,6 +127,21 @@ def dominating(problem: Problem, form: str) -> Model:
     return _scaled(problem, processes, variances)
 
 
+def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -> Model:
+    """The smallest model of a form that dominates with given correlation times, without zeros.
+
+    A spectrum without a limit at zero frequency is dominated down to the lowest frequency.
+    """
+    processes: list[Process] = [WhiteNoise(1.0)]
+    if "K" in form.split("+"):
+        processes.append(RandomWalk(1.0))
+    processes += [GaussMarkov(1.0, tau) for tau in taus]
+    walking = any(process.is_walk for process in processes)
+    shares = _solved(problem, _columns(problem, processes), walking)[1]
+    least = tuning.LEAST_SHARE * float(np.sum(shares))
+    return _scaled(problem, processes, np.maximum(shares, least))
+
+
 def _correlation_times(problem: Problem) -> FloatArray:
     """Logarithms of those that are tried: a grid, and those of the truth."""
     high = np.log(1.0 / problem.f[0])
@@ -150,14 +165,16 @@ def _columns(problem: Problem, processes: Sequence[Process]) -> FloatArray:
     )
 
 
-def _solved(problem: Problem, columns: FloatArray) -> tuple[float, FloatArray]:
+def _solved(
+    problem: Problem, columns: FloatArray, is_walking: bool = True
+) -> tuple[float, FloatArray]:
     """Least cost, and the share of it that each process has."""
     rows = columns / np.max(columns, axis=1, keepdims=True)
     right = 1.0 / np.max(columns, axis=1)
     least = [0.0] * columns.shape[1]
     least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.targets)
     walk = max(target.walk for target in problem.targets)
-    if walk > 0.0:
+    if walk > 0.0 and is_walking:
         least[1] = problem.cost(RandomWalk(1.0)) * walk
     found = linprog(
         np.ones(columns.shape[1]), A_ub=-rows, b_ub=-right,

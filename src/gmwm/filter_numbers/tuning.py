@@ -66,6 +66,26 @@ process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a ha
 (1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
 (NEES 1.07); see docs/filter-numbers.md."""
 
+# -- reduced numbers ------------------------------------------------------------------------------
+
+LEAST_SHARE = 1e-3
+"""Of the objective, that each number has at the start of the search: its logarithm is searched."""
+
+DIFFERENCE = 1e-4
+"""Of the logarithms of the numbers, for slopes."""
+
+SLOPE = 3e-3
+"""Of the score over the logarithm of a number, below which the search ends; as in `gmwm.ins`."""
+
+INERTIA = 1e-3
+"""Of the score, for a number's squared distance from the start: what does not matter stays."""
+
+STEPS = 60
+"""Of the search, at most."""
+
+FARTHEST = 12.0
+"""Largest logarithm of a factor on the start: beyond, numbers have no meaning any more."""
+
 # -- confidence regions ---------------------------------------------------------------------------
 
 REGION_DRAWS = 300

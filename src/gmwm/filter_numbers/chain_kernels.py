@@ -1,0 +1,60 @@
+"""Many fixes of a chain of integrators, in compiled code."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray
+
+
+@compiled()
+def settle(
+    P: FloatArray, J: FloatArray, A: FloatArray, Q: FloatArray, B: FloatArray, R: FloatArray,
+    n: int, q: int, variance: float, fixes: int, out_P: FloatArray, out_J: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Propagate and update by fixes of the last integral.
+
+    Parameters
+    ----------
+    P, A, Q : (n + q, n + q) ndarray
+        The filter's covariance, its transition between fixes, its noise.
+    J, B, R : (m, m) ndarray
+        The same of the joint vector: errors of the integrals, estimates of the states, true states.
+    n, q : int
+        Integrals, and states of the filter.
+    variance : float
+        Of a fix.
+    fixes : int
+    out_P, out_J : (K, n, n) ndarray
+        Covariances of the integrals after the first K fixes.
+
+    Returns
+    -------
+    P, J : ndarray
+        After the last fix.
+    """
+    size, total = P.shape[0], J.shape[0]
+    added = np.zeros(total)
+    for fix in range(fixes):
+        P = A @ P @ A.T + Q
+        J = B @ J @ B.T + R
+        gain = P[:, n - 1] / (P[n - 1, n - 1] + variance)
+        row = P[n - 1].copy()
+        for i in range(size):
+            for j in range(size):
+                P[i, j] -= 0.5 * (gain[i] * row[j] + row[i] * gain[j])
+        # Feedback: the integrals are corrected, and the estimates take what their errors lose.
+        for i in range(n):
+            added[i] = -gain[i]
+        for i in range(n, n + q):
+            added[i] = gain[i]
+        first = J[n - 1].copy()
+        own = first[n - 1] + variance
+        for i in range(total):
+            for j in range(total):
+                J[i, j] += added[i] * first[j] + first[i] * added[j] + own * added[i] * added[j]
+        if fix < out_P.shape[0]:
+            out_P[fix] = P[:n, :n]
+            out_J[fix] = J[:n, :n]
+    return P, J

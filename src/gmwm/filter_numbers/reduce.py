@@ -1,0 +1,176 @@
+"""Numbers with which a small filter is consistent, for given times without aiding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+from scipy.optimize import minimize
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.bound import predicted, uncertainty
+from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.dominance import Problem, with_correlation_times
+from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
+from gmwm.filter_numbers.target import Target
+from gmwm.process import Model
+
+_TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}
+"""Correlation times at the start of the search, over the longest outage."""
+
+
+@overload
+def reduce(
+    source: One,
+    form: str = ...,
+    outages: Sequence[float] = ...,
+    *,
+    bias_sd: Sd = ...,
+    dt: float | None = ...,
+    progress: Progress | None = ...,
+) -> FilterNumbers: ...
+@overload
+def reduce(
+    source: Several,
+    form: str = ...,
+    outages: Sequence[float] = ...,
+    *,
+    bias_sd: Sd = ...,
+    shared: bool = ...,
+    dt: float | None = ...,
+    progress: Progress | None = ...,
+) -> SensorNumbers: ...
+def reduce(
+    source: One | Several,
+    form: str = "N+K",
+    outages: Sequence[float] = (10.0, 30.0, 60.0),
+    *,
+    bias_sd: Sd = 0.0,
+    shared: bool = False,
+    dt: float | None = None,
+    progress: Progress | None = None,
+) -> FilterNumbers | SensorNumbers:
+    """The numbers of a form that make a small filter consistent, and as accurate as it can be.
+
+    Unlike those of `gmwm.bound` they may be too optimistic in some direction or at other times.
+
+    Parameters
+    ----------
+    source : Process, Model, Fit, Calibration or mapping
+        The error model of an axis, or of several by channel name.
+    form : {"N+K", "N+GM", "N+K+GM", "N+2GM"}
+        White noise with a random walk, with Gauss-Markov processes, or both.
+    outages : sequence of float, optional
+        Times without aiding for which they shall be good, s.
+    bias_sd : float or mapping, optional
+        Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind
+        ("gyro", "accel") if a mapping.
+    shared : bool, optional
+        Whether axes of a kind have the same numbers.
+    dt : float, optional
+        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    progress : callable, optional
+        Called as ``progress(done, total, channel)``.
+
+    Returns
+    -------
+    FilterNumbers or SensorNumbers
+        Of one axis, or by channel; the horizon is the longest outage, and what is predicted is at
+        each of them and at ten times the longest.
+
+    Raises
+    ------
+    InputError
+        If a parameter is open, a term has no state-space form, or there is no outage.
+
+    Notes
+    -----
+    They minimise the expected negative logarithm of the predicted density at the true error of the
+    integrals at the end of the outages: a proper score, which punishes a covariance that is too
+    small as it does one that is too large. The expectation is exact for the truth given, in the
+    filter of `gmwm.filter_numbers.Chain`. `gmwm.ins.reduce` does the same in a whole navigation
+    filter on a trajectory.
+    """
+    checks.choice("form", form, FORMS)
+    times = sorted({checks.positive("outage", each) for each in outages})
+    if not times:
+        raise InputError("outages: give one length at least, s")
+    axes = Axes.of(source, dt, bias_sd)
+    done = 0
+
+    def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
+        nonlocal done
+        if progress is not None:
+            progress(done, len(axes.axes), group[0].name)
+        done += len(group)
+        return _reduced(group, form, times)
+
+    result = axes.numbers(found, shared)
+    if progress is not None:
+        progress(done, done, "")
+    return result
+
+
+def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[FilterNumbers]:
+    longest = times[-1]
+    targets = [Target.of(axis.model, axis.dt, longest) for axis in group]
+    start, sd = _start(group, targets, form, longest)
+    names = list(start.params)
+    values = np.array([float(start.params[name] or 0.0) for name in names])
+
+    def scaled(logs: FloatArray) -> Model:
+        return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
+
+    def cost(logs: FloatArray) -> float:
+        if np.max(np.abs(logs)) > tuning.FARTHEST:
+            return float("inf")
+        model = scaled(logs)
+        total = 0.0
+        for axis in group:
+            errors = Chain.usual(axis.quantity).errors(
+                axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
+            )
+            total += float(np.sum(errors.score()))
+        return total / len(group) + tuning.INERTIA * float(logs @ logs)
+
+    best = minimize(
+        cost, np.zeros(len(names)), method="BFGS",
+        options={"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS},
+    ).x  # fmt: skip
+    model = scaled(best)
+    return [
+        FilterNumbers(
+            form=form,
+            model=model,
+            horizon=longest,
+            initial_sd=sd,
+            method="reduce",
+            predicted=predicted(axis, model, sd, (*times, 10.0 * longest)),
+            notices=(*target.notices, *uncertainty(axis, None)),
+            quantity=axis.quantity,
+        )
+        for axis, target in zip(group, targets, strict=True)
+    ]
+
+
+def _start(
+    group: Sequence[Axis], targets: Sequence[Target], form: str, longest: float
+) -> tuple[Model, float]:
+    """A bound with given correlation times, without zeros; standard deviation at the start."""
+    problem = Problem(tuple(targets), longest)
+    taus = [factor * longest for factor in _TIMES[form]]
+    model = with_correlation_times(problem, form, taus)
+    walking = any(term.is_walk for term in model.terms)
+    variance = 0.0
+    for axis, target in zip(group, targets, strict=True):
+        own = axis.bias_sd**2 + target.constant_sd**2
+        if walking:
+            still = Model(tuple(term for term in model.terms if not term.is_walk))
+            own += target.slow_variance(still)
+        variance = max(variance, own)
+    return model, float(np.sqrt(variance))

@@ -1,0 +1,119 @@
+"""Reductions: consistent where they are asked to be, whatever the length of the record."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import gmwm
+from error_models import DT, TRUTHS
+from gmwm import GaussMarkov, InputError, RandomWalk, SensorNumbers, WhiteNoise
+from gmwm.filter_numbers import Chain
+from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
+from gmwm.study.sensor_tables import TABLE_6
+
+ONE = TRUTHS["one"]
+OUTAGES = (10.0, 30.0, 60.0)
+SENSORS = {
+    "one": ONE,
+    "three": TRUTHS["three"],
+    "other three": WhiteNoise(3e-4)
+    + GaussMarkov(5e-4, 1.0)
+    + GaussMarkov(2e-4, 40.0)
+    + GaussMarkov(2e-4, 700.0),
+}
+
+
+@pytest.mark.parametrize("form", ["N+K", "N+GM", "N+2GM", "N+K+GM"])
+@pytest.mark.parametrize("name", SENSORS)
+@pytest.mark.parametrize("channel", ["gyro_x", "accel_x"])
+def test_it_is_consistent_at_the_outages(name, form, channel):
+    found = gmwm.reduce({channel: SENSORS[name]}, form)[channel]
+    assert list(found.nees) == [*OUTAGES, 600.0]
+    for time in OUTAGES:
+        assert 0.9 < found.nees[time] < 1.1
+        assert 0.9 < found.tightness[time] < 1.15
+
+
+def test_a_search_of_another_kind_finds_little_more():
+    truth = TRUTHS["two"]
+    found = gmwm.reduce({"gyro_x": truth}, "N+GM")["gyro_x"]
+    keys = list(found.model.params)
+    values = np.array(list(found.model.params.values()))
+    chain = Chain.usual("gyro")
+
+    def cost(logs):
+        model = found.model.with_params(dict(zip(keys, values * np.exp(logs), strict=True)))
+        errors = chain.errors(truth, model, DT, OUTAGES, believed_sd=found.initial_sd)
+        return float(np.sum(errors.score()))
+
+    simplex = np.vstack([np.zeros(3), 0.3 * np.eye(3)])
+    options = {"initial_simplex": simplex, "maxfev": 100, "fatol": 1e-4, "xatol": 1e-2}
+    again = minimize(cost, np.zeros(3), method="Nelder-Mead", options=options)
+    assert cost(np.zeros(3)) - again.fun < 0.02
+
+
+def test_a_model_that_has_the_form_comes_back():
+    walk = WhiteNoise(1e-4) + RandomWalk(2e-5)
+    found = gmwm.reduce({"gyro_x": walk}, "N+K")["gyro_x"]
+    assert pytest.approx((1e-4, 2e-5), rel=0.05) == (found.N, found.K)
+    assert found.nees[600.0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_numbers_do_not_depend_on_the_length_of_the_record():
+    found = []
+    for hours, seed in ((1, 3), (16, 4)):
+        fit = gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(hours * 3600, 1.0, seed), 1.0)
+        found.append(gmwm.reduce({"gyro_x": fit.model}, dt=1.0)["gyro_x"].K)
+    right = gmwm.reduce({"gyro_x": ONE}, dt=1.0)["gyro_x"].K
+    assert right == pytest.approx(4.6e-6, rel=0.1)
+    # The standard error of sigma^2/tau from one hour is some 25 %, of K half of that.
+    assert found[0] == pytest.approx(right, rel=0.4)
+    assert found[1] == pytest.approx(right, rel=0.1)
+
+
+def test_the_navigation_filter_is_consistent_with_them():
+    """On a flight, with all six axes at once."""
+    models = SensorModels.of(TABLE_6).models
+    numbers = gmwm.reduce(models, "N+K", shared=True, dt=0.1)
+    flight = fixed_wing_loiter(duration=590.0, dt=0.1)
+    outages = (Outage(120.0, 10.0), Outage(250.0, 30.0), Outage(400.0, 60.0))
+    scenario = Scenario(flight, gnss(flight), outages, interval=100.0, step=0.5)
+    believed = SensorModels.of(
+        {name: each.model for name, each in numbers.items()},
+        {name: each.initial_sd for name, each in numbers.items()},
+    )
+    analysis = covariance_analysis(scenario, SensorModels.of(TABLE_6), believed)
+    for outage in outages:
+        assert 0.9 < analysis.nees()[analysis.index(outage.end)] < 1.1
+
+
+def test_axes_may_share_their_numbers():
+    models = {"gyro_x": ONE, "gyro_y": TRUTHS["two"], "accel_x": TRUTHS["three"]}
+    steps = []
+    shared = gmwm.reduce(models, shared=True, progress=lambda *each: steps.append(each))
+    assert isinstance(shared, SensorNumbers)
+    assert list(shared) == list(models)
+    assert shared["gyro_x"].model == shared["gyro_y"].model
+    # Right for both together: too timid for the one, too bold for the other.
+    assert shared["gyro_x"].nees[60.0] < 1.0 < shared["gyro_y"].nees[60.0]
+    assert steps == [(0, 3, "gyro_x"), (2, 3, "accel_x"), (3, 3, "")]
+
+
+def test_a_turn_on_bias_is_part_of_the_start():
+    found = gmwm.reduce(ONE, bias_sd=1e-3)
+    assert found.initial_sd == pytest.approx(np.hypot(1e-3, 4e-5), rel=0.02)
+    assert gmwm.reduce(ONE, "N+GM", bias_sd=1e-3).initial_sd == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"form": "N"}, r"form = 'N': known are N\+K, N\+GM, N\+K\+GM, N\+2GM"),
+        ({"outages": ()}, "outages: give one length at least"),
+        ({"outages": (10.0, -1.0)}, r"outage = -1\.0"),
+        ({"bias_sd": float("nan")}, "bias_sd = nan"),
+    ],
+)
+def test_what_cannot_be_used(options, message):
+    with pytest.raises(InputError, match=message):
+        gmwm.reduce(ONE, **options)
