@@ -55,7 +55,7 @@ def about(imu: Imu, title: str, convention: str) -> list[str]:
     if any(axis.nees for triad in imu.triads for axis in triad.axes):
         lines += _wrapped(
             "NEES: predicted error squared over what a filter with these numbers believes, after "
-            "that time without aiding; 1 is consistent, below 1 is cautious"
+            "that time without aiding; 1 is consistent, below 1 cautious, above 1 too optimistic"
         )
     for quantity, by_horizon in imu.outlook.items():
         values = (f"{t:g} s: {n:.3e}, {k:.3e}" for t, (n, k) in by_horizon.items())

@@ -46,7 +46,8 @@ def export(
     Parameters
     ----------
     numbers : Calibration, SensorNumbers, or a sequence of them
-        Of a calibration, those of `gmwm.bound` are written. Several together make one IMU, such as
+        Of a calibration, those of `gmwm.bound` are written; those of `gmwm.reduce` if it has a
+        random walk and the program has no place for one. Several together make one IMU, such as
         gyros and accelerometers of different rates.
     target : str
         Name of the program: "kalibr", "gtsam", ...

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gmwm.export import tuning
 from gmwm.export.imu import Imu
 from gmwm.export.target import ImuFile
 
@@ -74,7 +75,7 @@ _SOURCE = (
 
 GTSAM = (
     ImuFile("gtsam", "GTSAM", "parameters of combined preintegration, Python", _CONVENTION, _SOURCE,
-           _python, horizon=1.0),
+           _python, horizon=tuning.KEYFRAME),
     ImuFile("gtsam-cpp", "GTSAM", "parameters of combined preintegration, C++", _CONVENTION,
-           _SOURCE, _cpp, horizon=1.0, mark="//"),
+           _SOURCE, _cpp, horizon=tuning.KEYFRAME, mark="//"),
 )  # fmt: skip

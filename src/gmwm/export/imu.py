@@ -14,7 +14,7 @@ from gmwm.calibration import Calibration, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export import tuning
-from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound
+from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound, reduce
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
@@ -231,7 +231,7 @@ def imu_of(
         next(one.method for each in numbers for one in each.values()),
         sources=tuple(map(_source, numbers)),
         outlook=_outlook(given),
-        remarks=_remarks(numbers),
+        remarks=_remarks(given, numbers),
     )  # fmt: skip
 
 
@@ -272,7 +272,9 @@ def _triad(
 
 
 def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:
-    """Numbers of a form: those of a calibration, or given ones if they have it.
+    """Numbers of a form: those that bound a calibration, or given ones if they have it.
+
+    Where a calibration has a random walk and the form none, they are those of `gmwm.reduce`.
 
     Raises
     ------
@@ -280,16 +282,11 @@ def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> Se
         If they have not.
     """
     if isinstance(given, Calibration):
-        walks = [
-            name for name, fit in given.items() if any(term.is_walk for term in fit.model.terms)
-        ]
-        if walks and form == "N+GM":
-            raise InputError(
-                f"the slow errors of {', '.join(walks)} grow without limit, which {form} cannot "
-                "bound: give numbers that gmwm.reduce makes in this form, or choose a program that "
-                "holds a random walk"
-            )
-        return bound(given, form, horizon=usual if horizon is None else horizon)
+        time = usual if horizon is None else horizon
+        if form == "N+GM" and any(_walks(fit) for fit in given.values()):
+            # No stationary process bounds a random walk; the best one for outages is found.
+            return reduce(given, form, [share * time for share in tuning.OUTAGES])
+        return bound(given, form, horizon=time)
     if not isinstance(given, SensorNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, or what "
@@ -326,6 +323,10 @@ def _axis(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) ->
     return axis
 
 
+def _walks(fit: Fit) -> bool:
+    return any(term.is_walk for term in fit.model.terms)
+
+
 def _outlook(given: Sequence[Any]) -> dict[str, dict[float, tuple[float, float]]]:
     """N and K for all axes at other horizons, where the models are known."""
     if not all(isinstance(each, Calibration) for each in given):
@@ -339,9 +340,15 @@ def _outlook(given: Sequence[Any]) -> dict[str, dict[float, tuple[float, float]]
     return found
 
 
-def _remarks(numbers: Sequence[SensorNumbers]) -> tuple[str, ...]:
+def _remarks(given: Sequence[Any], numbers: Sequence[SensorNumbers]) -> tuple[str, ...]:
     """Each notice once, after the channels that it is about."""
     places: dict[str, list[str]] = {}
+    for source, each in zip(given, numbers, strict=True):
+        walks = [name for name, fit in source.items() if isinstance(fit, Fit) and _walks(fit)]
+        if walks and "K" not in each.form:
+            places[
+                f"a random walk, which {each.form} cannot bound: gmwm.reduce, not gmwm.bound"
+            ] = walks
     for each in numbers:
         for notice in each.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)

@@ -236,7 +236,7 @@ OKVIS2 = ImuFile(
 MAPLAB = ImuFile(
     "maplab", "maplab", "the IMU in the sensors file", _CONTINUOUS,
     "map-structure/sensors/src/imu.cc; algorithms/imu-integrator-rk4/include/imu-integrator/"
-    "imu-integrator-inl.h: getCovarianceTransitionDerivatives",
+    "imu-integrator-inl.h: getCovarianceTransitionDerivativesRungeKutta",
     Keys(_named("gyro_noise_density", "acc_noise_density",
                 "gyro_bias_random_walk_noise_density", "acc_bias_random_walk_noise_density"),
          before=("sigmas:",), indent="  "),

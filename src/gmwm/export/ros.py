@@ -7,6 +7,7 @@ mean that it is not known, -1 in the first place that there is no such measureme
 from __future__ import annotations
 
 from gmwm.errors import InputError
+from gmwm.export import tuning
 from gmwm.export.imu import Imu, Triad
 from gmwm.export.target import ImuFile
 
@@ -37,5 +38,5 @@ ROS = ImuFile(
     "ros-covariance", "ROS", "covariances of sensor_msgs/Imu",
     "N^2 f of each axis, the variance of the white noise of one sample at the rate f, on the "
     "diagonal of a row-major 3 x 3 matrix; slow errors have no place in it",
-    "common_interfaces/sensor_msgs/msg/Imu.msg", _body, horizon=1.0,
+    "common_interfaces/sensor_msgs/msg/Imu.msg", _body, horizon=tuning.KEYFRAME,
 )  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import gmwm
-from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound
+from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm.export import TARGETS
 from gmwm.process import as_model
 from imu_numbers import numbers
@@ -337,10 +337,16 @@ def test_nothing_that_a_filter_divides_by_is_zero():
         gmwm.export(replace(given, axes=no_walk), "kalibr")
 
 
-@pytest.mark.parametrize("name", ["gazebo", "kfgins", "gnss-ins-sim"])
-def test_a_walk_has_no_bound_of_a_stationary_process(calibration, name):
-    with pytest.raises(InputError, match="gyro_x, gyro_y grow without limit"):
-        gmwm.export(calibration, name)
+def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibration):
+    # No stationary process bounds it.
+    text = gmwm.export(calibration, "kfgins", horizon=30.0)
+    assert "gyro_x, gyro_y: a random walk, which N+GM cannot bound" in text
+    assert "see gmwm.reduce" in text
+    found = reduce(calibration, "N+GM", [5.0, 15.0, 30.0])
+    content = yaml.safe_load(text)["imunoise"]
+    arw = np.radians(np.array(content["arw"][:2])) / 60.0
+    assert arw == pytest.approx([found[f"gyro_{axis}"].N for axis in "xy"], rel=1e-5)
+    assert "gmwm.reduce" not in gmwm.export(calibration, "kalibr")
 
 
 @pytest.mark.parametrize(

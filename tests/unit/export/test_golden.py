@@ -7,7 +7,7 @@ import pytest
 import gmwm
 from gmwm.export import TARGETS
 from imu_numbers import FORMS, numbers
-from places import GOLDEN
+from places import GOLDEN, REPOSITORY
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 SOURCE = "bench.csv, a name\nof two lines: {\\"
@@ -32,6 +32,12 @@ def test_file(name):
 
 def test_nothing_else_is_kept():
     assert {path.stem for path in (GOLDEN / "export").iterdir()} == set(TARGETS)
+
+
+def test_the_page_of_programs_has_them_all():
+    page = (REPOSITORY / "docs" / "export.md").read_text(encoding="utf-8")
+    for name in TARGETS:
+        assert f"`{name}`" in page, name
 
 
 if __name__ == "__main__":
