@@ -346,10 +346,8 @@ def _remarks(given: Sequence[Any], numbers: Sequence[SensorNumbers]) -> tuple[st
     for source, each in zip(given, numbers, strict=True):
         walks = [name for name, fit in source.items() if isinstance(fit, Fit) and _walks(fit)]
         if walks and "K" not in each.form:
-            places[
-                f"a random walk, which {each.form} cannot bound: gmwm.reduce, not gmwm.bound"
-            ] = walks
-    for each in numbers:
+            text = f"a random walk, which {each.form} cannot bound: gmwm.reduce, not gmwm.bound"
+            places[text] = walks
         for notice in each.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
     return tuple(f"{', '.join(where)}: {text}" for text, where in places.items())

@@ -341,7 +341,7 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     # No stationary process bounds it.
     text = gmwm.export(calibration, "kfgins", horizon=30.0)
     assert "gyro_x, gyro_y: a random walk, which N+GM cannot bound" in text
-    assert "see gmwm.reduce" in text
+    assert "whose filter has the right errors at the horizon" in text
     found = reduce(calibration, "N+GM", [5.0, 15.0, 30.0])
     content = yaml.safe_load(text)["imunoise"]
     arw = np.radians(np.array(content["arw"][:2])) / 60.0
