@@ -47,6 +47,8 @@ def main(path: Path) -> None:
         print(name, fit.params, fit.interval(0.9), bound.stderr, noise)
     calibration.report("report.html")
     calibration.save("calibration.json")
+    text: str = gmwm.export(calibration, "openvins", horizon=2.0)
+    print(len(text))
     print(corrected(WhiteNoise(N=0.1) + GaussMarkov(sigma=1.0, tau=3.0)), Hum(level=1.0).values)
     print(GaussMarkov(sigma=1.0, tau=3.0).tau * 2.0)
 

@@ -13,8 +13,8 @@ from gmwm.errors import InputError
 @click.argument("files", metavar="FILE...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--to", "target", metavar="NAME", help="The program; see --list.")
 @click.option("--horizon", type=float, metavar="T",
-              help="Seconds without aiding that the numbers are for; by default 1 (keyframes, "
-                   "scans) or 60, see --list.")  # fmt: skip
+              help="Time without aiding that the numbers are for, in seconds; by default 1 "
+                   "(keyframes, scans) or 60, see --list.")  # fmt: skip
 @click.option("--form", metavar="FORM",
               help="N+K, N+GM, ...: most programs hold one; state-space holds any.")  # fmt: skip
 @click.option("-o", "--output", type=click.Path(path_type=Path),

@@ -10,6 +10,8 @@ from gmwm.export.imu import Axis, Imu, Triad
 
 WIDTH = 92
 
+_LONGEST = 500  # characters of one remark or name
+
 _HOW = {
     "bound": "the smallest that are never too optimistic for the error models",
     "reduce": "those whose filter has the right errors at the horizon, see gmwm.reduce",
@@ -28,7 +30,7 @@ def plain(text: str) -> str:
     Line ends of every kind become blanks; other control characters, and a backslash, which
     continues a C++ comment on the next line, become question marks.
     """
-    line = " ".join(text.split())[:200]
+    line = " ".join(text.split())[:_LONGEST]
     return "".join(c if c.isprintable() and c != "\\" else "?" for c in line)
 
 

@@ -241,11 +241,12 @@ def _triad(
     """The axes of a quantity, of what was given, its numbers and those that its axes share."""
     axes: list[Axis] = []
     common = None
-    for source, numbers, together in sources:
+    holding = [each for each in sources if each[1].of(quantity)]
+    for source, numbers, together in holding:
         fits = source.fits if isinstance(source, Calibration) else {}
         for name, one in numbers.of(quantity).items():
             axis = _axis(name, one, numbers.rate, fits.get(name))
-            if together is not None:
+            if together is not None and len(holding) == 1:
                 common = together[name]
                 axis = replace(axis, nees=dict(common.nees))
             axes.append(axis)
@@ -260,15 +261,14 @@ def _triad(
             f"{', '.join(axis.name for axis in axes)} are more than three axes: export one IMU at "
             "a time"
         )
-    triad = Triad(quantity, tuple(axes), common)
-    letter = "K" if "K" in form else "N"
-    for key in ("N", letter):
-        if not getattr(triad, key) > 0.0:
-            raise InputError(
-                f"{key} of the {sensor} is zero, by which filters divide: give numbers with one, "
-                "or export the calibration, which knows an upper bound"
-            )
-    return triad
+    for axis in axes:
+        for key in ("N", "K" if "K" in form else "sigma"):
+            if not getattr(axis, key) > 0.0:
+                raise InputError(
+                    f"{key} of {axis.name} is zero, by which filters divide: give numbers with "
+                    "one, or export the calibration, which knows an upper bound"
+                )
+    return Triad(quantity, tuple(axes), common)
 
 
 def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:

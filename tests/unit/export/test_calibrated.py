@@ -308,6 +308,18 @@ def test_two_recordings_of_different_rates(slow):
     assert yaml.safe_load(text)["acc_n"] == pytest.approx(one.N * np.sqrt(400.0), rel=1e-6)
 
 
+def test_axes_of_one_sensor_in_two_calibrations_have_the_larger_numbers(slow):
+    # A bound over the axes of one of them would not be one of the other's.
+    parts = [
+        replace(slow, fits={n: f for n, f in slow.items() if n[-1] == axis}) for axis in "xy"
+    ]
+    for order in (parts, parts[::-1]):
+        content = yaml.safe_load(gmwm.export(order, "kalibr"))
+        found = bound(slow, "N+K", 1.0).of("gyro").values()
+        assert content["gyroscope_random_walk"] == pytest.approx(max(each.K for each in found))
+        assert content["gyroscope_noise_density"] == pytest.approx(max(each.N for each in found))
+
+
 def test_numbers_that_were_found_before():
     given = numbers("N+K")
     assert gmwm.export(given, "kalibr", horizon=60.0) == gmwm.export(given, "kalibr")
@@ -333,7 +345,7 @@ def test_nothing_that_a_filter_divides_by_is_zero():
         name: replace(each, model=WhiteNoise(each.N) + RandomWalk(0.0), initial_sd=0.0)
         for name, each in given.items()
     }
-    with pytest.raises(InputError, match="K of the gyroscope is zero"):
+    with pytest.raises(InputError, match="K of gyro_x is zero"):
         gmwm.export(replace(given, axes=no_walk), "kalibr")
 
 

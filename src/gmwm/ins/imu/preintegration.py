@@ -127,7 +127,8 @@ def preintegrate(
     -----
     The error of each sample is H x + v, with x[k+1] = F x[k] + w the exact samples of the models.
     Rate and specific force are constant within a step in body axes; turns within a step count in
-    full. To first order in the errors nothing else is approximated.
+    full. To first order in the errors nothing else is approximated. The mean of a rate ramp is no
+    variance: take it off the increments.
     """
     models = SensorModels.of(models)
     parts = [models.models[axis].state_space(imu.dt) for axis in AXES]
