@@ -25,9 +25,13 @@ from .estimate import (
     fit as fit,
 )
 from .filter_numbers import (
+    Certificate as Certificate,
     FilterNumbers as FilterNumbers,
+    Imperfections as Imperfections,
+    Motion as Motion,
     SensorNumbers as SensorNumbers,
     bound as bound,
+    certify as certify,
     reduce as reduce,
 )
 from .process import (

@@ -12,7 +12,6 @@ from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
-from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.dominance import KINDS, Problem, dominating
 from gmwm.filter_numbers.region import region_envelope
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
@@ -110,14 +109,15 @@ def bound(
         level = checks.share("level", level, 0.95)
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
-        return _bounded(group, form, horizon, level)
+        return bound_of(group, form, horizon, level)
 
     return axes.numbers(found, shared)
 
 
-def _bounded(
+def bound_of(
     group: Sequence[Axis], form: str, horizon: float, level: float | None
 ) -> list[FilterNumbers]:
+    """The bound of axes that share their numbers; see `bound`."""
     targets = tuple(Target.of(axis.model, axis.dt, horizon) for axis in group)
     envelope = None
     if level is not None:
@@ -153,7 +153,7 @@ def _start(axis: Axis, target: Target, model: Model) -> float:
 def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tuple[Predicted, ...]:
     """What a filter with these numbers knows of its error after some times without aiding."""
     try:
-        errors = Chain.usual(axis.quantity).errors(
+        errors = axis.chain.errors(
             axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
         )
     except InputError:

@@ -202,7 +202,7 @@ def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) 
     ratio = short(fine)
     most = float(np.max(ratio))
     # A maximum lies between two of the points.
-    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most):
+    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most).tolist():
         ends = fine[max(place - 1, 0)], fine[min(place + 1, fine.size - 1)]
         most = max(most, float(np.max(short(np.geomspace(*ends, tuning.REFINED)))))
     variances = variances * max(most, 1.0) * tuning.SAFETY
