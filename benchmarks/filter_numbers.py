@@ -1,6 +1,7 @@
 """Numbers for small filters: how tight, how consistent, and how they go with the record.
 
-Run with ``python benchmarks/filter_numbers.py length | tightness | rules | flight``; the tables of
+Run with ``python benchmarks/filter_numbers.py length | tightness | rules | flight``, or
+``... real FOLDER`` with the four ADIS16405 recordings; the tables of
 docs/filter-numbers.md. All but ``length``, which simulates and fits records, are exact covariance
 analyses.
 """
@@ -15,7 +16,13 @@ import gmwm
 from gmwm import BiasInstability, GaussMarkov, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.calibration import random_walk
 from gmwm.filter_numbers import Chain
-from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
+from gmwm.ins import (
+    Recorded,
+    SensorModels,
+    covariance_analysis,
+    loiter_with_outages,
+    monte_carlo,
+)
 from gmwm.study.sensor_tables import TABLE_6
 
 DT = 0.01
@@ -164,6 +171,63 @@ def flight() -> None:
                   + f"{analysis.nees()[at]:>8.3f}{ratio.max():>9.4f}", flush=True)  # fmt: skip
 
 
+# Of the ADIS16405 in u/sqrt(Hz) and u: 2 deg/sqrt(h), 0.007 deg/s; 0.2 m/s/sqrt(h), 0.2 mg.
+_SHEET = {"gyro": (5.8e-4, 1.2e-4), "accel": (3.3e-3, 2.0e-3)}
+
+
+def real(folder: str) -> None:
+    """Certified and measured NEES: one recording is calibrated, the others are navigated with."""
+    recordings = [
+        gmwm.read(f"{folder}/adis16405_{k}.csv.gz", rate=100.0,
+                  units={"gyro": "deg/s", "accel": "g"})
+        for k in (1, 2, 3, 4)
+    ]  # fmt: skip
+    scenario = loiter_with_outages((10.0, 60.0), DT)
+    print("position error at the end of outages of 10 and 60 s: certified NEES, and measured with")
+    print("the errors of the other three recordings, 24 runs of each")
+    print(f"{'calibrated':<12}{'numbers':<14}{'certified':>20}{'measured':>20}")
+    for k, recording in enumerate(recordings):
+        calibration = gmwm.calibrate(recording)
+        models = {name: fit.model for name, fit in calibration.items()}
+        lines = {}
+        for name, fit in calibration.items():
+            tau, deviation = fit.wv.tau, fit.wv.allan_deviation
+            at = lambda t, x=tau, y=deviation: float(np.interp(np.log(t), np.log(x), y))  # noqa: E731
+            lines[name] = (at(1.0), at(1000.0) * np.sqrt(3.0 / 1000.0))
+        sheet = {kind: (N, B / np.sqrt(1000.0)) for kind, (N, B) in _SHEET.items()}
+        given = {
+            "data sheet": sheet,
+            "Allan lines": lines,
+            "lines x 10": {name: (10.0 * N, 10.0 * K) for name, (N, K) in lines.items()},
+            "bound": gmwm.bound(calibration),
+            "reduce": gmwm.reduce(models, outages=(10.0, 60.0)),
+        }
+        certificates = {name: gmwm.certify(models, numbers) for name, numbers in given.items()}
+        filters = {
+            name: SensorModels.of(
+                {axis: each.model for axis, each in found.numbers.items()},
+                {axis: each.initial_sd for axis, each in found.numbers.items()},
+            )
+            for name, found in certificates.items()
+        }
+        others = [each for i, each in enumerate(recordings) if i != k]
+        source = Recorded.of(others, scenario.trajectory.duration)
+        runs = monte_carlo(scenario, source, filters, min(24, source.available or 24))
+        for name, found in certificates.items():
+            certified = [check.nees for check in found.of("outage")]
+            measured = [
+                float(np.mean(runs[name].nees[:, runs[name].index(outage.end), 0])) / 3.0
+                for outage in scenario.outages
+            ]
+            print(f"{k + 1:<12}{name:<14}" + "".join(f"{v:>10.3g}" for v in certified + measured),
+                  flush=True)  # fmt: skip
+        for notice in next(iter(certificates.values())).notices:
+            print(f"  {notice}")
+
+
 if __name__ == "__main__":
-    for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
-        {"length": length, "tightness": tightness, "rules": rules, "flight": flight}[part]()
+    if sys.argv[1:2] == ["real"]:
+        real(sys.argv[2])
+    else:
+        for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
+            {"length": length, "tightness": tightness, "rules": rules, "flight": flight}[part]()

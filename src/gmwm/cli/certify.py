@@ -28,18 +28,21 @@ _GRAVITY = 9.80665
 @click.option("-K", "walk", metavar="GYRO,ACCEL",
               help="with random walks, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).")  # fmt: skip
 @click.option("--outages", default="10,60", show_default=True, metavar="T,T,...",
-              help="Times without aiding, s.")  # fmt: skip
+              help="Times without aiding in seconds.")  # fmt: skip
 @click.option("--keyframe", type=float, default=1.0, show_default=True, metavar="S",
-              help="Interval of keyframes or scans.")  # fmt: skip
+              help="Interval of keyframes or scans in seconds.")  # fmt: skip
 @click.option(
     "--motion",
     metavar="NAME",
     help="handheld, drone, car, fixed-wing, or a recording of your own motion, for:",
 )
-@click.option("--scale-error", type=float, default=0.0, metavar="PERCENT")
-@click.option("--misalignment", type=float, default=0.0, metavar="DEG")
-@click.option("--g-sensitivity", type=float, default=0.0, metavar="DEG/S/G")
-@click.option("--time-offset", type=float, default=0.0, metavar="MS")
+@click.option("--scale-error", type=float, default=0.0, metavar="PERCENT",
+              help="of both sensors,")  # fmt: skip
+@click.option("--misalignment", type=float, default=0.0, metavar="DEG", help="of the axes,")
+@click.option("--g-sensitivity", type=float, default=0.0, metavar="DEG/S/G",
+              help="of gyros,")  # fmt: skip
+@click.option("--time-offset", type=float, default=0.0, metavar="MS",
+              help="against what the IMU is fused with.")  # fmt: skip
 @click.option("--vibration-rectification", type=float, default=0.0, metavar="MG/G^2",
               help="Of accelerometers, with")  # fmt: skip
 @click.option("--vibration", type=float, default=0.0, metavar="G", help="root mean square.")
@@ -61,7 +64,8 @@ def certify(
     \b
     Examples:
       gmwm certify out/calibration.json --imu kalibr.yaml
-      gmwm certify out/calibration.json -N 1e-4,2e-3 -K 1e-6,3e-5 --motion drone --scale-error 0.5
+      gmwm certify out/calibration.json -N 1e-4,2e-3 -K 1e-6,3e-5
+      gmwm certify out/calibration.json --imu imu.yaml --motion car --scale-error 1
     """
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import Imperfections, certify as run

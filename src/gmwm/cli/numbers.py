@@ -39,7 +39,8 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command()
 @_with_options
 @click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
-              help="Time without aiding; of relative poses the interval of keyframes.")  # fmt: skip
+              help="Time without aiding in seconds; of relative poses, the interval of "
+                   "keyframes.")  # fmt: skip
 @click.option("--level", type=float, metavar="P",
               help="Dominate the confidence region of this level, e.g. 0.95, and not the estimate "
                    "alone.")  # fmt: skip
@@ -68,7 +69,7 @@ def bound(
 @click.command()
 @_with_options
 @click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
-              help="Times without aiding for which they shall be good, s.")  # fmt: skip
+              help="Times without aiding for which they shall be good, in seconds.")  # fmt: skip
 def reduce(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
     as_json: bool, outages: str,
