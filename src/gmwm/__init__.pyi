@@ -26,9 +26,13 @@ from .estimate import (
 )
 from .export import export as export
 from .filter_numbers import (
+    Certificate as Certificate,
     FilterNumbers as FilterNumbers,
+    Imperfections as Imperfections,
+    Motion as Motion,
     SensorNumbers as SensorNumbers,
     bound as bound,
+    certify as certify,
     reduce as reduce,
 )
 from .process import (

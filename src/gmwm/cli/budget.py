@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gmwm.errors import InputError
+from gmwm.cli.options import seconds
 
 
 @click.command()
@@ -31,11 +31,4 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     from gmwm.calibration import Calibration
 
     calibration = Calibration.load(file)
-    click.echo(error_budget(calibration, _seconds(times), calibrated=not unknown_start))
-
-
-def _seconds(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"--times {text}: write seconds, e.g. 1,10,60") from None
+    click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))

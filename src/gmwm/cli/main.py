@@ -9,11 +9,13 @@ import click
 from gmwm import __version__
 from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
+from gmwm.cli.certify import certify
 from gmwm.cli.demo import demo
 from gmwm.cli.export import export
 from gmwm.cli.health import health
 from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
+from gmwm.cli.numbers import bound, reduce
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError
 
@@ -26,7 +28,9 @@ def cli() -> None:
     """Stochastic error models of inertial sensors from static recordings."""
 
 
-for _command in (calibrate, demo, budget, export, health, navigate, reproduce):
+for _command in (
+    calibrate, demo, budget, health, bound, reduce, certify, export, navigate, reproduce,
+):  # fmt: skip
     cli.add_command(_command)
 
 

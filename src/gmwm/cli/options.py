@@ -77,3 +77,11 @@ def time_reference(text: str | None) -> str | int | bool | None:
     if text is None:
         return None
     return False if text.lower() == "none" else _column(text)
+
+
+def seconds(option: str, text: str) -> list[float]:
+    """Times of an option, separated by commas."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text}: write seconds, e.g. 1,10,60") from None

@@ -5,17 +5,29 @@ axis; which numbers are right depends on how long it goes without aiding, the ho
 """
 
 from gmwm.filter_numbers.bound import bound
+from gmwm.filter_numbers.certificate import CONSUMERS, Cause, Certificate, Check
+from gmwm.filter_numbers.certify import certify
 from gmwm.filter_numbers.chain import Chain, ChainErrors
+from gmwm.filter_numbers.given import read_numbers
+from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.reduce import reduce
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 
 __all__ = [
+    "CONSUMERS",
     "FORMS",
+    "Cause",
+    "Certificate",
     "Chain",
     "ChainErrors",
+    "Check",
     "FilterNumbers",
+    "Imperfections",
+    "Motion",
     "Predicted",
     "SensorNumbers",
     "bound",
+    "certify",
+    "read_numbers",
     "reduce",
 ]

@@ -10,6 +10,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
 from gmwm.process import Model, Process, as_model
 
@@ -47,6 +48,12 @@ class Axis:
     quantity: str
     bias_sd: float
     fit: Fit | None
+
+    @property
+    def chain(self) -> Chain:
+        """The filter by which its numbers are judged; the gyro of the vertical turns a heading."""
+        is_heading = self.quantity == "gyro" and self.name.endswith("_z")
+        return Chain.usual("" if is_heading else self.quantity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +110,19 @@ class Axes:
         self, found: Callable[[tuple[Axis, ...]], list[FilterNumbers]], shared: bool
     ) -> FilterNumbers | SensorNumbers:
         """The result, from a function that gives axes that share their numbers their results."""
+        numbers = self.sensor(found, shared)
+        return next(iter(numbers.values())) if self.single else numbers
+
+    def sensor(
+        self, found: Callable[[tuple[Axis, ...]], list[FilterNumbers]], shared: bool
+    ) -> SensorNumbers:
+        """The same as a mapping, of one axis too."""
         groups = self.groups if shared else tuple((axis,) for axis in self.axes)
         pairs = [
             (axis.name, each)
             for group in groups
             for axis, each in zip(group, found(group), strict=True)
         ]
-        if self.single:
-            return pairs[0][1]
         by_name = dict(pairs)
         ordered = {axis.name: by_name[axis.name] for axis in self.axes}
         return SensorNumbers(ordered, self.source, self.rate, self.duration, shared)

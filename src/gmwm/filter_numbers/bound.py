@@ -10,11 +10,11 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
-from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.dominance import KINDS, Problem, dominating
-from gmwm.filter_numbers.region import region_envelope
+from gmwm.filter_numbers.region import region_targets
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.target import Target
 from gmwm.process import Model
@@ -104,28 +104,28 @@ def bound(
             raise InputError(
                 f"horizon = {horizon:g} s: give two sampling intervals or more, {2.0 * axis.dt:g} s"
             )
-        if level is not None and axis.fit is None:
-            raise InputError("level is that of a fit: a model has no confidence region")
+        if level is not None:
+            _fit(axis)
     if level is not None:
         level = checks.share("level", level, 0.95)
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
-        return _bounded(group, form, horizon, level)
+        return bound_of(group, form, horizon, level)
 
     return axes.numbers(found, shared)
 
 
-def _bounded(
+def bound_of(
     group: Sequence[Axis], form: str, horizon: float, level: float | None
 ) -> list[FilterNumbers]:
+    """The bound of axes that share their numbers; see `bound`."""
     targets = tuple(Target.of(axis.model, axis.dt, horizon) for axis in group)
-    envelope = None
+    region: list[Target] = []
     if level is not None:
-        envelope = region_envelope([(t, axis.fit) for t, axis in zip(targets, group, strict=True)
-                                    if axis.fit is not None], level)  # fmt: skip
-    model = dominating(Problem(targets, horizon, envelope), form)
-    starts = [_start(axis, target, model) for axis, target in zip(group, targets, strict=True)]
-    sd = max(starts)
+        for axis, target in zip(group, targets, strict=True):
+            region += region_targets(target, _fit(axis), level)
+    model = dominating(Problem(targets, horizon, tuple(region)), form)
+    sd = max(_start(group, each, model) for each in (*targets, *region))
     return [
         FilterNumbers(
             form=form,
@@ -141,9 +141,15 @@ def _bounded(
     ]
 
 
-def _start(axis: Axis, target: Target, model: Model) -> float:
+def _fit(axis: Axis) -> Fit:
+    if axis.fit is None:
+        raise InputError("level is that of a fit: a model has no confidence region")
+    return axis.fit
+
+
+def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
     """Standard deviation of the walk at the start, or of a constant where there is no walk."""
-    variance = axis.bias_sd**2 + target.constant_sd**2
+    variance = max(axis.bias_sd for axis in group) ** 2 + target.constant_sd**2
     stationary = [term for term in model.terms if not term.is_walk]
     if len(stationary) < len(model.terms):
         variance += tuning.INITIAL_SHARE * target.slow_variance(Model(tuple(stationary)))
@@ -153,7 +159,7 @@ def _start(axis: Axis, target: Target, model: Model) -> float:
 def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tuple[Predicted, ...]:
     """What a filter with these numbers knows of its error after some times without aiding."""
     try:
-        errors = Chain.usual(axis.quantity).errors(
+        errors = axis.chain.errors(
             axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
         )
     except InputError:

@@ -75,6 +75,8 @@ class Chain:
         Between fixes, s.
     initial_sd : tuple of float
         Of the integrals at the start.
+    is_relative : bool
+        Whether the last integral starts anew at each fix, as a relative pose at a keyframe.
     """
 
     order: int
@@ -82,6 +84,7 @@ class Chain:
     settled: float = tuning.SETTLING
     interval: float = tuning.FIX_INTERVAL
     initial_sd: tuple[float, ...] = tuning.INITIAL_SD
+    is_relative: bool = False
 
     @classmethod
     def usual(cls, quantity: str) -> Chain:
@@ -132,8 +135,9 @@ class Chain:
             shape = (fixes - 1 if every_fix else 0, n, n)
             after_P, after_J = np.empty(shape), np.empty(shape)
             P, J = settle(
-                P, J, *step.filter, *step.joint, n, q, self.fix_sd**2, fixes, after_P, after_J
-            )
+                P, J, *step.filter, *step.joint, n, q, self.fix_sd**2, self.is_relative, fixes,
+                after_P, after_J,
+            )  # fmt: skip
             ages = (np.arange(shape[0]) + 1 - fixes) * self.interval
             kept = list(zip(ages, after_P, after_J, strict=True))
         before = 0.0
@@ -141,8 +145,8 @@ class Chain:
             P, J = _Step.of(real, own, dt, n, time - before).over(P, J)
             before = time
             kept.append((time, P[:n, :n], J[:n, :n]))
-        time, predicted, actual = (np.array(each) for each in zip(*kept, strict=True))
-        return ChainErrors(time, predicted, actual)
+        columns = list(zip(*kept, strict=True))
+        return ChainErrors(*(np.array(column) for column in columns))
 
 
 @dataclass(frozen=True, eq=False)

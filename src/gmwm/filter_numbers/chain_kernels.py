@@ -11,7 +11,8 @@ from gmwm._core.typing import FloatArray
 @compiled()
 def settle(
     P: FloatArray, J: FloatArray, A: FloatArray, Q: FloatArray, B: FloatArray, R: FloatArray,
-    n: int, q: int, variance: float, fixes: int, out_P: FloatArray, out_J: FloatArray,
+    n: int, q: int, variance: float, is_relative: bool, fixes: int,
+    out_P: FloatArray, out_J: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Propagate and update by fixes of the last integral.
 
@@ -25,6 +26,8 @@ def settle(
         Integrals, and states of the filter.
     variance : float
         Of a fix.
+    is_relative : bool
+        Whether the last integral starts anew at each fix.
     fixes : int
     out_P, out_J : (K, n, n) ndarray
         Covariances of the integrals after the first K fixes.
@@ -54,6 +57,11 @@ def settle(
         for i in range(total):
             for j in range(total):
                 J[i, j] += added[i] * first[j] + first[i] * added[j] + own * added[i] * added[j]
+        if is_relative:
+            P[n - 1] = 0.0
+            P[:, n - 1] = 0.0
+            J[n - 1] = 0.0
+            J[:, n - 1] = 0.0
         if fix < out_P.shape[0]:
             out_P[fix] = P[:n, :n]
             out_J[fix] = J[:n, :n]

@@ -9,7 +9,7 @@ linear program, for each correlation time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,9 +24,6 @@ from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 KINDS = {"N+K": "NK", "N+GM": "NG", "N+K+GM": "NKG"}
 """Forms that `dominating` knows, with the kinds of their terms."""
 
-Envelope = Callable[[FloatArray], FloatArray]
-"""Spectral density to dominate at frequencies in Hz, u^2/Hz."""
-
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -35,16 +32,17 @@ class Problem:
     Attributes
     ----------
     targets : tuple of Target
-        Of one axis, or of several that share the numbers.
+        Of one axis, or of several that share the numbers: the objective.
     horizon : float
         s.
-    envelope : callable
-        The largest of the spectra; by default that of the targets.
+    region : tuple of Target
+        What has to be dominated, where that is not the targets alone, but all that lies between
+        these.
     """
 
     targets: tuple[Target, ...]
     horizon: float
-    envelope: Envelope | None = None
+    region: tuple[Target, ...] = ()
     f: FloatArray = field(init=False)
     need: FloatArray = field(init=False)
     _averaging: FloatArray = field(init=False)
@@ -66,15 +64,19 @@ class Problem:
         """Sampling interval, s."""
         return self.targets[0].dt
 
+    @property
+    def dominated(self) -> tuple[Target, ...]:
+        """What has to be dominated."""
+        return self.region or self.targets
+
     def frequencies(self, points: int) -> FloatArray:
         """Those of all targets, some a decade; Hz."""
-        return np.unique(np.concatenate([t.frequencies(points) for t in self.targets]))
+        return np.unique(np.concatenate([t.frequencies(points) for t in self.dominated]))
 
     def largest(self, f: FloatArray) -> FloatArray:
         """Largest of the spectra at frequencies (Hz), u^2/Hz."""
-        if self.envelope is not None:
-            return self.envelope(f)
-        return np.max([target.psd(f) for target in self.targets], axis=0)
+        largest = np.max([target.psd(f) for target in self.dominated], axis=0)
+        return np.asarray(largest * (tuning.ENVELOPE if self.region else 1.0))
 
     def cost(self, process: Process) -> float:
         """Mean over averaging times and axes of its Allan variance over that of the truth."""
@@ -96,7 +98,7 @@ def dominating(problem: Problem, form: str) -> Model:
         If the form cannot dominate: "N+GM" where a spectrum has no limit at zero frequency.
     """
     kinds = KINDS[form]
-    if "K" not in kinds and not all(target.is_stationary for target in problem.targets):
+    if "K" not in kinds and not all(target.is_stationary for target in problem.dominated):
         raise InputError(
             f"{form} cannot dominate a model that walks off: its spectrum rises without limit "
             "towards zero frequency; use N+K or N+K+GM"
@@ -172,8 +174,8 @@ def _solved(
     rows = columns / np.max(columns, axis=1, keepdims=True)
     right = 1.0 / np.max(columns, axis=1)
     least = [0.0] * columns.shape[1]
-    least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.targets)
-    walk = max(target.walk for target in problem.targets)
+    least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.dominated)
+    walk = max(target.walk for target in problem.dominated)
     if walk > 0.0 and is_walking:
         least[1] = problem.cost(RandomWalk(1.0)) * walk
     found = linprog(
@@ -202,7 +204,7 @@ def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) 
     ratio = short(fine)
     most = float(np.max(ratio))
     # A maximum lies between two of the points.
-    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most):
+    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most).tolist():
         ends = fine[max(place - 1, 0)], fine[min(place + 1, fine.size - 1)]
         most = max(most, float(np.max(short(np.geomspace(*ends, tuning.REFINED)))))
     variances = variances * max(most, 1.0) * tuning.SAFETY

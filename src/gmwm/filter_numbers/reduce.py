@@ -14,7 +14,6 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
 from gmwm.filter_numbers.bound import predicted, uncertainty
-from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.dominance import Problem, with_correlation_times
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
 from gmwm.filter_numbers.target import Target
@@ -132,7 +131,7 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
         model = scaled(logs)
         total = 0.0
         for axis in group:
-            errors = Chain.usual(axis.quantity).errors(
+            errors = axis.chain.errors(
                 axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
             )
             total += float(np.sum(errors.score()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.dominance import Envelope
 from gmwm.filter_numbers.target import Target
 from gmwm.process import Model
 
@@ -100,15 +98,16 @@ class ParameterRegion:
         return points
 
 
-def region_envelope(pairs: Sequence[tuple[Target, Fit]], level: float) -> Envelope:
-    """The largest density at each frequency over the confidence regions of some fits.
+def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]:
+    """Models of a confidence region, one of which has nearly the largest density at any frequency.
 
-    It is that of a finite number of models: those with the largest density at frequencies on a
-    grid, found by search, and some that are drawn.
+    They are drawn, or found by search at frequencies on a grid.
 
     Parameters
     ----------
-    pairs : sequence of (Target, Fit)
+    target : Target
+        That of the estimate.
+    fit : Fit
     level : float
 
     Raises
@@ -116,41 +115,33 @@ def region_envelope(pairs: Sequence[tuple[Target, Fit]], level: float) -> Envelo
     InputError
         If the data bound a parameter in no way.
     """
-    found: list[Target] = []
-    for target, fit in pairs:
-        region = ParameterRegion.of(fit, level)
-        found += [_target(target, region.model_at(p)) for p in _extremes(target, region)]
-
-    def envelope(f: FloatArray) -> FloatArray:
-        return np.asarray(tuning.ENVELOPE * np.max([each.psd(f) for each in found], axis=0))
-
-    return envelope
-
-
-def _extremes(target: Target, region: ParameterRegion) -> list[FloatArray]:
-    """Points of the ball with the largest densities."""
-    rng = np.random.default_rng(tuning.REGION_SEED)
+    region = ParameterRegion.of(fit, level)
+    dt = target.dt
     if not region.keys:
-        return [np.zeros(0)]
-    drawn = list(region.draws(tuning.REGION_DRAWS, rng))
-    points = np.log10(0.5 / target.dt / target.lowest) * tuning.REGION_POINTS
-    f = np.geomspace(target.lowest, 0.5 / target.dt, int(points) + 1)
-    densities = np.array([_target(target, region.model_at(p)).psd(f) for p in drawn])
-    result = drawn
+        return (Target.of(region.model, dt, target.horizon),)
+    counted = [i for i, term in enumerate(fit.model.terms) if not (term.is_line or term.is_drift)]
+
+    def density(point: FloatArray, f: FloatArray) -> FloatArray:
+        terms = region.model_at(point).terms
+        return np.sum([terms[i].psd(f, dt) for i in counted], axis=0)
+
+    def least(point: FloatArray, f: FloatArray) -> float:
+        inside = point / max(1.0, float(np.linalg.norm(point)))
+        return -float(np.log(density(inside, f)[0]))
+
+    # Slower processes than the estimate change at lower frequencies.
+    f = target.frequencies(tuning.REGION_POINTS)
+    f = np.append(f[0] * np.array([0.01, 0.1]), f)
+    points = list(region.draws(tuning.REGION_DRAWS, np.random.default_rng(tuning.REGION_SEED)))
+    densities = np.array([density(point, f) for point in points])
     for k in range(f.size):
-
-        def least(point: FloatArray, at: FloatArray = f[k : k + 1]) -> float:
-            inside = point / max(1.0, float(np.linalg.norm(point)))
-            return -float(np.log(_target(target, region.model_at(inside)).psd(at)[0]))
-
-        start = drawn[int(np.argmax(densities[:, k]))]
         best = minimize(
-            least, start, method="SLSQP", options={"maxiter": 40, "ftol": 1e-6},
+            least, points[int(np.argmax(densities[:, k]))], args=(f[k : k + 1],), method="SLSQP",
+            options={"maxiter": 40, "ftol": 1e-6},
             constraints={"type": "ineq", "fun": lambda p: 1.0 - float(p @ p)},
         ).x  # fmt: skip
-        result = [*result, best / max(1.0, float(np.linalg.norm(best)))]
-    return result
-
-
-def _target(like: Target, model: Model) -> Target:
-    return Target.of(model, like.dt, like.horizon)
+        points.append(best / max(1.0, float(np.linalg.norm(best))))
+    fine = np.geomspace(f[0], f[-1], 20 * f.size)
+    densities = np.array([density(point, fine) for point in points])
+    largest = np.unique(np.argmax(densities, axis=0))
+    return tuple(Target.of(region.model_at(points[i]), dt, target.horizon) for i in largest)

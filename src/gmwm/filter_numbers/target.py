@@ -162,7 +162,7 @@ def _limit(terms: list[Process], start: float, dt: float) -> tuple[float, float]
     """Frequency where every spectrum has reached its limit, and the slope there."""
     if not terms:
         return start, 0.0
-    f = start * 10.0 ** -np.arange(tuning.DECADES + 1)
+    f = np.asarray(start * 10.0 ** -np.arange(tuning.DECADES + 1.0), dtype=float)
     lowest, steepest = 0, 0.0
     for term in terms:
         density = np.maximum(evaluated(term.psd, f, dt), np.finfo(float).tiny)

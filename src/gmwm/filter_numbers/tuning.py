@@ -118,3 +118,32 @@ where the quantity is not known."""
 
 INITIAL_SD = (0.01, 0.1, 1.0)
 """Of the integrals at the start, in order."""
+
+# -- certificates ---------------------------------------------------------------------------------
+
+KEYFRAME_SD = {"gyro": 1e-3, "accel": 0.01, "": 1e-3}
+"""Of the relative pose between two keyframes as a camera or lidar sees it: rad, m; a tenth of a
+degree less than that of good odometry and a centimetre."""
+
+KEYFRAME_ORDER = {"gyro": 1, "accel": 2, "": 1}
+"""Integrals between keyframes: rotation; velocity and position."""
+
+KEYFRAMES = 120
+"""Before the interval that is judged, for the bias to settle."""
+
+MOTIONS = {
+    "handheld": (0.7, 1.5, 0.15),
+    "drone": (0.4, 1.5, 0.2),
+    "car": (0.1, 1.0, 1.0),
+    "fixed-wing": (0.1, 2.0, 2.0),
+}
+"""Usual motion: rad/s, m/s^2, s. Orders of magnitude; a recording of one's own is better."""
+
+VIBRATION_MEMORY = 60.0
+"""s over which vibration stays the same, as an engine at one speed."""
+
+LARGE = 2.0
+"""Factor by which a cause makes numbers larger, above which a state for it is better."""
+
+CONSISTENT = (0.5, 2.0)
+"""NEES per degree of freedom within which numbers are called consistent."""

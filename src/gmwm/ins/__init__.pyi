@@ -1,5 +1,9 @@
 from .covariance.analysis import Analysis as Analysis, covariance_analysis as covariance_analysis
-from .covariance.reduction import Reduction as Reduction, reduce as reduce
+from .covariance.reduction import (
+    Reduction as Reduction,
+    loiter_with_outages as loiter_with_outages,
+    reduce as reduce,
+)
 from .field.fix_file import read_fixes as read_fixes
 from .field.imu_file import read_imu as read_imu
 from .field.measured import Measured as Measured

@@ -310,9 +310,7 @@ def test_two_recordings_of_different_rates(slow):
 
 def test_axes_of_one_sensor_in_two_calibrations_have_the_larger_numbers(slow):
     # A bound over the axes of one of them would not be one of the other's.
-    parts = [
-        replace(slow, fits={n: f for n, f in slow.items() if n[-1] == axis}) for axis in "xy"
-    ]
+    parts = [replace(slow, fits={n: f for n, f in slow.items() if n[-1] == axis}) for axis in "xy"]
     for order in (parts, parts[::-1]):
         content = yaml.safe_load(gmwm.export(order, "kalibr"))
         found = bound(slow, "N+K", 1.0).of("gyro").values()

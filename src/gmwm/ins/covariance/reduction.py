@@ -139,7 +139,7 @@ def reduce(
     """
     checks.choice("form", form, list(FORMS))
     truth = SensorModels.of(models)
-    scenario = _default_scenario(outages, dt) if scenario is None else scenario
+    scenario = loiter_with_outages(outages, dt) if scenario is None else scenario
     if not scenario.outages:
         raise InputError("outages: give one length at least, s")
     course = Course.of(scenario)
@@ -214,7 +214,21 @@ def _initial_sd(models: SensorModels, axis: str, dt: float) -> float:
     return float(np.sqrt(slow + models.bias_sd[axis] ** 2))
 
 
-def _default_scenario(lengths: Sequence[float], dt: float) -> Scenario:
+def loiter_with_outages(lengths: Sequence[float], dt: float = 0.01) -> Scenario:
+    """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
+
+    Parameters
+    ----------
+    lengths : sequence of float
+        Of the outages, s, with two minutes before each.
+    dt : float, optional
+        Sampling interval of the IMU, s.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, or not a multiple of ``dt``.
+    """
     outages = []
     start = tuning.SETTLING
     for length in lengths:

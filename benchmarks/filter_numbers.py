@@ -1,0 +1,233 @@
+"""Numbers for small filters: how tight, how consistent, and how they go with the record.
+
+Run with ``python benchmarks/filter_numbers.py length | tightness | rules | flight``, or
+``... real FOLDER`` with the four ADIS16405 recordings; the tables of
+docs/filter-numbers.md. All but ``length``, which simulates and fits records, are exact covariance
+analyses.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+import gmwm
+from gmwm import BiasInstability, GaussMarkov, InputError, Model, RandomWalk, WhiteNoise
+from gmwm.calibration import random_walk
+from gmwm.filter_numbers import Chain
+from gmwm.ins import (
+    Recorded,
+    SensorModels,
+    covariance_analysis,
+    loiter_with_outages,
+    monte_carlo,
+)
+from gmwm.study.sensor_tables import TABLE_6
+
+DT = 0.01
+ONE = WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0)
+TRUTHS = {
+    "1 GM": ONE,
+    "2 GM": WhiteNoise(5e-5) + GaussMarkov(4e-4, 5.0) + GaussMarkov(1e-4, 300.0),
+    "3 GM": WhiteNoise(1e-4)
+    + GaussMarkov(2e-4, 0.5)
+    + GaussMarkov(6e-5, 25.0)
+    + GaussMarkov(9e-5, 2000.0),
+    "3 GM, other": WhiteNoise(3e-4)
+    + GaussMarkov(5e-4, 1.0)
+    + GaussMarkov(2e-4, 40.0)
+    + GaussMarkov(2e-4, 700.0),
+    "walk + GM": WhiteNoise(1e-4) + RandomWalk(2e-6) + GaussMarkov(1e-4, 30.0),
+    "flicker": WhiteNoise(1e-4) + BiasInstability(5e-5),
+    "slow GMs only": Model((GaussMarkov(4e-5, 60.0), GaussMarkov(3e-4, 6e5))),
+    "fast GMs only": Model((GaussMarkov(1e-2, 0.02), GaussMarkov(3e-3, 0.3))),
+    "demo gyro": TABLE_6.models["gyro_x"],
+}
+HORIZONS = (1.0, 10.0, 60.0, 600.0)
+OUTAGES = (10.0, 30.0, 60.0)
+
+
+def length() -> None:
+    """K from records of several lengths, by the old rule, bound and reduce."""
+    print("K [rad/s^2/sqrt(Hz)] by length of record; random walk: fitted, or its 95 % bound")
+    print(f"{'hours':>6} {'seed':>5} {'random walk':>12} {'bound 60 s':>11} {'reduce':>11}   NEES "
+          f"with reduce after {', '.join(f'{t:g}' for t in OUTAGES)} s")  # fmt: skip
+    chain = Chain.usual("gyro")
+    for hours in (1, 4, 16, 64):
+        for seed in (1, 2, 3):
+            series = ONE.simulate(hours * 36_000, 0.1, seed)
+            fit = gmwm.fit(WhiteNoise() + GaussMarkov(), series, 0.1)
+            small = gmwm.reduce({"gyro_x": fit.model}, dt=0.1)["gyro_x"]
+            errors = chain.errors(ONE, small.model, 0.1, OUTAGES, believed_sd=small.initial_sd)
+            nees = " ".join(f"{value:6.3f}" for value in errors.nees())
+            print(f"{hours:>6} {seed:>5} {random_walk(fit).value:>12.2e} "
+                  f"{gmwm.bound(fit).K:>11.2e} {small.K:>11.2e}   {nees}", flush=True)  # fmt: skip
+    right = gmwm.reduce({"gyro_x": ONE})["gyro_x"]
+    print(f"{'truth':>6} {'':>5} {'none':>12} {gmwm.bound(ONE).K:>11.2e} {right.K:>11.2e}   "
+          + " ".join(f"{right.nees[t]:6.3f}" for t in OUTAGES))  # fmt: skip
+
+
+def tightness() -> None:
+    """Predicted over true standard deviation of bounds at their horizons; the worst direction."""
+    print("tilt-velocity-position chain, two minutes with a fix of 1 m every second before")
+    print("predicted/true standard deviation of position at the horizon; last: worst NEES of any")
+    print("direction of chains of 1 to 3 integrals, settled 0 to 1,200 s, at 0.1 to 10 horizons")
+    heads = "".join(f"{f'{t:g} s':>7}" for t in HORIZONS)
+    print(f"{'truth':<15}{'form':<8}{heads}   worst")
+    total: dict[str, list[float]] = {}
+    for name, truth in TRUTHS.items():
+        for form in ("N+K", "N+GM", "N+K+GM"):
+            cells, worst = [], 0.0
+            for T in HORIZONS:
+                try:
+                    found = gmwm.bound(truth, form, T)
+                except InputError:
+                    break
+                for order in (1, 2, 3):
+                    for settled in (0.0, 30.0, 120.0, 1200.0):
+                        sd = 1.0 / 9.8 if order == 3 else 1.0
+                        errors = Chain(order, sd, settled).errors(
+                            truth, found.model, DT, (0.1 * T, T, 3.0 * T, 10.0 * T),
+                            believed_sd=found.initial_sd, every_fix=settled < 1200.0,
+                        )  # fmt: skip
+                        worst = max(worst, float(errors.worst().max()))
+                        if order == 3 and settled == 120.0:
+                            cells.append(float(errors.tightness()[-3]))
+            if cells:
+                total.setdefault(form, []).extend(cells)
+                shown = "".join(f"{cell:7.2f}" for cell in cells)
+                print(f"{name:<15}{form:<8}{shown}   {worst:.5f}", flush=True)
+    for form, values in total.items():
+        print(f"{form}: mean {np.mean(values):.2f}, {np.min(values):.2f} to {np.max(values):.2f}")
+
+
+def _rules(truth: Model, T: float) -> dict[str, tuple[Model, float]]:
+    """Numbers as people have them."""
+    safe = gmwm.bound(truth, horizon=T)
+    small = gmwm.reduce({"gyro_x": truth}, outages=(T,))["gyro_x"]
+    tau = DT * 2.0 ** np.arange(24)
+    deviation = np.sqrt(2.0 * truth.haar_variance(tau, DT))
+    N = float(np.interp(0.0, np.log(tau), deviation))
+    # The line of slope +1/2 that touches the Allan deviation from below its end, at 1,000 s.
+    K = float(np.sqrt(3.0 / 1000.0) * np.interp(np.log(1000.0), np.log(tau), deviation))
+    line = WhiteNoise(N) + RandomWalk(K)
+    white = WhiteNoise(max(np.sqrt(truth.white_density()), 1e-12)) + RandomWalk(1e-9)
+    ten = WhiteNoise(10.0 * N) + RandomWalk(10.0 * K)
+    sd = safe.initial_sd
+    return {
+        "white noise only": (white, sd),
+        "Allan lines": (line, sd),
+        "times ten": (ten, sd),
+        "bound": (safe.model, sd),
+        "reduce": (small.model, small.initial_sd),
+    }
+
+
+def rules() -> None:
+    """NEES and loss of accuracy with numbers by several rules."""
+    print("position by tilt after 60 s: NEES per degree of freedom; true error over that of a")
+    print("filter that has the full model; predicted over true")
+    T, chain = 60.0, Chain.usual("gyro")
+    names = list(_rules(ONE, T))
+    print(f"{'truth':<15}" + "".join(f"{name:>22}" for name in names))
+    for name, truth in TRUTHS.items():
+        best = chain.errors(truth, truth, DT, (T,)).actual[0, -1, -1]
+        cells = []
+        for model, sd in _rules(truth, T).values():
+            errors = chain.errors(truth, model, DT, (T,), believed_sd=sd)
+            loss = np.sqrt(errors.actual[0, -1, -1] / best)
+            cells.append(f"{errors.nees()[0]:8.3g} {loss:6.2f} {errors.tightness()[0]:6.2f}")
+        print(f"{name:<15}" + "".join(f"{cell:>22}" for cell in cells), flush=True)
+
+
+def flight() -> None:
+    """The whole navigation filter on a loiter: worst direction and horizontal error."""
+    print("INS/GNSS on a loiter, demo sensor, at the end of outages")
+    truth, scenario = SensorModels.of(TABLE_6), loiter_with_outages(OUTAGES, DT)
+    models = truth.models
+    found = {
+        "bound N+K": gmwm.bound(models),
+        "bound N+GM": gmwm.bound(models, "N+GM"),
+        "bound N+K+GM": gmwm.bound(models, "N+K+GM"),
+        "reduce N+K": gmwm.reduce(models),
+        "reduce N+GM": gmwm.reduce(models, "N+GM"),
+        "reduce N+2GM": gmwm.reduce(models, "N+2GM"),
+    }
+    full = covariance_analysis(scenario, truth, truth)
+    print(f"{'':<14}{'outage':>8}{'full [m]':>10}{'true [m]':>10}{'predicted':>10}{'NEES':>8}"
+          f"{'worst':>9}")  # fmt: skip
+    for name, numbers in found.items():
+        believed = SensorModels.of(
+            {axis: each.model for axis, each in numbers.items()},
+            {axis: each.initial_sd for axis, each in numbers.items()},
+        )
+        analysis = covariance_analysis(scenario, truth, believed)
+        ratio = np.linalg.eigvals(np.linalg.solve(analysis.predicted, analysis.actual)).real
+        for outage in scenario.outages:
+            at = analysis.index(outage.end)
+            sizes = (np.hypot(*s[at, :2]) for s in (full.sd, analysis.sd, analysis.predicted_sd))
+            print(f"{name:<14}{outage.duration:>6g} s" + "".join(f"{s:>10.4g}" for s in sizes)
+                  + f"{analysis.nees()[at]:>8.3f}{ratio.max():>9.4f}", flush=True)  # fmt: skip
+
+
+# Of the ADIS16405 in u/sqrt(Hz) and u: 2 deg/sqrt(h), 0.007 deg/s; 0.2 m/s/sqrt(h), 0.2 mg.
+_SHEET = {"gyro": (5.8e-4, 1.2e-4), "accel": (3.3e-3, 2.0e-3)}
+
+
+def real(folder: str) -> None:
+    """Certified and measured NEES: one recording is calibrated, the others are navigated with."""
+    recordings = [
+        gmwm.read(f"{folder}/adis16405_{k}.csv.gz", rate=100.0,
+                  units={"gyro": "deg/s", "accel": "g"})
+        for k in (1, 2, 3, 4)
+    ]  # fmt: skip
+    scenario = loiter_with_outages((10.0, 60.0), DT)
+    print("position error at the end of outages of 10 and 60 s: certified NEES, and measured with")
+    print("the errors of the other three recordings, 24 runs of each")
+    print(f"{'calibrated':<12}{'numbers':<14}{'certified':>20}{'measured':>20}")
+    for k, recording in enumerate(recordings):
+        calibration = gmwm.calibrate(recording)
+        models = {name: fit.model for name, fit in calibration.items()}
+        lines = {}
+        for name, fit in calibration.items():
+            tau, deviation = fit.wv.tau, fit.wv.allan_deviation
+            at = lambda t, x=tau, y=deviation: float(np.interp(np.log(t), np.log(x), y))  # noqa: E731
+            lines[name] = (at(1.0), at(1000.0) * np.sqrt(3.0 / 1000.0))
+        sheet = {kind: (N, B / np.sqrt(1000.0)) for kind, (N, B) in _SHEET.items()}
+        given = {
+            "data sheet": sheet,
+            "Allan lines": lines,
+            "lines x 10": {name: (10.0 * N, 10.0 * K) for name, (N, K) in lines.items()},
+            "bound": gmwm.bound(calibration),
+            "reduce": gmwm.reduce(models, outages=(10.0, 60.0)),
+        }
+        certificates = {name: gmwm.certify(models, numbers) for name, numbers in given.items()}
+        filters = {
+            name: SensorModels.of(
+                {axis: each.model for axis, each in found.numbers.items()},
+                {axis: each.initial_sd for axis, each in found.numbers.items()},
+            )
+            for name, found in certificates.items()
+        }
+        others = [each for i, each in enumerate(recordings) if i != k]
+        source = Recorded.of(others, scenario.trajectory.duration)
+        runs = monte_carlo(scenario, source, filters, min(24, source.available or 24))
+        for name, found in certificates.items():
+            certified = [check.nees for check in found.of("outage")]
+            measured = [
+                float(np.mean(runs[name].nees[:, runs[name].index(outage.end), 0])) / 3.0
+                for outage in scenario.outages
+            ]
+            print(f"{k + 1:<12}{name:<14}" + "".join(f"{v:>10.3g}" for v in certified + measured),
+                  flush=True)  # fmt: skip
+        for notice in next(iter(certificates.values())).notices:
+            print(f"  {notice}")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["real"]:
+        real(sys.argv[2])
+    else:
+        for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
+            {"length": length, "tightness": tightness, "rules": rules, "flight": flight}[part]()

@@ -1,0 +1,103 @@
+"""``gmwm bound`` and ``gmwm reduce``: the numbers that a small filter should believe."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gmwm.cli.console import progress_bar
+from gmwm.cli.options import seconds
+
+if TYPE_CHECKING:
+    from gmwm._core.documents import Document
+
+_OPTIONS = (
+    click.argument("file", type=click.Path(path_type=Path)),
+    click.option("--form", default="N+K", show_default=True,
+                 help="N+K, N+GM, N+K+GM; of reduce also N+2GM."),
+    click.option("--shared", is_flag=True, help="The same numbers for all axes of a sensor."),
+    click.option("--gyro-bias", type=float, default=0.0, metavar="RAD/S",
+                 help="Standard deviation of the turn-on bias of a gyro."),
+    click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
+                 help="The same of an accelerometer."),
+    click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
+                 help="File to save them in."),
+    click.option("--json", "as_json", is_flag=True, help="Print JSON."),
+)  # fmt: skip
+
+
+def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+@click.command()
+@_with_options
+@click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
+              help="Time without aiding in seconds; of relative poses, the interval of "
+                   "keyframes.")  # fmt: skip
+@click.option("--level", type=float, metavar="P",
+              help="Dominate the confidence region of this level, e.g. 0.95, and not the estimate "
+                   "alone.")  # fmt: skip
+def bound(
+    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
+    as_json: bool, horizon: float, level: float | None,
+) -> None:  # fmt: skip
+    """Give the smallest numbers with which a filter is never too optimistic.
+
+    FILE is a calibration.json.
+
+    \b
+    Example:
+      gmwm bound out/calibration.json --horizon 10 -o numbers.json
+    """
+    from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import bound as run
+
+    found = run(
+        Calibration.load(file), form, horizon, level=level, shared=shared,
+        bias_sd={"gyro": gyro_bias, "accel": accel_bias},
+    )  # fmt: skip
+    show(found, output, as_json)
+
+
+@click.command()
+@_with_options
+@click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
+              help="Times without aiding for which they shall be good, in seconds.")  # fmt: skip
+def reduce(
+    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
+    as_json: bool, outages: str,
+) -> None:  # fmt: skip
+    """Give the numbers with which a small filter is consistent in given outages.
+
+    FILE is a calibration.json.
+
+    \b
+    Example:
+      gmwm reduce out/calibration.json --form N+GM --outages 10,60
+    """
+    from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import reduce as run
+
+    calibration, times = Calibration.load(file), seconds("--outages", outages)
+    with progress_bar("reducing", "channels") as bar:
+        found = run(
+            calibration, form, times, shared=shared, progress=bar,
+            bias_sd={"gyro": gyro_bias, "accel": accel_bias},
+        )  # fmt: skip
+    show(found, output, as_json)
+
+
+def show(result: Document, output: Path | None, as_json: bool) -> None:
+    """Save and print a result."""
+    if output is not None:
+        result.save(output)
+    click.echo(json.dumps(result.to_dict(), indent=1) if as_json else str(result))
+    if output is not None and not as_json:
+        click.echo(f"wrote {output}")

@@ -1,0 +1,187 @@
+"""How consistent a filter will be with given numbers, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from gmwm._core.documents import Document
+from gmwm._core.frames import frame
+from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
+from gmwm.estimate.result import plain
+from gmwm.filter_numbers.result import SensorNumbers
+
+if TYPE_CHECKING:
+    import pandas
+
+CONSUMERS = {
+    "free": "Without aiding, after fixes every second",
+    "outage": "INS/GNSS filter, at the end of an outage",
+    "keyframes": "Relative pose between keyframes",
+}
+"""Who uses the numbers."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Error that a filter believes beside the true one.
+
+    Attributes
+    ----------
+    consumer : {"free", "outage", "keyframes"}
+    where : str
+        The channel, or "horizontal".
+    quantity : str
+        What is in error.
+    unit : str
+    time : float
+        Without aiding, s.
+    true, believed : float
+        Standard deviations.
+    nees : float
+        Normalised error squared per degree of freedom: of all integrals of a channel, or of the
+        position.
+    """
+
+    consumer: str
+    where: str
+    quantity: str
+    unit: str
+    time: float
+    true: float
+    believed: float
+    nees: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What makes the numbers of a kind of sensor larger.
+
+    Attributes
+    ----------
+    quantity : {"gyro", "accel", ""}
+    name : str
+    N, K : float
+        That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
+    N_factor, K_factor : float
+        Of "error model" and "all together", over the numbers in use; of the others, over those of
+        the error model.
+    """
+
+    quantity: str
+    name: str
+    N: float
+    K: float
+    N_factor: float
+    K_factor: float
+
+
+@dataclass(frozen=True, repr=False)
+class Certificate(Document):
+    """How consistent a filter will be with given numbers, and why.
+
+    Attributes
+    ----------
+    numbers : SensorNumbers
+        In use.
+    recommended : SensorNumbers
+        With which a filter is never too optimistic about the error model.
+    checks : tuple of Check
+    causes : tuple of Cause
+    notices : tuple of Notice
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.certificate"
+
+    numbers: SensorNumbers
+    recommended: SensorNumbers
+    checks: tuple[Check, ...]
+    causes: tuple[Cause, ...]
+    notices: tuple[Notice, ...] = ()
+
+    def of(self, consumer: str) -> tuple[Check, ...]:
+        """The checks of a consumer; see `CONSUMERS`."""
+        return tuple(check for check in self.checks if check.consumer == consumer)
+
+    @property
+    def worst(self) -> Check:
+        """The check with the largest NEES."""
+        return max(self.checks, key=lambda check: check.nees)
+
+    def __repr__(self) -> str:
+        worst = self.worst
+        return (
+            f"<Certificate of {self.numbers.source or 'numbers'}: NEES up to {worst.nees:.3g}, "
+            f"{worst.where} after {worst.time:g} s>"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
+        for consumer, title in CONSUMERS.items():
+            checks = self.of(consumer)
+            if not checks:
+                continue
+            head = f"{'true':>11} {'believed':>11} {'NEES/dof':>9}"
+            lines += ["", title, f"{'':<12}{'':<22}{'time [s]':>9} {head}"]
+            for check in checks:
+                what = f"{check.quantity} [{check.unit}]"
+                lines.append(
+                    f"{check.where:<12}{what:<22}{check.time:>9g} {check.true:>11.4g} "
+                    f"{check.believed:>11.4g} {check.nees:>9.3g}"
+                )
+        for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
+            lines += ["", f"{quantity or 'axis'}: what N and K have to cover, all axes"]
+            lines.append(f"{'':<32}{'N':>11} {'K':>11} {'N times':>9} {'K times':>9}")
+            lines += [
+                f"{cause.name:<32}{cause.N:>11.3e} {cause.K:>11.3e} {cause.N_factor:>9.3g} "
+                f"{cause.K_factor:>9.3g}"
+                for cause in self.causes
+                if cause.quantity == quantity
+            ]
+        if self.causes:
+            lines += ["", *wrapped(
+                "times: of the error model and of all together, over the numbers in use; of the "
+                "others, over those of the error model."
+            )]  # fmt: skip
+        for notice in self.notices:
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join([*lines, "", "Recommended: " + str(self.recommended)])
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the checks; needs pandas."""
+        return frame((asdict(check) for check in self.checks), tuple(Check.__annotations__))
+
+    # -- files ------------------------------------------------------------------------------------
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "numbers": self.numbers.to_dict(),
+            "recommended": self.recommended.to_dict(),
+            "checks": [_json(asdict(check)) for check in self.checks],
+            "causes": [_json(asdict(cause)) for cause in self.causes],
+            "notices": [notice.to_dict() for notice in self.notices],
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        return cls(
+            numbers=SensorNumbers.from_dict(content["numbers"]),
+            recommended=SensorNumbers.from_dict(content["recommended"]),
+            checks=tuple(Check(**_python(each)) for each in content["checks"]),
+            causes=tuple(Cause(**_python(each)) for each in content["causes"]),
+            notices=tuple(map(Notice.from_dict, content["notices"])),
+        )
+
+
+def _json(row: dict[str, Any]) -> dict[str, Any]:
+    return {k: plain(v) if isinstance(v, float) else v for k, v in row.items()}
+
+
+def _python(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: float("nan") if v is None else v for k, v in row.items()}

@@ -1,0 +1,144 @@
+"""What static data cannot show: errors that come with motion, as terms of an error model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
+from gmwm.process import GaussMarkov, Process, WhiteNoise
+from gmwm.readers import Recording
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a vehicle moves, about its mean.
+
+    Attributes
+    ----------
+    rate, accel : float
+        Root mean square of the angular rate (rad/s) and of the specific force (m/s^2) of an axis.
+    memory : float
+        Correlation time of both, s.
+    """
+
+    rate: float
+    accel: float
+    memory: float
+
+    @classmethod
+    def of(cls, motion: str | Motion | Recording) -> Motion:
+        """A usual one by name, or that of a recording.
+
+        Raises
+        ------
+        InputError
+            If there is no such name, or the recording has no gyro and accelerometer.
+        """
+        if isinstance(motion, Motion):
+            return motion
+        if isinstance(motion, str) and motion in tuning.MOTIONS:
+            return cls(*tuning.MOTIONS[motion])
+        if not isinstance(motion, Recording):
+            raise InputError(
+                f"motion {checks.shown(motion)} is not known: write {', '.join(tuning.MOTIONS)}, "
+                "or give a recording"
+            )
+        series = {
+            kind: [c.values for c in motion.inertial if c.quantity == kind]
+            for kind in ("gyro", "accel")
+        }
+        for kind, found in series.items():
+            if not found:
+                raise InputError(
+                    f"{motion.source}: has no {kind} channel: give a recording of both"
+                )
+        sizes = {kind: [float(np.nanstd(v)) for v in found] for kind, found in series.items()}
+        memory = [_memory(v, 1.0 / motion.rate) for found in series.values() for v in found]
+        return cls(
+            float(np.sqrt(np.mean(np.square(sizes["gyro"])))),
+            float(np.sqrt(np.mean(np.square(sizes["accel"])))),
+            float(np.median(memory)),
+        )
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """Errors of a calibration and of a mounting; zero where none is known.
+
+    Attributes
+    ----------
+    scale_error : float
+        Of both sensors, as a fraction.
+    misalignment : float
+        Of the axes, rad.
+    g_sensitivity : float
+        Of gyros, rad/s per m/s^2.
+    time_offset : float
+        Of the IMU against what it is fused with, s.
+    vibration_rectification : float
+        Of accelerometers, m/s^2 per (m/s^2)^2.
+    vibration : float
+        Root mean square of the vibration, m/s^2.
+    """
+
+    scale_error: float = 0.0
+    misalignment: float = 0.0
+    g_sensitivity: float = 0.0
+    time_offset: float = 0.0
+    vibration_rectification: float = 0.0
+    vibration: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not checks.is_number(value) or value < 0.0:
+                raise InputError(
+                    f"{field.name} = {checks.shown(value)}: give a number, zero or more"
+                )
+
+    @property
+    def needs_motion(self) -> bool:
+        """Whether one of them does nothing without motion."""
+        return any((self.scale_error, self.misalignment, self.g_sensitivity, self.time_offset))
+
+    def terms(self, quantity: str, motion: Motion | None) -> Mapping[str, Process]:
+        """Error terms of a gyro or an accelerometer by cause.
+
+        An error in proportion to the motion has its correlation time. One of a time offset d is d
+        times the derivative of the motion: of a spectrum 2 s^2 tau/(1 + (2 pi f tau)^2), that is
+        below white noise of density 2 s^2 d^2/tau.
+        """
+        found: dict[str, Process] = {}
+        if motion is not None:
+            size = motion.rate if quantity == "gyro" else motion.accel
+            # Each cause has a correlation time of its own: processes of one would be one.
+            sizes = {
+                "scale error": self.scale_error * size,
+                "misalignment": np.sqrt(2.0) * self.misalignment * size,
+                "g-sensitivity": self.g_sensitivity * motion.accel * (quantity == "gyro"),
+            }
+            for i, (cause, sd) in enumerate(sizes.items()):
+                if sd > 0.0:
+                    found[cause] = GaussMarkov(float(sd), motion.memory * (1.0 + 1e-6 * i))
+            if self.time_offset > 0.0:
+                density = size * self.time_offset * np.sqrt(2.0 / motion.memory)
+                found["time offset"] = WhiteNoise(float(density))
+        rectified = self.vibration_rectification * self.vibration**2
+        if quantity == "accel" and rectified > 0.0:
+            found["vibration rectification"] = GaussMarkov(rectified, tuning.VIBRATION_MEMORY)
+        return found
+
+
+def _memory(values: FloatArray, dt: float) -> float:
+    """Time after which the autocorrelation of a series has fallen to 1/e, s."""
+    x = np.nan_to_num(values - np.nanmean(values))
+    spectrum = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
+    correlation = np.fft.irfft(spectrum)[: x.size]
+    below = np.flatnonzero(correlation < np.exp(-1.0) * correlation[0])
+    return float(below[0] if below.size else x.size) * dt

@@ -1,0 +1,150 @@
+"""``gmwm bound``, ``gmwm reduce`` and ``gmwm certify``."""
+
+import json
+import sys
+
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, SensorNumbers, WhiteNoise, cli
+from gmwm.cli.certify import _numbers
+
+MODELS = {
+    "gyro_x": WhiteNoise(1e-4) + GaussMarkov(2e-3, 3.0),
+    "accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-2, 2.0),
+}
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    recording = gmwm.Recording.from_arrays(
+        {name: model.simulate(3000, 0.1, i) for i, (name, model) in enumerate(MODELS.items())},
+        10.0,
+        {"gyro": "rad/s", "accel": "m/s^2"},
+    )
+    opened = {name: model.opened() for name, model in MODELS.items()}
+    found = gmwm.calibrate(recording, opened, screening=())
+    return found.save(tmp_path_factory.mktemp("calibration") / "calibration.json")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, output, messages."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code
+        return code, *capsys.readouterr()
+
+    return _run
+
+
+def test_bound_prints_and_saves_what_python_gives(run, calibration, tmp_path):
+    code, printed, _ = run("bound", calibration, "--horizon", 10, "-o", "numbers.json")
+    assert code == 0
+    expected = gmwm.bound(gmwm.load(calibration), horizon=10.0)
+    assert str(expected) in printed
+    assert "wrote numbers.json" in printed
+    assert gmwm.load(tmp_path / "numbers.json").to_dict() == expected.to_dict()
+
+
+def test_options_reach_the_bound(run, calibration):
+    code, printed, _ = run(
+        "bound", calibration, "--form", "N+K+GM", "--level", 0.9, "--shared", "--gyro-bias", 0.01,
+        "--json",
+    )  # fmt: skip
+    assert code == 0
+    found = SensorNumbers.from_dict(json.loads(printed))
+    assert found.shared
+    assert found["gyro_x"].form == "N+K+GM"
+    assert found["gyro_x"].initial_sd >= 0.01 > found["accel_x"].initial_sd
+    assert not any(n.code == "uncertainty-not-covered" for n in found.notices)
+
+
+def test_reduce(run, calibration):
+    code, printed, _ = run("reduce", calibration, "--outages", "5,20", "--json")
+    assert code == 0
+    found = SensorNumbers.from_dict(json.loads(printed))
+    assert found.to_dict() == gmwm.reduce(gmwm.load(calibration), outages=(5.0, 20.0)).to_dict()
+    assert list(found["gyro_x"].nees) == [5.0, 20.0, 200.0]
+
+
+def test_certify_a_file_and_numbers(run, calibration, tmp_path):
+    (tmp_path / "imu.yaml").write_text(
+        "gyroscope_noise_density: 1e-4\ngyroscope_random_walk: 1e-6\n"
+        "accelerometer_noise_density: 1e-3\naccelerometer_random_walk: 2e-5\n"
+    )
+    code, printed, _ = run("certify", calibration, "--imu", "imu.yaml", "-o", "certificate.json")
+    assert code == 0
+    expected = gmwm.certify(gmwm.load(calibration), {"gyro": (1e-4, 1e-6), "accel": (1e-3, 2e-5)})
+    assert str(expected) in printed
+    code, again, _ = run("certify", calibration, "-N", "1e-4,1e-3", "-K", "1e-6,2e-5")
+    assert code == 0
+    assert str(expected) in again
+    assert gmwm.load(tmp_path / "certificate.json").checks == expected.checks
+
+
+def test_certify_what_bound_saved(run, calibration):
+    run("bound", calibration, "-o", "numbers.json")
+    code, printed, _ = run("certify", calibration, "--imu", "numbers.json", "--json")
+    assert code == 0
+    checks = json.loads(printed)["checks"]
+    assert all(check["nees"] < 1.001 for check in checks)
+
+
+def test_units_of_imperfections(run, calibration):
+    code, printed, _ = run(
+        "certify", calibration, "-N", "1e-4,1e-3", "-K", "1e-6,2e-5", "--motion", "car",
+        "--scale-error", 0.5, "--misalignment", 0.2, "--g-sensitivity", 0.01, "--time-offset", 5,
+        "--vibration-rectification", 0.1, "--vibration", 0.5, "--json",
+    )  # fmt: skip
+    assert code == 0
+    expected = gmwm.certify(
+        gmwm.load(calibration), {"gyro": (1e-4, 1e-6), "accel": (1e-3, 2e-5)}, motion="car",
+        imperfections=gmwm.Imperfections(
+            0.005, 3.490658503988659e-3, 1.7797461903e-5, 0.005, 1.0197162e-5, 4.903325
+        ),
+    )  # fmt: skip
+    found = json.loads(printed)["causes"]
+    assert [cause["name"] for cause in found] == [cause.name for cause in expected.causes]
+    for cause, other in zip(found, expected.causes, strict=True):
+        assert (cause["N"], cause["K"]) == pytest.approx((other.N, other.K), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("certify", "CAL"), "give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL"),
+        (("certify", "CAL", "-N", "1,1"), "-N and -K belong together"),
+        (("certify", "CAL", "-N", "1", "-K", "1,1"), "-N 1: write a positive number for gyro and"),
+        (("certify", "CAL", "-N", "1,x", "-K", "1,1"), "-N 1,x: write a positive number"),
+        (("certify", "CAL", "--imu", "none.yaml"), "none.yaml: cannot be read"),
+        (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--outages", "a"), "--outages a: write sec"),
+        (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--motion", "boat"), "motion 'boat' is not"),
+        (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--scale-error", "1"), "add --motion drone"),
+        (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--scale-error", "-1"), "scale_error = -0"),
+        (("bound", "none.json"), "none.json: cannot be read"),
+        (("bound", "CAL", "--form", "N"), "form = 'N': known are"),
+        (("bound", "CAL", "--horizon", "-1"), "horizon = -1"),
+        (("bound", "CAL", "--level", "2"), "level = 2"),
+        (("reduce", "CAL", "--outages", "10,x"), "--outages 10,x: write seconds"),
+        (("reduce", "CAL", "--form", "K"), "form = 'K': known are"),
+    ],
+)
+def test_bad_input_is_one_sentence(run, calibration, arguments, message):
+    code, printed, told = run(*(calibration if each == "CAL" else each for each in arguments))
+    assert code == 2
+    assert printed == ""
+    assert message in told
+    assert told.count("\n") == 1
+
+
+def test_numbers_of_one_kind_of_sensor_are_single(calibration):
+    found = gmwm.load(calibration)
+    gyros = gmwm.Calibration({"gyro_x": found["gyro_x"]}, {}, "", 10.0, 3000)
+    assert _numbers(None, "1e-4", "1e-6", gyros) == {"gyro": (1e-4, 1e-6)}
