@@ -47,7 +47,12 @@ def main(path: Path) -> None:
         print(name, fit.params, fit.interval(0.9), bound.stderr, noise)
     calibration.report("report.html")
     calibration.save("calibration.json")
-    text: str = gmwm.export(calibration, "openvins", horizon=2.0)
+    numbers = gmwm.bound(calibration, "N+K", horizon=10.0)
+    walk: float = numbers["gyro_x"].K
+    small: gmwm.FilterNumbers = gmwm.reduce(calibration["gyro_x"], "N+2GM", outages=(10, 60))
+    certificate = gmwm.certify(calibration, {"gyro": (1e-4, walk), "accel": (1e-3, 1e-5)})
+    print(small.sigma, certificate.worst.nees, certificate.recommended.horizon)
+    text: str = gmwm.export(numbers, "openvins")
     print(len(text))
     print(corrected(WhiteNoise(N=0.1) + GaussMarkov(sigma=1.0, tau=3.0)), Hum(level=1.0).values)
     print(GaussMarkov(sigma=1.0, tau=3.0).tau * 2.0)

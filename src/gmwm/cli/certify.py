@@ -65,7 +65,7 @@ def certify(
     Examples:
       gmwm certify out/calibration.json --imu kalibr.yaml
       gmwm certify out/calibration.json -N 1e-4,2e-3 -K 1e-6,3e-5
-      gmwm certify out/calibration.json --imu imu.yaml --motion car --scale-error 1
+      gmwm certify calibration.json --imu imu.yaml --motion car --scale-error 1
     """
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import Imperfections, certify as run

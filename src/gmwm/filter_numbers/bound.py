@@ -134,7 +134,7 @@ def bound_of(
             initial_sd=sd,
             method="bound",
             predicted=predicted(axis, model, sd, (horizon, 10.0 * horizon)),
-            notices=(*target.notices, *uncertainty(axis, level)),
+            notices=(*target.notices, *about(axis, level)),
             quantity=axis.quantity,
         )
         for axis, target in zip(group, targets, strict=True)
@@ -169,11 +169,16 @@ def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tu
     return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
 
 
-def uncertainty(axis: Axis, level: float | None) -> tuple[Notice, ...]:
-    """What there is to know of the fit that numbers are made from."""
-    if axis.fit is None:
-        return ()
+def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
+    """What there is to know of the fit and of the prediction."""
     found = []
+    try:
+        axis.model.state_space(axis.dt)
+    except InputError as error:
+        text = f"the consistency is not predicted: {error}"
+        found.append(Notice("not-predicted", "note", "", text))
+    if axis.fit is None:
+        return tuple(found)
     if not axis.fit.valid:
         text = "the fit is not valid, nor are numbers from it"
         found.append(Notice("fit-not-valid", "warning", "", text, {}, "read its notices first"))

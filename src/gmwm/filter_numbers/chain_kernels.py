@@ -42,6 +42,8 @@ def settle(
     for fix in range(fixes):
         P = A @ P @ A.T + Q
         J = B @ J @ B.T + R
+        # Nothing damps what rounding leaves of an asymmetry.
+        J = 0.5 * (J + J.T)
         gain = P[:, n - 1] / (P[n - 1, n - 1] + variance)
         row = P[n - 1].copy()
         for i in range(size):

@@ -13,7 +13,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
-from gmwm.filter_numbers.bound import predicted, uncertainty
+from gmwm.filter_numbers.bound import about, predicted
 from gmwm.filter_numbers.dominance import Problem, with_correlation_times
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
 from gmwm.filter_numbers.target import Target
@@ -150,7 +150,7 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
             initial_sd=sd,
             method="reduce",
             predicted=predicted(axis, model, sd, (*times, 10.0 * longest)),
-            notices=(*target.notices, *uncertainty(axis, None)),
+            notices=(*target.notices, *about(axis, None)),
             quantity=axis.quantity,
         )
         for axis, target in zip(group, targets, strict=True)

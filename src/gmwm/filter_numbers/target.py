@@ -135,8 +135,10 @@ class Target:
             for p in term.shape_parameters
             if p.unit == "Hz"
         ]
-        f = np.concatenate([_grid(self.lowest, nyquist, points), *own])
-        return np.unique(f[(f >= self.lowest) & (f <= nyquist)])
+        # Below the lowest there are only limits, which are as good as reached.
+        below = self.lowest * np.array([1e-3, 1e-2, 1e-1])
+        f = np.concatenate([below, _grid(self.lowest, nyquist, points), *own])
+        return np.unique(f[f <= nyquist])
 
     def slow_variance(self, stationary: Model) -> float:
         """Variance of what lies above a stationary spectrum and is not a random walk, u^2.
@@ -168,18 +170,28 @@ def _limit(terms: list[Process], start: float, dt: float) -> tuple[float, float]
         density = np.maximum(evaluated(term.psd, f, dt), np.finfo(float).tiny)
         slopes = np.diff(np.log10(density))
         changes = np.abs(np.diff(slopes, prepend=np.inf))
-        settled = (np.abs(slopes) < tuning.SETTLED) | (changes < tuning.SETTLED)
+        settled = np.abs(slopes) < tuning.SETTLED
+        if not _has_variance(term, dt):
+            # Above the corner of a slow stationary process the slope is constant too.
+            settled |= changes < tuning.SETTLED
         place = int(np.argmax(settled)) if np.any(settled) else slopes.size - 1
         lowest, steepest = max(lowest, place), max(steepest, float(slopes[place]))
     return float(f[lowest]), steepest
 
 
+def _has_variance(term: Process, dt: float) -> bool:
+    """Whether a process is stationary as far as it is known."""
+    try:
+        term.autocovariance(np.zeros(1, dtype=int), dt)
+    except InputError:
+        return False
+    return True
+
+
 def _ramp(label: str, rate: float, sd: float) -> Notice:
     text = f"the {label} counts as a constant of standard deviation {sd:.3g}: |R| times the horizon"
-    return Notice(
-        "ramp-as-constant", "note", "", text, {"R": rate, "sd": sd}, "a filter that lasts longer "
-        "needs a state for it"
-    )  # fmt: skip
+    mend = "a filter that lasts longer needs a state for it"
+    return Notice("ramp-as-constant", "warning", "", text, {"R": rate, "sd": sd}, mend)
 
 
 def _line(label: str, frequency: float, amplitude: float, fast: float) -> Notice:

@@ -159,6 +159,38 @@ def test_the_full_navigation_filter_is_not_too_optimistic_either():
     assert np.hypot(*analysis.predicted_sd[at, :2]) < 1.3 * np.hypot(*analysis.sd[at, :2])
 
 
+@pytest.mark.parametrize("form", ["N+K", "N+GM", "N+K+GM"])
+def test_a_process_far_slower_than_the_horizon_is_not_taken_for_a_walk(form):
+    """Its variance is the start; above its corner it looks like a walk for many decades."""
+    truth = WhiteNoise(1e-4) + GaussMarkov(1e-2, 1e9)
+    numbers = gmwm.bound(truth, form, 60.0)
+    start = np.hypot(numbers.initial_sd, sum(numbers.sigma))
+    assert 1e-2 <= start < 1.5e-2
+    assert worst_direction(truth, numbers, 60.0, every_fix=True) < WORST
+
+
+def test_limits_at_zero_frequency_are_dominated():
+    truth = Model(tuple(GaussMarkov(1e-4, 10.0**k) for k in range(-1, 4)))
+    numbers = gmwm.bound(truth, "N+GM", 0.1, dt=1e-4)
+    f = np.geomspace(1e-12, 5e3, 3000)
+    assert np.min(numbers.model.psd(f, 1e-4) / truth.psd(f, 1e-4)) > 1.0 - 1e-5
+
+
+def test_a_spectrum_alone_is_dominated_without_a_prediction():
+    class Pink(Process):
+        level: float = gmwm.parameter("u", role="scale")
+
+        def psd(self, f, dt):
+            return self.level**2 * dt * (2.0 * f * dt) ** -0.5
+
+    truth = WhiteNoise(1e-4) + Pink(1e-4)
+    numbers = gmwm.bound(truth, "N+K", 60.0)
+    ratio = numbers.model.psd(FREQUENCIES, DT) / truth.psd(FREQUENCIES, DT)
+    assert np.min(ratio) > 1.0 - 1e-5
+    assert np.isnan(numbers.nees[60.0])
+    assert [notice.code for notice in numbers.notices] == ["not-predicted"]
+
+
 # ---- The length of the record does not matter ----
 
 
