@@ -126,9 +126,8 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
         return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
 
     def cost(logs: FloatArray) -> float:
-        if np.max(np.abs(logs)) > tuning.FARTHEST:
-            return float("inf")
-        model = scaled(logs)
+        # Finite beyond the farthest too, where a line search may try: differences are taken of it.
+        model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
         total = 0.0
         for axis in group:
             errors = axis.chain.errors(
@@ -141,7 +140,7 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
         cost, np.zeros(len(names)), method="BFGS",
         options={"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS},
     ).x  # fmt: skip
-    model = scaled(best)
+    model = scaled(np.clip(best, -tuning.FARTHEST, tuning.FARTHEST))
     return [
         FilterNumbers(
             form=form,
