@@ -65,6 +65,10 @@ class Process:
     is_white: ClassVar[bool] = False
     """Whether it is white at any rate: noise of a measurement, which needs no state."""
 
+    is_band_limited: ClassVar[bool] = False
+    """Whether it is white noise that the sensor filtered: white beyond the memory of the filter,
+    it needs no state. Its ``state_space`` is that white noise."""
+
     is_walk: ClassVar[bool] = False
     """Whether it wanders off from where it starts, so that its start is a parameter of its own."""
 
