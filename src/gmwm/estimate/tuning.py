@@ -44,7 +44,10 @@ WELL_KNOWN_DOF = 30.0
 """Degrees of freedom of a level above which its deviation is known to 13 %."""
 
 POOR_DEVIATION = 0.10
-"""Misfit of the Allan deviation at a well-known level that navigation would feel."""
+"""Misfit of the Allan deviation that navigation would feel ..."""
+
+BEYOND_CHANCE = 2.5
+"""... where it is more than so many standard errors: one level in eighty by chance."""
 
 EXCLUDED_P = 0.001
 """Level of the test that no averaging time is missed: 4 standard errors for twenty of them."""

@@ -35,7 +35,6 @@ class _Filtered(Process):
 
     is_band_limited: ClassVar[bool] = True
     has_finite_state_space: ClassVar[bool] = False
-    repeatable: ClassVar[bool] = False
 
     N: float
 

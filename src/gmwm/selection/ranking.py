@@ -35,6 +35,7 @@ from gmwm.process import (
     model_from_list,
 )
 from gmwm.selection import tuning
+from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
 from gmwm.variance import PooledVariance, WaveletVariance
 
 MAX_GAUSS_MARKOV = 5
@@ -50,10 +51,13 @@ class Choices:
         Largest number of Gauss-Markov terms.
     extra : tuple of Process
         Further terms of open amplitude and given shape, each of which a candidate may have.
+    bandwidth : Bandwidth or None
+        The sensor's own low-pass, where the finest levels show one.
     """
 
     max_gauss_markov: int = MAX_GAUSS_MARKOV
     extra: tuple[Process, ...] = ()
+    bandwidth: Bandwidth | None = None
 
     def __post_init__(self) -> None:
         most = self.max_gauss_markov
@@ -76,9 +80,32 @@ class Choices:
                     "Sinusoid(frequency=0.5)"
                 )
 
+    def seeing(self, wv: WaveletVariance) -> Choices:
+        """The same with the sensor's low-pass, if these wavelet variances show one."""
+        return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, _penalty(wv.n)))
+
+    @property
+    def given(self) -> tuple[Process, ...]:
+        """All terms of given shape beside the textbook processes."""
+        return self.extra if self.bandwidth is None else (*self.extra, self.bandwidth.given)
+
+    def opened(self, candidate: Candidate, n: int) -> Candidate:
+        """A candidate with the low-pass as it is to be fitted; the search of its shape has a price."""
+        found = self.bandwidth
+        if found is None or found.given not in candidate.model.terms:
+            return candidate
+        terms = (found.free if term == found.given else term for term in candidate.model.terms)
+        return replace(
+            candidate,
+            model=Model(tuple(terms)),
+            criterion=candidate.criterion + _penalty(n) * found.n_shapes,
+            n_parameters=candidate.n_parameters + found.n_shapes,
+            dof=candidate.dof - found.n_shapes,
+        )
+
     def bases(self) -> Iterator[tuple[Process, ...]]:
         """All sums of the terms whose shape is given, the empty one first."""
-        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.given)
         for chosen in product((False, True), repeat=len(kinds)):
             yield tuple(kind for kind, on in zip(kinds, chosen, strict=True) if on)
 
@@ -144,7 +171,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
         Of one recording, or pooled of several; a drift is sought in one recording only.
     choices : Choices
     """
-    reference = dictionary_fit(wv, wv.variance, choices.extra)
+    reference = dictionary_fit(wv, wv.variance, choices.given)
     allowed = reference.discrepancy
     plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
     plain.sort(key=lambda item: item[0].criterion)
@@ -182,7 +209,7 @@ def _drift_free(
     """
     for _ in range(tuning.RAMP_ROUNDS):
         target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
-        reference = dictionary_fit(wv, target, choices.extra)
+        reference = dictionary_fit(wv, target, choices.given)
         slope = gls_slope(wv, reference.mixture.psd)
     return target, reference
 
@@ -294,7 +321,8 @@ def _candidates(
                 before = point.objective
                 continue
             before = point.objective
-            found.append((ground.candidate(design, point), point))
+            candidate = choices.opened(ground.candidate(design, point), wv.n)
+            found.append((candidate, point))
     return found or [_fallback(wv, ground)]
 
 

@@ -232,7 +232,7 @@ def select(
         wv = as_wavelet_variance(cast("Data", data), dt)
     if checks.choice("rule", rule, RULES) == "merge":
         return _by_merging(wv, choices)
-    ranking = tuple(rank(wv, choices))
+    ranking = tuple(rank(wv, choices.seeing(wv)))
     tried = []
     for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
         fitted = _fitted(candidate.model, wv)

@@ -42,3 +42,11 @@ RIVALS = 5
 
 WIDER = 1.2
 """Times the interval, from which on the range of a tie is reported."""
+
+BANDWIDTH_P = 1e-6
+"""Level of the test that a low-pass is needed beside a mixture of textbook processes, which follows
+white noise whatever chance does."""
+
+FILTER_LIKE = 10.0
+"""Correlation time in samples below which a Gauss-Markov process would take over part of a filter:
+none is beside the low-pass while its shape is sought."""

@@ -102,6 +102,24 @@ class Goodness:
         return float(self.misfit[worst]), float(self.tau[worst])
 
     @property
+    def beyond_chance(self) -> tuple[float, float, float] | None:
+        """Largest misfit that is no chance, its averaging time (s) and residual; None if none is.
+
+        Among levels whose residual exceeds 2.5 statistical standard errors of the model's own.
+        """
+        far = np.abs(self.residual) > tuning.BEYOND_CHANCE
+        if not self.is_tested or not np.any(far):
+            return None
+        worst = np.flatnonzero(far)[int(np.argmax(np.abs(self.misfit[far])))]
+        return float(self.misfit[worst]), float(self.tau[worst]), float(self.residual[worst])
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether that misfit is one that predictions feel: more than 10 % of the deviation."""
+        beyond = self.beyond_chance
+        return beyond is not None and abs(beyond[0]) > tuning.POOR_DEVIATION
+
+    @property
     def largest(self) -> tuple[float, float] | None:
         """Largest residual with what was allowed for, and its averaging time (s).
 

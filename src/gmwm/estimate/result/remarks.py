@@ -12,7 +12,6 @@ from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.process import Model
-from gmwm.variance import WaveletVariance
 
 REASONS = {
     "amplitude-bound": "amplitudes_above_zero",
@@ -138,50 +137,24 @@ def undetermined_notices(model: Model, keys: Sequence[str], matrix: FloatArray) 
     ]  # fmt: skip
 
 
-def misfit_notices(
-    wv: WaveletVariance,
-    target: FloatArray,
-    implied: FloatArray,
-    variance: FloatArray,
-    discrepancy: float,
-) -> list[Notice]:
-    """Notices of a model that fails the chi-square test.
+def misfit_notices(goodness: Goodness, discrepancy: float) -> list[Notice]:
+    """What it means for prediction that a model fails the chi-square test.
 
-    ``variance`` (J,) are the statistical variances of ``target``, u^4.
+    ``discrepancy`` is the relative error of the variances that was allowed for.
     """
-    worst, tau, poor = worst_misfit(wv, target, implied, variance)
-    text = f"largest misfit of the deviation {100.0 * worst:.2g} % at tau = {tau:.3g} s"
-    if discrepancy > 0.0:
-        if tau == 0.0:
-            return []
+    beyond = goodness.beyond_chance
+    if beyond is None:
+        return []
+    misfit, tau, residual = beyond
+    values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
+    share = f"{100.0 * abs(misfit):.2g} %"
+    if goodness.is_poor:
+        side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
         text = (
-            f"a discrepancy of {100.0 * discrepancy:.2g} % of the variance at each level was "
-            f"allowed for and widens the intervals ({text})"
+            f"predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
+            f"model's Allan deviation, by {abs(residual):.2g} standard errors"
         )
-    return [
-        Notice(
-            "misfit", "bad" if poor else "note", "",
-            f"the model differs from the data by more than their statistical errors; {text}",
-            {"misfit": worst, "tau": tau, "discrepancy": discrepancy},
-        )
-    ]  # fmt: skip
-
-
-def worst_misfit(
-    wv: WaveletVariance, target: FloatArray, implied: FloatArray, variance: FloatArray
-) -> tuple[float, float, bool]:
-    """Largest relative misfit of the deviation at well-known levels, its time (s), if it is poor.
-
-    ``variance`` (J,) are the statistical variances of ``target``, u^4. The time is zero where no
-    level is known well.
-    """
-    known = 2.0 * target**2 / np.maximum(variance, 1e-300) > tuning.WELL_KNOWN_DOF
-    if not np.any(known):
-        return 0.0, 0.0, False
-    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
-    worst = int(np.argmax(ratio))
-    return (
-        float(ratio[worst]),
-        float(wv.tau[known][worst]),
-        bool(ratio[worst] > tuning.POOR_DEVIATION),
-    )
+        return [Notice("misfit", "bad", "", text, values)]
+    text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
+    text += ", which the intervals allow for" if discrepancy > 0.0 else ""
+    return [Notice("misfit", "note", "", text, values)]
