@@ -96,8 +96,8 @@ class LowPassNoise(_Filtered):
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)
-        log_tangent, weight = _nodes(tuple((tau.ravel() / dt).tolist()))
-        return np.asarray((weight @ _gain(shape, log_tangent, dt) / dt).reshape(tau.shape))
+        averaging = tuple((tau.ravel() / dt).tolist())
+        return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(tau.shape).copy()
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         lag = np.asarray(lag, dtype=int)
@@ -191,6 +191,13 @@ def _gain(shape: Shape, log_tangent: FloatArray, dt: float) -> FloatArray:
     exponent = np.log(half_power) + order * (log_tangent - np.log(np.tan(np.pi * bandwidth * dt)))
     q = np.exp(np.minimum(exponent, 0.5 * _LARGEST_LOG))
     return np.asarray(1.0 / (1.0 + q * (bend + q)))
+
+
+@lru_cache(maxsize=1024)
+def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatArray:
+    """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
+    log_tangent, weight = _nodes(averaging)
+    return np.asarray(weight @ _gain(shape, log_tangent, dt) / dt)
 
 
 @lru_cache(maxsize=8)

@@ -90,7 +90,7 @@ class Choices:
         return self.extra if self.bandwidth is None else (*self.extra, self.bandwidth.given)
 
     def opened(self, candidate: Candidate, n: int) -> Candidate:
-        """A candidate with the low-pass as it is to be fitted; the search of its shape has a price."""
+        """A candidate with the low-pass as it is to be fitted; its shape has a price."""
         found = self.bandwidth
         if found is None or found.given not in candidate.model.terms:
             return candidate
