@@ -443,6 +443,15 @@ class Process:
             return cls.repeatable
         return bool(instance.shape_parameters)
 
+    def named(self) -> str:
+        """The term as a reader finds it in a model: ``Gauss-Markov term of tau = 0.52 s``."""
+        shape = ", ".join(
+            f"{p.name} = {self.values[p.name]:.3g} {p.unit}".removesuffix(" -")
+            for p in self.shape_parameters
+            if self.values[p.name] is not None
+        )
+        return f"{self.title()} term" + (f" of {shape}" if shape else "")
+
     @classmethod
     def title(cls) -> str:
         """Name for tables and legends."""

@@ -24,7 +24,7 @@ from gmwm.selection.ranking import (
     rank,
     rank_key,
 )
-from gmwm.selection.ties import ranges
+from gmwm.selection.ties import loses_at_a_level, ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 
 if TYPE_CHECKING:
@@ -233,15 +233,29 @@ def select(
     if checks.choice("rule", rule, RULES) == "merge":
         return _by_merging(wv, choices)
     ranking = tuple(rank(wv, choices.seeing(wv)))
-    tried = []
+    limit = rank_key(ranking[0]) + tuning.TIE
+    tried: list[tuple[Candidate, Fit]] = []
+    found: tuple[Candidate, Fit] | None = None
     for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
+        if found is not None and rank_key(candidate) > limit:
+            break
         fitted = _fitted(candidate.model, wv)
-        if fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded):
-            return Selection(ranking, *_simplest_by_own_fit(ranking, candidate, fitted, wv))
-        tried.append((candidate, fitted))
+        if not _is_acceptable(fitted):
+            tried.append((candidate, fitted))
+        elif found is None or loses_at_a_level(found[1], fitted):
+            found = candidate, fitted
+        if found is not None and not found[1].goodness.largest_p < tuning.LEVEL_LOST_P:
+            break
+    if found is not None:
+        return Selection(ranking, *_simplest_by_own_fit(ranking, *found, wv))
     # A term too many does less harm than a level that is missed.
     best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
     return Selection(ranking, *best)
+
+
+def _is_acceptable(fitted: Fit) -> bool:
+    """Whether all terms of a fit are supported and no averaging time is missed by far."""
+    return fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded)
 
 
 def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
@@ -286,7 +300,7 @@ def _simplest_by_own_fit(
         other = _fitted(candidate.model, wv)
         as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + tuning.TIE
         as_good = as_good and other.discrepancy <= fitted.discrepancy
-        if as_good and not (_has_redundant_term(other) or other.goodness.is_excluded):
+        if as_good and _is_acceptable(other) and not loses_at_a_level(other, fitted):
             return candidate, other
     return best, fitted
 

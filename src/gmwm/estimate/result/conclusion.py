@@ -23,6 +23,7 @@ from gmwm.estimate.problem import (
 from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.remarks import (
+    bandwidth_notices,
     bound_notices,
     confounded_notices,
     indistinct_notices,
@@ -171,6 +172,7 @@ def conclude(
             *indistinct_notices(model, ordered, matrix),
             *confounded_notices(model, ordered, matrix),
             *notices,
+            *bandwidth_notices(model, wv),
             *wv.notices,
         ),
         log_likelihood=log_likelihood,

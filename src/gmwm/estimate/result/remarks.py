@@ -9,9 +9,11 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import field_units
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.process import Model
+from gmwm.process import Model, Process
+from gmwm.variance import WaveletVariance
 
 REASONS = {
     "amplitude-bound": "amplitudes_above_zero",
@@ -56,6 +58,49 @@ def no_test_notice() -> Notice:
         "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by "
         "straight lines",
     )  # fmt: skip
+
+
+def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
+    """Terms that are the sensor's own filter: what they are, and what they act as.
+
+    A Gauss-Markov process of a correlation time of a few samples is a low-pass of first order,
+    where the model has no white noise beside it.
+    """
+    filtered = [i for i, term in enumerate(model.terms) if term.is_band_limited]
+    if not filtered and not any(term.is_white for term in model.terms):
+        times = ((i, term.values.get("tau")) for i, term in enumerate(model.terms))
+        filtered = [i for i, tau in times if tau is not None and tau < tuning.FILTER_LIKE * wv.dt]
+    notices = []
+    for i in filtered:
+        term = model.terms[i]
+        key = next(p.key for p in model.parameters if p.term == i and p.parameter.role == "shape")
+        bandwidth = _half_power(term, wv.dt)
+        low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
+        units = field_units("u/sqrt(Hz)", wv.quantity)
+        unit, factor = (
+            (units[0].unit, units[0].per_si) if units else (f"{wv.unit or 'u'}/sqrt(Hz)", 1.0)
+        )
+        density = float(np.sqrt(low))
+        notices.append(
+            Notice(
+                "sensor-bandwidth", "note", key,
+                f"the {term.named()} = sensor bandwidth ({bandwidth:.3g} Hz); acts as white noise "
+                f"of N = {density * factor:.3g} {unit}, needs no state",
+                {"bandwidth": bandwidth, "density": density},
+            )
+        )  # fmt: skip
+    return notices
+
+
+def _half_power(term: Process, dt: float) -> float:
+    """Lowest frequency (Hz) at which half of the power of a low-pass is left, or half the rate."""
+    f = np.geomspace(1e-5, 0.5, 2000) / dt
+    density = term.psd(f, dt)
+    below = np.flatnonzero(density < 0.5 * density[0])
+    if below.size == 0:
+        return float(f[-1])
+    part = slice(below[0] - 1, below[0] + 1)
+    return float(np.interp(-0.5 * density[0], -density[part], f[part]))
 
 
 def bound_notices(upper: Mapping[str, float]) -> list[Notice]:
