@@ -246,9 +246,12 @@ def select(
             found = candidate, fitted
         if found is not None and not found[1].goodness.largest_p < tuning.LEVEL_LOST_P:
             break
+    # A term too many, or one that is only bounded, does less harm than a level that is missed.
     if found is not None:
+        for better, other in tried:
+            if rank_key(better) <= limit < rank_key(found[0]) and loses_at_a_level(found[1], other):
+                return Selection(ranking, better, other)
         return Selection(ranking, *_simplest_by_own_fit(ranking, *found, wv))
-    # A term too many does less harm than a level that is missed.
     best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
     return Selection(ranking, *best)
 
