@@ -54,10 +54,11 @@ class LowPassNoise(_Filtered):
     bandwidth : float, optional
         Frequency at which half of the power is left (-3 dB), Hz.
     order : float, optional
-        Of the filter: beyond its bandwidth the deviation falls by 6 dB per octave and order. Any
-        positive number.
+        Of the filter, from 0.9 to 16: beyond its bandwidth the power falls by 6 dB per octave and
+        order. It need not be whole.
     damping : float, optional
-        Damping ratio of a filter of second order; 0.7071 is a Butterworth filter of any order.
+        Damping ratio of a filter of second order, from 0.2 to 2; 0.7071 is a Butterworth filter of
+        any order.
 
     Notes
     -----
@@ -70,8 +71,10 @@ class LowPassNoise(_Filtered):
 
     N: float = parameter("u/sqrt(Hz)", "scale", meaning="density of the filtered white noise")
     bandwidth: float = parameter("Hz", meaning="sensor bandwidth, -3 dB")
-    order: float = parameter("-", upper=16.0, meaning="order of the sensor's low-pass")
-    damping: float = parameter("-", upper=2.0, meaning="damping ratio of the sensor's low-pass")
+    order: float = parameter("-", lower=0.9, upper=16.0, meaning="order of the sensor's low-pass")
+    damping: float = parameter(
+        "-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass"
+    )
     label: ClassVar[str] = "low-pass noise"
     prefix: ClassVar[str] = "lowpass_"
 

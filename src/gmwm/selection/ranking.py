@@ -162,8 +162,8 @@ class Candidate:
         return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
 
 
-def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
-    """All candidates, best first.
+def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope | None]:
+    """All candidates, best first, and a slope that an unresolved walk explains as well as a ramp.
 
     Parameters
     ----------
@@ -176,12 +176,13 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
     plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
     plain.sort(key=lambda item: item[0].criterion)
     if isinstance(wv, PooledVariance):
-        return [candidate for candidate, _ in plain]
+        return [candidate for candidate, _ in plain], None
     slope = _slope_under(plain[0], wv)
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
+    ambiguous = None
     if without > tuning.RAMP_PLAUSIBLE:
-        target, drift_free = _drift_free(wv, slope, choices)
+        target, drift_free, slope = _drift_free(wv, slope, choices)
         if slope_p_value(wv, drift_free.mixture.psd) < tuning.RAMP_P:
             if drift_free.discrepancy < allowed:
                 # Both kinds must be compared under the same allowance.
@@ -189,7 +190,9 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
                 plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
             found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
             ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
-    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+        elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
+            ambiguous = slope  # a ramp would have won but for the walk
+    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key), ambiguous
 
 
 def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
@@ -201,8 +204,8 @@ def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
 
 def _drift_free(
     wv: WaveletVariance, slope: Slope, choices: Choices
-) -> tuple[FloatArray, Reference]:
-    """Wavelet variances without the drift, and the mixture fitted to them.
+) -> tuple[FloatArray, Reference, Slope]:
+    """Wavelet variances without the drift, the mixture fitted to them, the slope under it.
 
     Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
     estimated again under the mixture that is left.
@@ -211,7 +214,7 @@ def _drift_free(
         target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
         reference = dictionary_fit(wv, target, choices.given)
         slope = gls_slope(wv, reference.mixture.psd)
-    return target, reference
+    return target, reference, slope
 
 
 def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:

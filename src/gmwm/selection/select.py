@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
@@ -24,7 +24,7 @@ from gmwm.selection.ranking import (
     rank,
     rank_key,
 )
-from gmwm.selection.ties import loses_at_a_level, ranges
+from gmwm.selection.ties import loses_at_a_level, ramp_or_walk, ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 
 if TYPE_CHECKING:
@@ -232,7 +232,16 @@ def select(
         wv = as_wavelet_variance(cast("Data", data), dt)
     if checks.choice("rule", rule, RULES) == "merge":
         return _by_merging(wv, choices)
-    ranking = tuple(rank(wv, choices.seeing(wv)))
+    ranked, slope = rank(wv, choices.seeing(wv))
+    ranking = tuple(ranked)
+    chosen, fitted = _chosen(ranking, wv)
+    if slope is not None and not _has_ramp(chosen.model):
+        fitted = replace(fitted, notices=(*fitted.notices, ramp_or_walk(fitted, slope)))
+    return Selection(ranking, chosen, fitted)
+
+
+def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
+    """The best of a ranking that the data support, and its fit."""
     limit = rank_key(ranking[0]) + tuning.TIE
     tried: list[tuple[Candidate, Fit]] = []
     found: tuple[Candidate, Fit] | None = None
@@ -250,10 +259,9 @@ def select(
     if found is not None:
         for better, other in tried:
             if rank_key(better) <= limit < rank_key(found[0]) and loses_at_a_level(found[1], other):
-                return Selection(ranking, better, other)
-        return Selection(ranking, *_simplest_by_own_fit(ranking, *found, wv))
-    best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
-    return Selection(ranking, *best)
+                return better, other
+        return _simplest_by_own_fit(ranking, *found, wv)
+    return next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
 
 
 def _is_acceptable(fitted: Fit) -> bool:

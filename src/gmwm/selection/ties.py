@@ -11,7 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import field_units
+from gmwm.estimate.problem import Slope
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process
 from gmwm.selection import tuning
@@ -63,6 +65,33 @@ def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
             if found is not None:
                 result[item.key] = (min(low, found[0]), max(high, found[1]))
     return result
+
+
+def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
+    """That a straight drift describes the slow part as well as the walk that was chosen."""
+    wv = fitted.wv
+    texts = []
+    for unit, name, value in (
+        ("u/s", "R", slope.value),
+        ("u/s/sqrt(Hz)", "K", fitted.params.get("K", float("nan"))),
+    ):
+        shown = field_units(unit, wv.quantity)
+        label, factor = (shown[0].unit, shown[0].per_si) if shown else (unit, 1.0)
+        texts.append(f"{name} = {value * factor:.3g} {label}")
+    ramp, walk = texts
+    if "K" not in fitted.params:
+        slow = max(fitted.model.terms, key=lambda term: term.haar_variance(wv.tau[-1:], wv.dt)[0])
+        walk = slow.named()
+    return Notice(
+        "ramp-or-walk", "note", "",
+        f"a rate ramp of {ramp} or slow noise ({walk}): this record sees it once and does not tell "
+        "them apart, the model has the noise",
+        {
+            "slope": slope.value,
+            "slope_error": float(np.sqrt(slope.variance)),
+            "walk": fitted.params.get("K", float("nan")),
+        },
+    )  # fmt: skip
 
 
 def _partners(model: Model, other: Model) -> list[int | None]:
