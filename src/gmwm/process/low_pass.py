@@ -72,9 +72,7 @@ class LowPassNoise(_Filtered):
     N: float = parameter("u/sqrt(Hz)", "scale", meaning="density of the filtered white noise")
     bandwidth: float = parameter("Hz", meaning="sensor bandwidth, -3 dB")
     order: float = parameter("-", lower=0.9, upper=16.0, meaning="order of the sensor's low-pass")
-    damping: float = parameter(
-        "-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass"
-    )
+    damping: float = parameter("-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass")
     label: ClassVar[str] = "low-pass noise"
     prefix: ClassVar[str] = "lowpass_"
 

@@ -258,7 +258,7 @@ def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidat
     # A term too many, or one that is only bounded, does less harm than a level that is missed.
     if found is not None:
         for better, other in tried:
-            if rank_key(better) <= limit < rank_key(found[0]) and loses_at_a_level(found[1], other):
+            if rank_key(better) <= limit and loses_at_a_level(found[1], other):
                 return better, other
         return _simplest_by_own_fit(ranking, *found, wv)
     return next((item for item in tried if not item[1].goodness.is_excluded), tried[0])

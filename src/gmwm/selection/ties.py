@@ -76,16 +76,18 @@ def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
         ("u/s/sqrt(Hz)", "K", fitted.params.get("K", float("nan"))),
     ):
         shown = field_units(unit, wv.quantity)
-        label, factor = (shown[0].unit, shown[0].per_si) if shown else (unit, 1.0)
+        plain = unit.replace("u", wv.unit or "u", 1)
+        label, factor = (shown[0].unit, shown[0].per_si) if shown else (plain, 1.0)
         texts.append(f"{name} = {value * factor:.3g} {label}")
     ramp, walk = texts
     if "K" not in fitted.params:
-        slow = max(fitted.model.terms, key=lambda term: term.haar_variance(wv.tau[-1:], wv.dt)[0])
-        walk = slow.named()
+        times = {term.values.get("tau") or 0.0: term for term in fitted.model.terms}
+        longest = max(times)
+        walk = times[longest].named() if longest > 0.0 else "a walk too slow to be resolved"
     return Notice(
         "ramp-or-walk", "note", "",
         f"a rate ramp of {ramp} or slow noise ({walk}): this record sees it once and does not tell "
-        "them apart, the model has the noise",
+        "them apart, the model has no ramp",
         {
             "slope": slope.value,
             "slope_error": float(np.sqrt(slope.variance)),
