@@ -24,7 +24,7 @@ DT, DENSITY = 0.005, 1e-3
 RATIOS = (0.02, 0.05, 0.08, 0.15, 0.25, 0.4)
 SLOW: dict[str, Process | None] = {
     "N": None,
-    "N + K": RandomWalk(1e-5),
+    "N + K": RandomWalk(5e-5),
     "N + GM": GaussMarkov(1e-4, 100.0),
 }
 SETTLED = 4000  # samples after which a filter has forgotten its start
@@ -48,11 +48,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=360_000)
     parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS)
+    parser.add_argument("--beside", nargs="*", choices=SLOW, default=list(SLOW))
     parser.add_argument("--white", type=int, default=200, help="series of plain white noise")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     warnings.simplefilter("ignore", gmwm.FitWarning)
-    for slow, process in SLOW.items():
+    for slow in given.beside:
+        process = SLOW[slow]
         valid = named = total = 0
         density, wrong = [], []
         for ratio in given.ratios:

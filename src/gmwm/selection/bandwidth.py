@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
 
 from gmwm._core.typing import FloatArray
 from gmwm.estimate.moments import dictionary, dictionary_fit
@@ -65,7 +64,7 @@ def sensor_bandwidth(
     extra : tuple of Process
         Lines and resonances that the series may have.
     penalty : float
-        Of the objective, for each shape parameter.
+        Of the criterion, for each parameter.
     """
     reference = dictionary_fit(wv, wv.variance, extra)
     if reference.discrepancy == 0.0:
@@ -83,9 +82,8 @@ def sensor_bandwidth(
     if found is None:
         return None
     bandwidth, gain = found
-    if chi2.sf(gain, 1 + bandwidth.n_shapes) > tuning.BANDWIDTH_P:
-        return None
-    return bandwidth
+    needed = tuning.BANDWIDTH_GAIN * penalty * (1 + bandwidth.n_shapes)
+    return bandwidth if gain > needed else None
 
 
 def _families() -> Iterator[Process]:

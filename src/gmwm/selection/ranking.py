@@ -104,10 +104,14 @@ class Choices:
         )
 
     def bases(self) -> Iterator[tuple[Process, ...]]:
-        """All sums of the terms whose shape is given, the empty one first."""
-        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.given)
+        """All sums of the terms whose shape is given, the empty one first.
+
+        A low-pass that was found is in all of them: no sum without it describes the finest levels.
+        """
+        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        always = self.given[len(self.extra) :]
         for chosen in product((False, True), repeat=len(kinds)):
-            yield tuple(kind for kind, on in zip(kinds, chosen, strict=True) if on)
+            yield (*(kind for kind, on in zip(kinds, chosen, strict=True) if on), *always)
 
 
 @dataclass(frozen=True)

@@ -43,9 +43,9 @@ RIVALS = 5
 WIDER = 1.2
 """Times the interval, from which on the range of a tie is reported."""
 
-BANDWIDTH_P = 1e-6
-"""Level of the test that a low-pass is needed beside a mixture of textbook processes, which follows
-white noise whatever chance does."""
+BANDWIDTH_GAIN = 2.0
+"""Times the price of its parameters: what a low-pass must gain over a mixture of textbook processes
+to be in the model. No sum of such processes is better than their mixture."""
 
 FILTER_LIKE = 10.0
 """Correlation time in samples below which a Gauss-Markov process would take over part of a filter:
