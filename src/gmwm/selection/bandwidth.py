@@ -69,7 +69,6 @@ def sensor_bandwidth(
     reference = dictionary_fit(wv, wv.variance, extra)
     if reference.discrepancy == 0.0:
         return None
-    found: tuple[Bandwidth, float] | None = None
     for _ in range(_ROUNDS):
         alone = _Beside.of(wv, extra, reference.covariance, fastest=0.0).objective
         tried = []
@@ -77,13 +76,9 @@ def sensor_bandwidth(
             problem = _Beside.of(wv, extra, reference.covariance, tuning.FILTER_LIKE, left_out)
             tried += [(*problem.best(each), price) for each in _families()]
         best, objective, _ = min(tried, key=lambda t: t[1] + penalty * t[0].n_shapes + t[2])
-        found = best, alone - objective
         reference = dictionary_fit(wv, wv.variance, (*extra, best.given))
-    if found is None:
-        return None
-    bandwidth, gain = found
-    needed = tuning.BANDWIDTH_GAIN * penalty * (1 + bandwidth.n_shapes)
-    return bandwidth if gain > needed else None
+    needed = tuning.BANDWIDTH_GAIN * penalty * (1 + best.n_shapes)
+    return best if alone - objective > needed else None
 
 
 def _families() -> Iterator[Process]:
