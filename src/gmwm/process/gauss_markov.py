@@ -1,6 +1,7 @@
 """Gauss-Markov processes of first and second order.
 
-Both are sums of exponential autocovariances, of real or complex rates. The sampled process with autocovariance exp(-a |k|) at lag k (a = dt/tau for Gauss-Markov) has
+Both are sums of exponential autocovariances, of real or complex rates. The sampled process
+with autocovariance exp(-a |k|) at lag k (a = dt/tau for Gauss-Markov) has
 
     S(f)  = dt coth(a/2) / (1 + sin^2(pi f dt) / sinh^2(a/2)),
     nu2_m = [2 m (sinh a - a) + h(m a)] / (8 m^2 sinh^2(a/2)),
