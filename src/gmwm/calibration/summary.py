@@ -69,8 +69,14 @@ def _foot(term: Process, frequency: FloatArray, dt: float) -> float:
 
 
 def floor(fitted: Fit) -> Floor:
-    """Lowest point of the fitted Allan deviation at averaging times with data."""
-    deviation = np.sqrt(2.0 * fitted.implied)
+    """Lowest point of the fitted Allan deviation at averaging times with data.
+
+    A model that runs below the data is not believed: where it does, the lower end of the data's
+    interval (95 %) counts.
+    """
+    at, wv = fitted.goodness, fitted.wv
+    share = np.sqrt(wv.lower / np.maximum(wv.variance, np.finfo(float).tiny))
+    deviation = np.fmax(np.sqrt(2.0 * fitted.implied), at.data * share)
     lowest = int(np.argmin(deviation))
     return Floor(float(deviation[lowest]), float(fitted.wv.tau[lowest]))
 
@@ -115,7 +121,8 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
     InputError
         If the data do not bound it.
     """
-    opened = fitted.model.opened()
+    # Given shapes, such as that of a line or of a low-pass, stay as they are.
+    opened = fitted.model.with_params(dict.fromkeys([*fitted.keys, *fitted.upper_bounds]))
     again = estimate(opened if key in fitted.params else opened + process, fitted.wv)
     bound = float(again.interval()[key][1])
     if not np.isfinite(bound):

@@ -21,7 +21,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import ols_slope, weight_root
-from gmwm.estimate.result import Fit, Region, slope_name, worst_misfit
+from gmwm.estimate.result import Fit, Region, slope_name
 from gmwm.process import (
     BiasInstability,
     Model,
@@ -410,8 +410,10 @@ def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     # happens to be small claims to be exact.
     ratio = np.maximum(wv.variance, np.finfo(float).tiny) / implied
     is_off = np.abs(np.log(ratio)) > tuning.LINES_SIGMA * np.sqrt(2.0 / wv.dof)
-    worst, tau, poor = worst_misfit(wv, np.where(is_off, wv.variance, implied), implied, variance)
-    if not poor:
+    known = 2.0 * wv.variance**2 / np.maximum(variance, 1e-300) > tuning.WELL_KNOWN_DOF
+    misfit = np.where(is_off & known, np.abs(np.sqrt(wv.variance / implied) - 1.0), 0.0)
+    worst, tau = float(np.max(misfit)), float(wv.tau[int(np.argmax(misfit))])
+    if worst <= tuning.POOR_DEVIATION:
         return []
     text = (
         f"the sum of the lines misses the Allan deviation by {100.0 * worst:.2g} % at tau = "

@@ -44,13 +44,30 @@ WELL_KNOWN_DOF = 30.0
 """Degrees of freedom of a level above which its deviation is known to 13 %."""
 
 POOR_DEVIATION = 0.10
-"""Misfit of the Allan deviation at a well-known level that navigation would feel."""
+"""Misfit of the Allan deviation that navigation would feel ..."""
+
+BEYOND_CHANCE = 2.5
+"""... where it is more than so many standard errors: one level in eighty by chance."""
 
 EXCLUDED_P = 0.001
 """Level of the test that no averaging time is missed: 4 standard errors for twenty of them."""
 
+FINEST_TIME = 0.1
+"""Averaging time (s) up to which a level is judged with the discrepancy in its errors: the sensor's
+filter, its rounding and fast resonances, which an integral over longer times does not feel ..."""
+
+FINEST_SAMPLES = 10.0
+"""... and the same in samples, of slow recordings."""
+
 RECORDINGS_DIFFER = 0.01
 """Level of the test that several recordings are the same noise."""
+
+FILTER_LIKE = 10.0
+"""Correlation time in samples below which a Gauss-Markov process without white noise beside it is
+the sensor's own low-pass."""
+
+FOOT = 0.01
+"""Of the bandwidth: a frequency at which the filtered noise is white."""
 
 # -- the allowed discrepancy ----------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from gmwm.plotting.deviation import (
     COMPONENT_COLOURS,
     DATA_COLOUR,
+    LINEAR_RESIDUAL,
     SUM_COLOUR,
     boxes,
     curves,
@@ -18,6 +19,7 @@ from gmwm.plotting.navigation import errors, growth, innovations, literal, measu
 __all__ = [
     "COMPONENT_COLOURS",
     "DATA_COLOUR",
+    "LINEAR_RESIDUAL",
     "SUM_COLOUR",
     "boxes",
     "curves",

@@ -28,6 +28,9 @@ _BESIDE = 1.07  # ratio of the averaging times at which bars of different kinds 
 _MARGIN = 2.5  # above and below the deviations of several kinds
 _DECADES_SHOWN_BELOW = 0.7  # of a component, below the lowest data point
 
+LINEAR_RESIDUAL = 5.0
+"""Standard errors up to which the axis of residuals is linear; beyond, it is logarithmic."""
+
 
 def deviation(
     tau: FloatArray,
@@ -253,7 +256,12 @@ def residuals(
             fontsize="x-small", color=DATA_COLOUR,
         )  # fmt: skip
     largest = max(float(np.max(np.abs(residual[shown]), initial=0.0)), 2.5)
-    ax.set_ylim(-1.25 * largest, 1.25 * largest)
+    if largest > LINEAR_RESIDUAL:
+        # Beside a residual of 50 at the finest level those at long times would be flat.
+        ax.set_yscale("symlog", linthresh=LINEAR_RESIDUAL, linscale=2.0)
+        ax.set_ylim(-2.0 * largest, 2.0 * largest)
+    else:
+        ax.set_ylim(-1.25 * largest, 1.25 * largest)
     ax.set_xscale("log")
     ax.set_xlabel("averaging time [s]")
     ax.set_ylabel("residual [standard errors]")

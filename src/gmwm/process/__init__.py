@@ -4,6 +4,7 @@ from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process, Shape
 from gmwm.process.catalogue import CATALOGUE, model_from_list
 from gmwm.process.gauss_markov import GaussMarkov, Resonance
+from gmwm.process.low_pass import BUTTERWORTH, AveragedNoise, LowPassNoise
 from gmwm.process.model import Model, as_model, simulate
 from gmwm.process.noise import (
     BiasInstability,
@@ -23,12 +24,15 @@ __all__ = [
     "AR",
     "ARIMA",
     "ARMA",
+    "BUTTERWORTH",
     "CATALOGUE",
     "MA",
     "PSD",
+    "AveragedNoise",
     "BiasInstability",
     "ComplexArray",
     "GaussMarkov",
+    "LowPassNoise",
     "Model",
     "Parameter",
     "Process",

@@ -163,7 +163,7 @@ class ARIMA(Process):
         if decay > _MAX_LAGS or np.any(np.abs(m - tau / dt) > 1e-6 * m) or np.any(m < 1.0):
             return spectral.haar_variance(self.psd, tau, dt)
         covariance = _unit_autocovariance(self.ar, self.ma, decay)
-        flat = [_haar_sum(covariance, value, self.d) for value in m.ravel()]
+        flat = [haar_sum(covariance, value, self.d) for value in m.ravel()]
         return self.sigma2 * np.reshape(flat, tau.shape)
 
     def state_space(self, dt: float) -> StateSpace:
@@ -334,7 +334,7 @@ def _unit_autocovariance(ar: tuple[float, ...], ma: tuple[float, ...], lags: int
     return np.concatenate([start, rest])
 
 
-def _haar_sum(covariance: FloatArray, m: float, d: int) -> float:
+def haar_sum(covariance: FloatArray, m: float, d: int = 0) -> float:
     """Haar variance at m samples as the sum of the autocovariance against the filter's own.
 
     The autocorrelation of the Haar filter (d = 0) and of its cumulative sum (d = 1) is the fourth

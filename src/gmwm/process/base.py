@@ -65,6 +65,10 @@ class Process:
     is_white: ClassVar[bool] = False
     """Whether it is white at any rate: noise of a measurement, which needs no state."""
 
+    is_band_limited: ClassVar[bool] = False
+    """Whether it is white noise that the sensor filtered: white beyond the memory of the filter,
+    it needs no state. Its ``state_space`` is that white noise."""
+
     is_walk: ClassVar[bool] = False
     """Whether it wanders off from where it starts, so that its start is a parameter of its own."""
 
@@ -438,6 +442,15 @@ class Process:
         if cls.repeatable is not None:
             return cls.repeatable
         return bool(instance.shape_parameters)
+
+    def named(self) -> str:
+        """The term as a reader finds it in a model: ``Gauss-Markov term of tau = 0.52 s``."""
+        shape = ", ".join(
+            f"{p.name} = {self.values[p.name]:.3g} {p.unit}".removesuffix(" -")
+            for p in self.shape_parameters
+            if self.values[p.name] is not None
+        )
+        return f"{self.title()} term" + (f" of {shape}" if shape else "")
 
     @classmethod
     def title(cls) -> str:

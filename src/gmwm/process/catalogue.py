@@ -9,6 +9,7 @@ from gmwm.errors import InputError
 from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process
 from gmwm.process.gauss_markov import GaussMarkov, Resonance
+from gmwm.process.low_pass import AveragedNoise, LowPassNoise
 from gmwm.process.model import Model
 from gmwm.process.noise import BiasInstability, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.process.sinusoid import Sinusoid
@@ -21,6 +22,8 @@ CATALOGUE: tuple[type[Process], ...] = (
     RateRamp,
     GaussMarkov,
     Resonance,
+    LowPassNoise,
+    AveragedNoise,
     Sinusoid,
     AR,
     MA,

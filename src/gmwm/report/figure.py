@@ -10,7 +10,13 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units
 from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.estimate.result import Fit
-from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
+from gmwm.plotting import (
+    COMPONENT_COLOURS,
+    DATA_COLOUR,
+    LINEAR_RESIDUAL,
+    SUM_COLOUR,
+    deviation_range,
+)
 
 _GRID = "#dddddd"
 _BESIDE = 1.7  # ratio of averaging times that is left free at both ends
@@ -96,7 +102,8 @@ def residual_figure(fitted: Fit) -> dict[str, Any]:
     """
     at = fitted.goodness
     shown = np.flatnonzero(np.isfinite(at.residual) & np.isfinite(at.misfit))
-    tau, height = at.tau[shown].tolist(), at.residual[shown].tolist()
+    residual = at.residual[shown]
+    tau, height = at.tau[shown].tolist(), _compressed(residual).tolist()
     stems: dict[str, list[float | None]] = {"x": [], "y": []}
     for time, value in zip(tau, height, strict=True):
         stems["x"] += [time, time, None]
@@ -117,25 +124,31 @@ def residual_figure(fitted: Fit) -> dict[str, Any]:
             "y": height,
             "marker": {"color": colour, "size": 7},
             "customdata": [
-                [100.0 * misfit, dof]
-                for misfit, dof in zip(at.misfit[shown], at.dof[shown], strict=True)
+                [100.0 * misfit, dof, value]
+                for misfit, dof, value in zip(
+                    at.misfit[shown], at.dof[shown], residual, strict=True
+                )
             ],
             "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
-            "%{y:+.2f} standard errors, %{customdata[1]:.3g} degrees of freedom<extra></extra>",
+            "%{customdata[2]:+.2f} standard errors, %{customdata[1]:.3g} degrees of freedom"
+            "<extra></extra>",
         },
     ]
     band = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": -2, "y1": 2}
     largest = max([2.5, *map(abs, height)])
+    ticks = np.array([-100.0, -10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 100.0])
     layout = {
         **_LAYOUT,
-        "margin": {"l": 75, "r": 15, "t": 8, "b": 42},
-        "height": 190,
+        "margin": {"l": 75, "r": 15, "t": 30, "b": 42},  # the toolbar is above the points
+        "height": 212,
         "showlegend": False,
         "shapes": [{**band, "fillcolor": "#e8eef4", "line": {"width": 0}, "layer": "below"}],
         "xaxis": _times(at.tau),
         "yaxis": {
             "title": {"text": "residual [sigma]"},
             "range": [-1.15 * largest, 1.15 * largest],
+            "tickvals": _compressed(ticks).tolist(),
+            "ticktext": [f"{value:g}" for value in ticks],
             "gridcolor": _GRID,
             "linecolor": "#888888",
             "mirror": True,
@@ -143,6 +156,13 @@ def residual_figure(fitted: Fit) -> dict[str, Any]:
         },
     }
     return {"data": traces, "layout": layout, "config": _CONFIG}
+
+
+def _compressed(residual: FloatArray) -> FloatArray:
+    """Heights of residuals: linear near zero, logarithmic beyond, so that one flattens no other."""
+    size = np.abs(residual)
+    beyond = LINEAR_RESIDUAL * (1.0 + np.log10(np.maximum(size, LINEAR_RESIDUAL) / LINEAR_RESIDUAL))
+    return np.asarray(np.sign(residual) * np.where(size > LINEAR_RESIDUAL, beyond, size))
 
 
 def growth_figure(

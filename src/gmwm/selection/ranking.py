@@ -35,6 +35,7 @@ from gmwm.process import (
     model_from_list,
 )
 from gmwm.selection import tuning
+from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
 from gmwm.variance import PooledVariance, WaveletVariance
 
 MAX_GAUSS_MARKOV = 5
@@ -50,10 +51,13 @@ class Choices:
         Largest number of Gauss-Markov terms.
     extra : tuple of Process
         Further terms of open amplitude and given shape, each of which a candidate may have.
+    bandwidth : Bandwidth or None
+        The sensor's own low-pass, where the finest levels show one.
     """
 
     max_gauss_markov: int = MAX_GAUSS_MARKOV
     extra: tuple[Process, ...] = ()
+    bandwidth: Bandwidth | None = None
 
     def __post_init__(self) -> None:
         most = self.max_gauss_markov
@@ -76,11 +80,38 @@ class Choices:
                     "Sinusoid(frequency=0.5)"
                 )
 
+    def seeing(self, wv: WaveletVariance) -> Choices:
+        """The same with the sensor's low-pass, if these wavelet variances show one."""
+        return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, _penalty(wv.n)))
+
+    @property
+    def given(self) -> tuple[Process, ...]:
+        """All terms of given shape beside the textbook processes."""
+        return self.extra if self.bandwidth is None else (*self.extra, self.bandwidth.given)
+
+    def opened(self, candidate: Candidate, n: int) -> Candidate:
+        """A candidate with the low-pass as it is to be fitted; its shape has a price."""
+        found = self.bandwidth
+        if found is None or found.given not in candidate.model.terms:
+            return candidate
+        terms = (found.free if term == found.given else term for term in candidate.model.terms)
+        return replace(
+            candidate,
+            model=Model(tuple(terms)),
+            criterion=candidate.criterion + _penalty(n) * found.n_shapes,
+            n_parameters=candidate.n_parameters + found.n_shapes,
+            dof=candidate.dof - found.n_shapes,
+        )
+
     def bases(self) -> Iterator[tuple[Process, ...]]:
-        """All sums of the terms whose shape is given, the empty one first."""
+        """All sums of the terms whose shape is given, the empty one first.
+
+        A low-pass that was found is in all of them: no sum without it describes the finest levels.
+        """
         kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        always = self.given[len(self.extra) :]
         for chosen in product((False, True), repeat=len(kinds)):
-            yield tuple(kind for kind, on in zip(kinds, chosen, strict=True) if on)
+            yield (*(kind for kind, on in zip(kinds, chosen, strict=True) if on), *always)
 
 
 @dataclass(frozen=True)
@@ -135,8 +166,8 @@ class Candidate:
         return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
 
 
-def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
-    """All candidates, best first.
+def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope | None]:
+    """All candidates, best first, and a slope that an unresolved walk explains as well as a ramp.
 
     Parameters
     ----------
@@ -144,17 +175,18 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
         Of one recording, or pooled of several; a drift is sought in one recording only.
     choices : Choices
     """
-    reference = dictionary_fit(wv, wv.variance, choices.extra)
+    reference = dictionary_fit(wv, wv.variance, choices.given)
     allowed = reference.discrepancy
     plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
     plain.sort(key=lambda item: item[0].criterion)
     if isinstance(wv, PooledVariance):
-        return [candidate for candidate, _ in plain]
+        return [candidate for candidate, _ in plain], None
     slope = _slope_under(plain[0], wv)
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
+    ambiguous = None
     if without > tuning.RAMP_PLAUSIBLE:
-        target, drift_free = _drift_free(wv, slope, choices)
+        target, drift_free, slope = _drift_free(wv, slope, choices)
         if slope_p_value(wv, drift_free.mixture.psd) < tuning.RAMP_P:
             if drift_free.discrepancy < allowed:
                 # Both kinds must be compared under the same allowance.
@@ -162,7 +194,9 @@ def rank(wv: WaveletVariance, choices: Choices) -> list[Candidate]:
                 plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
             found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
             ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
-    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+        elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
+            ambiguous = slope  # a ramp would have won but for the walk
+    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key), ambiguous
 
 
 def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
@@ -174,17 +208,17 @@ def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
 
 def _drift_free(
     wv: WaveletVariance, slope: Slope, choices: Choices
-) -> tuple[FloatArray, Reference]:
-    """Wavelet variances without the drift, and the mixture fitted to them.
+) -> tuple[FloatArray, Reference, Slope]:
+    """Wavelet variances without the drift, the mixture fitted to them, the slope under it.
 
     Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
     estimated again under the mixture that is left.
     """
     for _ in range(tuning.RAMP_ROUNDS):
         target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
-        reference = dictionary_fit(wv, target, choices.extra)
+        reference = dictionary_fit(wv, target, choices.given)
         slope = gls_slope(wv, reference.mixture.psd)
-    return target, reference
+    return target, reference, slope
 
 
 def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
@@ -294,7 +328,8 @@ def _candidates(
                 before = point.objective
                 continue
             before = point.objective
-            found.append((ground.candidate(design, point), point))
+            candidate = choices.opened(ground.candidate(design, point), wv.n)
+            found.append((candidate, point))
     return found or [_fallback(wv, ground)]
 
 

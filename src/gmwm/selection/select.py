@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
@@ -24,7 +24,7 @@ from gmwm.selection.ranking import (
     rank,
     rank_key,
 )
-from gmwm.selection.ties import ranges
+from gmwm.selection.ties import loses_at_a_level, ramp_or_walk, ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 
 if TYPE_CHECKING:
@@ -232,16 +232,41 @@ def select(
         wv = as_wavelet_variance(cast("Data", data), dt)
     if checks.choice("rule", rule, RULES) == "merge":
         return _by_merging(wv, choices)
-    ranking = tuple(rank(wv, choices))
-    tried = []
+    ranked, slope = rank(wv, choices.seeing(wv))
+    ranking = tuple(ranked)
+    chosen, fitted = _chosen(ranking, wv)
+    if slope is not None and not _has_ramp(chosen.model):
+        fitted = replace(fitted, notices=(*fitted.notices, ramp_or_walk(fitted, slope)))
+    return Selection(ranking, chosen, fitted)
+
+
+def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
+    """The best of a ranking that the data support, and its fit."""
+    limit = rank_key(ranking[0]) + tuning.TIE
+    tried: list[tuple[Candidate, Fit]] = []
+    found: tuple[Candidate, Fit] | None = None
     for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
+        if found is not None and rank_key(candidate) > limit:
+            break
         fitted = _fitted(candidate.model, wv)
-        if fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded):
-            return Selection(ranking, *_simplest_by_own_fit(ranking, candidate, fitted, wv))
-        tried.append((candidate, fitted))
-    # A term too many does less harm than a level that is missed.
-    best = next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
-    return Selection(ranking, *best)
+        if not _is_acceptable(fitted):
+            tried.append((candidate, fitted))
+        elif found is None or loses_at_a_level(found[1], fitted):
+            found = candidate, fitted
+        if found is not None and not found[1].goodness.largest_p < tuning.LEVEL_LOST_P:
+            break
+    # A term too many, or one that is only bounded, does less harm than a level that is missed.
+    if found is not None:
+        for better, other in tried:
+            if rank_key(better) <= limit and loses_at_a_level(found[1], other):
+                return better, other
+        return _simplest_by_own_fit(ranking, *found, wv)
+    return next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
+
+
+def _is_acceptable(fitted: Fit) -> bool:
+    """Whether all terms of a fit are supported and no averaging time is missed by far."""
+    return fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded)
 
 
 def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
@@ -286,7 +311,7 @@ def _simplest_by_own_fit(
         other = _fitted(candidate.model, wv)
         as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + tuning.TIE
         as_good = as_good and other.discrepancy <= fitted.discrepancy
-        if as_good and not (_has_redundant_term(other) or other.goodness.is_excluded):
+        if as_good and _is_acceptable(other) and not loses_at_a_level(other, fitted):
             return candidate, other
     return best, fitted
 

@@ -11,12 +11,23 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import field_units
+from gmwm.estimate.problem import Slope
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process
 from gmwm.selection import tuning
 
 Ranges = dict[str, tuple[float, float]]
+
+
+def loses_at_a_level(smaller: Fit, larger: Fit) -> bool:
+    """Whether a model misses an averaging time by more than chance that a larger one describes.
+
+    Their criteria may tie all the same, for the chi-square is of all levels together.
+    """
+    lost, kept = smaller.goodness.largest_p, larger.goodness.largest_p
+    return lost < tuning.LEVEL_LOST_P <= kept
 
 
 def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
@@ -54,6 +65,35 @@ def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
             if found is not None:
                 result[item.key] = (min(low, found[0]), max(high, found[1]))
     return result
+
+
+def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
+    """That a straight drift describes the slow part as well as the walk that was chosen."""
+    wv = fitted.wv
+    texts = []
+    for unit, name, value in (
+        ("u/s", "R", slope.value),
+        ("u/s/sqrt(Hz)", "K", fitted.params.get("K", float("nan"))),
+    ):
+        shown = field_units(unit, wv.quantity)
+        plain = unit.replace("u", wv.unit or "u", 1)
+        label, factor = (shown[0].unit, shown[0].per_si) if shown else (plain, 1.0)
+        texts.append(f"{name} = {value * factor:.3g} {label}")
+    ramp, walk = texts
+    if "K" not in fitted.params:
+        times = {term.values.get("tau") or 0.0: term for term in fitted.model.terms}
+        longest = max(times)
+        walk = times[longest].named() if longest > 0.0 else "a walk too slow to be resolved"
+    return Notice(
+        "ramp-or-walk", "note", "",
+        f"a rate ramp of {ramp} or slow noise ({walk}): this record sees it once and does not tell "
+        "them apart, the model has no ramp",
+        {
+            "slope": slope.value,
+            "slope_error": float(np.sqrt(slope.variance)),
+            "walk": fitted.params.get("K", float("nan")),
+        },
+    )  # fmt: skip
 
 
 def _partners(model: Model, other: Model) -> list[int | None]:

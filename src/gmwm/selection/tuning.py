@@ -42,3 +42,15 @@ RIVALS = 5
 
 WIDER = 1.2
 """Times the interval, from which on the range of a tie is reported."""
+
+BANDWIDTH_GAIN = 2.0
+"""Times the price of its parameters: what a low-pass must gain over a mixture of textbook processes
+to be in the model. No sum of such processes is better than their mixture."""
+
+FILTER_LIKE = 10.0
+"""Correlation time in samples below which a Gauss-Markov process would take over part of a filter:
+none is beside the low-pass while its shape is sought."""
+
+LEVEL_LOST_P = 0.01
+"""Level of the test that no averaging time is missed, by which a smaller model loses to a larger
+one: 3.5 standard errors for twenty levels."""

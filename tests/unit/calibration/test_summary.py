@@ -22,9 +22,9 @@ from gmwm.calibration.summary import floor, random_walk, sentence, white_density
 from gmwm.process import as_model
 
 
-def fitted(model, quantity="gyro", dt=0.01, n=20_000):
-    """A fit that says just this model, whatever the data behind it."""
-    values = np.random.default_rng(0).normal(size=n)
+def fitted(model, quantity="gyro", dt=0.01, n=20_000, scale=1.0):
+    """A fit that says just this model, whatever the data behind it, white noise of ``scale``."""
+    values = scale * np.random.default_rng(0).normal(size=n)
     channel = Channel("axis", values, dt, quantity, SI_UNIT.get(quantity, "V"))
     any_fit = gmwm.fit(WhiteNoise(), channel)
     return replace(any_fit, model=as_model(model), keys=(), covariance=np.zeros((0, 0)))
@@ -71,7 +71,7 @@ def test_fast_gauss_markov_acts_as_white_noise_of_its_density_at_zero_frequency(
 
 def test_floor_is_the_lowest_point_of_the_allan_deviation():
     N, K, dt = 1e-3, 5e-4, 0.01
-    fit = fitted(WhiteNoise(N) + RandomWalk(K), dt=dt)
+    fit = fitted(WhiteNoise(N) + RandomWalk(K), dt=dt, scale=1e-12)
     tau = fit.wv.tau
     allan = N**2 / tau + K**2 * (tau / 3.0 + dt**2 / (6.0 * tau))
     found = floor(fit)
@@ -81,7 +81,7 @@ def test_floor_is_the_lowest_point_of_the_allan_deviation():
 
 
 def test_bias_instability_is_read_off_a_plateau():
-    found = floor(fitted(BiasInstability(2e-5)))
+    found = floor(fitted(BiasInstability(2e-5), scale=1e-12))
     assert found.bias_instability == pytest.approx(2e-5, rel=0.01)
     assert found.deviation == pytest.approx(0.664 * 2e-5, rel=0.01)
 
@@ -138,7 +138,7 @@ def test_the_bound_does_not_depend_on_whether_a_walk_of_zero_was_fitted():
 
 def test_sentence_for_a_gyro():
     # 3e-4 rad/s/sqrt(Hz) over a minute: 3e-4 sqrt(60) rad = 0.133 deg.
-    fit = fitted(WhiteNoise(3e-4) + RandomWalk(3e-4))
+    fit = fitted(WhiteNoise(3e-4) + RandomWalk(3e-4), scale=1e-12)
     low = floor(fit)
     text = sentence(fit)
     assert "angle error of 0.13 deg (1 sigma)" in text
@@ -161,3 +161,17 @@ def test_sentence_for_anything_else_keeps_its_unit():
     assert "White noise of 0.002 V/sqrt(Hz)" in text
     assert "deg" not in text
     assert " V (still falling" in text
+
+
+def test_no_floor_lies_below_the_data():
+    """A model without the walk that the data have: its deviation goes on falling."""
+    x = (WhiteNoise(1e-3) + RandomWalk(1e-4)).simulate(50_000, 0.1, 1)
+    fit = gmwm.fit(WhiteNoise() + RandomWalk(), Channel("gyro_x", x, 0.1, "gyro", "rad/s"))
+    blind = replace(fit, model=as_model(WhiteNoise(1e-3)), keys=(), covariance=np.zeros((0, 0)))
+    found, low = floor(blind), np.sqrt(2.0 * fit.wv.lower)
+    assert np.sqrt(2.0 * blind.implied[-1]) < 0.2 * found.deviation
+    at = int(np.searchsorted(fit.wv.tau, found.tau))
+    assert found.deviation >= low[at]
+    assert found.tau < 100.0
+    # Where the model describes the data, its own lowest point is the floor.
+    assert floor(fit).deviation == np.min(np.sqrt(2.0 * fit.implied))

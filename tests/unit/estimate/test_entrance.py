@@ -151,7 +151,7 @@ class TestWhatIsOff:
         fit = gmwm.fit(WhiteNoise(), gmwm.simulate(truth, 50_000, 1.0, 3), dt=1.0)
         assert not fit.valid
         assert fit.discrepancy > 0.1
-        assert "differs from the data" in fit.message
+        assert not fit.reasons["describes_data"]
 
     def test_a_model_that_fits_has_no_discrepancy(self):
         truth = WhiteNoise(0.1) + GaussMarkov(1.0, 50.0)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from gmwm._core.notices import Notice
 from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.moments import suffices
@@ -16,7 +14,6 @@ from gmwm.estimate.result import (
     Estimates,
     Fit,
     conclude,
-    misfit_notices,
     no_test_notice,
 )
 from gmwm.process import Model
@@ -46,19 +43,20 @@ def conclude_likelihood(
     notices, trace : sequence
         See `Fit`.
     """
-    comparison, misfits = _compared(series, found)
+    comparison, agrees = _compared(series, found)
+    misfits = not (agrees or series.is_bridged)
     if series.is_bridged:
         untested = float("nan")
         comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
-        misfits = [no_test_notice()]
+        notices = (*notices, no_test_notice())
     return conclude(
-        found, comparison, series.wv, method=method, notices=(*notices, *misfits),
+        found, comparison, series.wv, method=method, misfits=misfits, notices=notices,
         log_likelihood=log_likelihood, trace=trace,
     )  # fmt: skip
 
 
-def _compared(series: Series, found: Estimates) -> tuple[Comparison, list[Notice]]:
-    """How the wavelet variances agree with the fitted noise: as in the method of moments."""
+def _compared(series: Series, found: Estimates) -> tuple[Comparison, bool]:
+    """How the wavelet variances agree with the fitted noise, and whether they do."""
     wv = series.wv
     moments = Moments.of(wv, found.coordinates.model)
     if found.slope is not None:
@@ -69,6 +67,4 @@ def _compared(series: Series, found: Estimates) -> tuple[Comparison, list[Notice
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     comparison = Comparison.of(target, implied, covariance, implied, len(found.present))
     agrees = suffices(0.0, target - implied, covariance, target, implied, max(comparison.dof, 1))
-    if agrees:
-        return comparison, []
-    return comparison, misfit_notices(wv, target, implied, np.diag(covariance), 0.0)
+    return comparison, agrees

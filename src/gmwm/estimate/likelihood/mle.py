@@ -73,6 +73,12 @@ class MLE:
                 'method = "mle" knows no open Sinusoid (its amplitude and frequency are not '
                 'parameters of a spectrum): give it values, or take method = "gmwm"'
             )
+        for term in model.terms:
+            if term.is_band_limited:
+                raise InputError(
+                    f'method = "mle" knows no {type(term).__name__}, which has no exact '
+                    'state-space form: take method = "gmwm" or "whittle"'
+                )
         series = Series.of(model, channel, self.start, gaps=True)
         columns = series.columns
         likelihood = KalmanLikelihood(columns)

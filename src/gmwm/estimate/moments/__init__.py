@@ -4,7 +4,7 @@ from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.moments.gmwm import GMWM, SimulatedMoments
 from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.moments.start import Reference, dictionary_fit, search
+from gmwm.estimate.moments.start import Reference, dictionary, dictionary_fit, search
 from gmwm.estimate.moments.weights import Weights
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Reference",
     "SimulatedMoments",
     "Weights",
+    "dictionary",
     "dictionary_fit",
     "search",
     "suffices",

@@ -24,8 +24,8 @@ def limit_notices(design: Design, shapes: Sequence[Shape], x: FloatArray) -> lis
     return [
         Notice(
             "search-limit", "bad", "",
-            f"a {design.terms[i].process.title()} term ran to the limit of what this record can "
-            f"show (shape {shapes[i][0]:.3g}): it is not identifiable, leave it out",
+            f"the {design.at_shape(i, shapes[i]).named()} ran to the limit of what this record can "
+            "show: it is not identifiable, leave it out",
             {"process": type(design.terms[i].process).__name__, "shape": shapes[i][0]},
         )
         for k, i in enumerate(design.owners())
@@ -60,13 +60,17 @@ def redundant_notices(
         return []
     # Of several alike, each can stand in for another: one of them is too many, not all.
     without, i = min(redundant)
-    process = design.terms[i].process
+    process = design.at_shape(i, point.shapes[i])
     return [
         Notice(
             "redundant-term", "bad", "",
-            f"a {process.title()} term does not improve the fit significantly: it is not "
+            f"the {process.named()} does not improve the fit significantly: it is not "
             "identifiable, leave it out",
-            {"process": type(process).__name__, "gain": without - point.objective},
+            {
+                "process": type(process).__name__,
+                "gain": without - point.objective,
+                **{p.name: process.values[p.name] for p in process.shape_parameters},
+            },
         )
     ]  # fmt: skip
 

@@ -17,7 +17,6 @@ from gmwm.estimate.result import (
     Estimates,
     Fit,
     conclude,
-    misfit_notices,
     upper_amplitude,
 )
 from gmwm.variance import WaveletVariance
@@ -84,11 +83,9 @@ def conclude_moments(
         ),
         *level_notices(target.size, design.n_free),
     ]
-    if discrepancy > 0.0:
-        notices += misfit_notices(moments.wv, target, implied, np.diag(statistical), discrepancy)
     return conclude(
         found, comparison, moments.wv, method=method, weights=weights.name,
-        discrepancy=discrepancy, notices=notices,
+        discrepancy=discrepancy, misfits=discrepancy > 0.0, notices=notices,
     )  # fmt: skip
 
 

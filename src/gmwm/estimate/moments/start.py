@@ -158,23 +158,7 @@ def dictionary_fit(
     ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
     first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
-    # Lines to be found are left out: a comb of them follows anything. Those at given frequencies
-    # follow one thing only, which no other process can.
-    lines = tuple(p for p in extra if p.is_line and p.values["frequency"] is not None)
-    # Simulated processes are too: they take their time, and the mixture does without them.
-    kinds = {type(p): p for p in extra if not p.is_line and p.has_spectrum()}
-    kinds.pop(GaussMarkov, None)
-    processes: tuple[Process, ...] = tuple(kind() for kind in DICTIONARY)
-    processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
-    processes += tuple(line.with_values(amplitude=None) for line in lines)
-    design = Design(Model(processes), Scales.of(wv))
-    atoms = [
-        (i, shape)
-        for i in design.linear
-        for shape in _denser(design.grid(i), bool(design.terms[i].process.ordered_by))
-    ]
-    columns = [design.curve(i, shape) for i, shape in atoms]
-    matrix = np.stack(columns, axis=1)
+    design, atoms, matrix = dictionary(Scales.of(wv), extra)
     covariance, discrepancy = wv.covariance, 0.0
     for _ in range(tuning.REWEIGHTINGS):
         discrepancy = _needed(matrix, target, covariance)
@@ -192,6 +176,37 @@ def dictionary_fit(
         whole = Model(tuple(mixture))
         covariance = wv.covariance_under(whole.psd, whole.lines())
     return Reference(Model(tuple(mixture)), covariance, matrix @ x, discrepancy)
+
+
+def dictionary(
+    scales: Scales, extra: tuple[Process, ...] = ()
+) -> tuple[Design, list[tuple[int, Shape]], FloatArray]:
+    """Processes of which almost any wavelet variance is a sum.
+
+    Returns
+    -------
+    design : Design
+    atoms : list of (int, Shape)
+        Term of the design and its shape.
+    matrix : (J, A) ndarray
+        Wavelet variance of each at unit amplitude.
+    """
+    # Lines to be found are left out: a comb of them follows anything. Those at given frequencies
+    # follow one thing only, which no other process can.
+    lines = tuple(p for p in extra if p.is_line and p.values["frequency"] is not None)
+    # Simulated processes are too: they take their time, and the mixture does without them.
+    kinds = {type(p): p for p in extra if not p.is_line and p.has_spectrum()}
+    kinds.pop(GaussMarkov, None)
+    processes: tuple[Process, ...] = tuple(kind() for kind in DICTIONARY)
+    processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
+    processes += tuple(line.with_values(amplitude=None) for line in lines)
+    design = Design(Model(processes), scales)
+    atoms = [
+        (i, shape)
+        for i in design.linear
+        for shape in _denser(design.grid(i), bool(design.terms[i].process.ordered_by))
+    ]
+    return design, atoms, np.stack([design.curve(i, shape) for i, shape in atoms], axis=1)
 
 
 def _denser(shapes: list[Shape], wanted: bool) -> list[Shape]:

@@ -7,7 +7,7 @@ from gmwm.estimate.result.fit import METHOD_NAMES, Fit
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.estimate.result.joint import JointFit, fit_joint
 from gmwm.estimate.result.region import Region, slope_name
-from gmwm.estimate.result.remarks import misfit_notices, no_test_notice, worst_misfit
+from gmwm.estimate.result.remarks import no_test_notice
 from gmwm.estimate.result.serialization import plain
 
 __all__ = [
@@ -22,10 +22,8 @@ __all__ = [
     "Region",
     "conclude",
     "fit_joint",
-    "misfit_notices",
     "no_test_notice",
     "plain",
     "slope_name",
     "upper_amplitude",
-    "worst_misfit",
 ]

@@ -23,9 +23,11 @@ from gmwm.estimate.problem import (
 from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.remarks import (
+    bandwidth_notices,
     bound_notices,
     confounded_notices,
     indistinct_notices,
+    misfit_notices,
     missed_level_notices,
     undetermined_notices,
 )
@@ -117,6 +119,7 @@ def conclude(
     method: str,
     weights: str = "",
     discrepancy: float = 0.0,
+    misfits: bool = False,
     notices: Sequence[Notice] = (),
     log_likelihood: float = float("nan"),
     trace: Sequence[float] = (),
@@ -129,6 +132,8 @@ def conclude(
     comparison : Comparison
     wv : WaveletVariance
         The data.
+    misfits : bool
+        Whether the fit fails the chi-square test.
     notices : sequence of Notice
         Those of the method; what the estimates themselves show is added.
     """
@@ -167,6 +172,7 @@ def conclude(
             *indistinct_notices(model, ordered, matrix),
             *confounded_notices(model, ordered, matrix),
             *notices,
+            *bandwidth_notices(model, wv),
             *wv.notices,
         ),
         log_likelihood=log_likelihood,
@@ -174,8 +180,10 @@ def conclude(
         slope_dof=dof,
         error_growth=growth,
     )
-    missed = missed_level_notices(fit.goodness)
-    return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
+    shown = missed_level_notices(fit.goodness)
+    if misfits:
+        shown += misfit_notices(fit.goodness, discrepancy)
+    return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
 
 
 def _upper_bounds(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:

@@ -102,15 +102,44 @@ class Goodness:
         return float(self.misfit[worst]), float(self.tau[worst])
 
     @property
+    def beyond_chance(self) -> tuple[float, float, float] | None:
+        """Largest misfit that is no chance, its averaging time (s) and residual; None if none is.
+
+        Among levels whose residual exceeds 2.5 statistical standard errors of the model's own.
+        """
+        far = np.abs(self.residual) > tuning.BEYOND_CHANCE
+        if not self.is_tested or not np.any(far):
+            return None
+        worst = np.flatnonzero(far)[int(np.argmax(np.abs(self.misfit[far])))]
+        return float(self.misfit[worst]), float(self.tau[worst]), float(self.residual[worst])
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether that misfit is one that predictions feel: more than 10 % of the deviation."""
+        beyond = self.beyond_chance
+        return beyond is not None and abs(beyond[0]) > tuning.POOR_DEVIATION
+
+    @property
+    def judged(self) -> FloatArray:
+        """The residuals that levels are judged by, (J,).
+
+        With what was allowed for below 0.1 s (or ten samples), where filters and rounding show, in
+        statistical errors alone from there on.
+        """
+        fine = self.tau < max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * float(self.tau[0]))
+        return np.where(fine, self.allowed, self.residual)
+
+    @property
     def largest(self) -> tuple[float, float] | None:
-        """Largest residual with what was allowed for, and its averaging time (s).
+        """Largest of the residuals that levels are judged by, and its averaging time (s).
 
         Among all levels that the model gives a variance; None if there is none.
         """
-        if not self.is_tested or np.all(np.isnan(self.allowed)):
+        judged = self.judged
+        if not self.is_tested or np.all(np.isnan(judged)):
             return None
-        largest = int(np.nanargmax(np.abs(self.allowed)))
-        return float(self.allowed[largest]), float(self.tau[largest])
+        largest = int(np.nanargmax(np.abs(judged)))
+        return float(judged[largest]), float(self.tau[largest])
 
     @property
     def largest_p(self) -> float:

@@ -9,9 +9,10 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import field_units
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.process import Model
+from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
 
 REASONS = {
@@ -57,6 +58,49 @@ def no_test_notice() -> Notice:
         "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by "
         "straight lines",
     )  # fmt: skip
+
+
+def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
+    """Terms that are the sensor's own filter: what they are, and what they act as.
+
+    A Gauss-Markov process of a correlation time of a few samples is a low-pass of first order,
+    where the model has no white noise beside it.
+    """
+    filtered = [i for i, term in enumerate(model.terms) if term.is_band_limited]
+    if not filtered and not any(term.is_white for term in model.terms):
+        times = ((i, term.values.get("tau")) for i, term in enumerate(model.terms))
+        filtered = [i for i, tau in times if tau is not None and tau < tuning.FILTER_LIKE * wv.dt]
+    notices = []
+    for i in filtered:
+        term = model.terms[i]
+        key = next(p.key for p in model.parameters if p.term == i and p.parameter.role == "shape")
+        bandwidth = _half_power(term, wv.dt)
+        low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
+        units = field_units("u/sqrt(Hz)", wv.quantity)
+        unit, factor = (
+            (units[0].unit, units[0].per_si) if units else (f"{wv.unit or 'u'}/sqrt(Hz)", 1.0)
+        )
+        density = float(np.sqrt(low))
+        notices.append(
+            Notice(
+                "sensor-bandwidth", "note", key,
+                f"the {term.named()} = sensor bandwidth ({bandwidth:.3g} Hz); acts as white noise "
+                f"of N = {density * factor:.3g} {unit}, needs no state",
+                {"bandwidth": bandwidth, "density": density},
+            )
+        )  # fmt: skip
+    return notices
+
+
+def _half_power(term: Process, dt: float) -> float:
+    """Lowest frequency (Hz) at which half of the power of a low-pass is left, or half the rate."""
+    f = np.geomspace(1e-5, 0.5, 2000) / dt
+    density = term.psd(f, dt)
+    below = np.flatnonzero(density < 0.5 * density[0])
+    if below.size == 0:
+        return float(f[-1])
+    part = slice(below[0] - 1, below[0] + 1)
+    return float(np.interp(-0.5 * density[0], -density[part], f[part]))
 
 
 def bound_notices(upper: Mapping[str, float]) -> list[Notice]:
@@ -138,50 +182,24 @@ def undetermined_notices(model: Model, keys: Sequence[str], matrix: FloatArray) 
     ]  # fmt: skip
 
 
-def misfit_notices(
-    wv: WaveletVariance,
-    target: FloatArray,
-    implied: FloatArray,
-    variance: FloatArray,
-    discrepancy: float,
-) -> list[Notice]:
-    """Notices of a model that fails the chi-square test.
+def misfit_notices(goodness: Goodness, discrepancy: float) -> list[Notice]:
+    """What it means for prediction that a model fails the chi-square test.
 
-    ``variance`` (J,) are the statistical variances of ``target``, u^4.
+    ``discrepancy`` is the relative error of the variances that was allowed for.
     """
-    worst, tau, poor = worst_misfit(wv, target, implied, variance)
-    text = f"largest misfit of the deviation {100.0 * worst:.2g} % at tau = {tau:.3g} s"
-    if discrepancy > 0.0:
-        if tau == 0.0:
-            return []
+    beyond = goodness.beyond_chance
+    if beyond is None:
+        return []
+    misfit, tau, residual = beyond
+    values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
+    share = f"{100.0 * abs(misfit):.2g} %"
+    if goodness.is_poor:
+        side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
         text = (
-            f"a discrepancy of {100.0 * discrepancy:.2g} % of the variance at each level was "
-            f"allowed for and widens the intervals ({text})"
+            f"predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
+            f"model's Allan deviation, by {abs(residual):.2g} standard errors"
         )
-    return [
-        Notice(
-            "misfit", "bad" if poor else "note", "",
-            f"the model differs from the data by more than their statistical errors; {text}",
-            {"misfit": worst, "tau": tau, "discrepancy": discrepancy},
-        )
-    ]  # fmt: skip
-
-
-def worst_misfit(
-    wv: WaveletVariance, target: FloatArray, implied: FloatArray, variance: FloatArray
-) -> tuple[float, float, bool]:
-    """Largest relative misfit of the deviation at well-known levels, its time (s), if it is poor.
-
-    ``variance`` (J,) are the statistical variances of ``target``, u^4. The time is zero where no
-    level is known well.
-    """
-    known = 2.0 * target**2 / np.maximum(variance, 1e-300) > tuning.WELL_KNOWN_DOF
-    if not np.any(known):
-        return 0.0, 0.0, False
-    ratio = np.abs(np.sqrt(target[known] / np.maximum(implied[known], 1e-300)) - 1.0)
-    worst = int(np.argmax(ratio))
-    return (
-        float(ratio[worst]),
-        float(wv.tau[known][worst]),
-        bool(ratio[worst] > tuning.POOR_DEVIATION),
-    )
+        return [Notice("misfit", "bad", "", text, values)]
+    text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
+    text += ", which the intervals allow for" if discrepancy > 0.0 else ""
+    return [Notice("misfit", "note", "", text, values)]

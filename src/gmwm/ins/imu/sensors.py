@@ -87,12 +87,14 @@ class SensorModels:
         """
         total, slow = np.empty((n, 6)), np.zeros((n, 6))
         for i, axis in enumerate(AXES):
+            filtered = np.zeros(n)
             for term in self.models[axis].terms:
                 if not term.is_white:
-                    slow[:, i] += term.simulate(n, dt, rng)
+                    part = filtered if term.is_band_limited else slow[:, i]
+                    part += term.simulate(n, dt, rng)
             if self.bias_sd[axis] > 0.0:
                 slow[:, i] += self.bias_sd[axis] * rng.standard_normal()
-            total[:, i] = slow[:, i]
+            total[:, i] = slow[:, i] + filtered
             density = self.models[axis].white_density()
             if density > 0.0:
                 total[:, i] += np.sqrt(density / dt) * rng.standard_normal(n)
@@ -108,8 +110,8 @@ class SensorErrors:
     total : (n, 6) ndarray
         What is measured less what is true, rad/s and m/s^2, mean over each interval.
     slow : (n, 6) ndarray or None
-        The part that a filter can estimate: all but the white noise; ``None`` where it is not
-        known, as of a real recording.
+        The part that a filter can estimate: all but white noise, filtered or not; ``None`` where it
+        is not known, as of a real recording.
     """
 
     total: FloatArray

@@ -175,6 +175,29 @@ class TestEveryMethod:
         db = gmwm.fit(TRUTH.opened(), gmwm.wavelet_variance(x, 1.0, wavelet="db2")).goodness
         assert np.all(np.abs(db.residual) < 4.5)
 
+    def test_a_misfit_counts_where_it_is_more_than_chance(self):
+        # A fine level 2 % off fails the chi-square test; a coarse one 15 % off may be chance.
+        truth = Resonance(0.02, 0.2, 0.05) + WhiteNoise(0.1) + RandomWalk(1e-3)
+        fit = gmwm.fit(WhiteNoise() + RandomWalk(), truth.simulate(200_000, 1.0, 4), dt=1.0)
+        (notice,) = (each for each in fit.notices if each.code == "misfit")
+        assert notice.severity == "note"
+        assert abs(notice.values["residual"]) > 2.5
+        assert abs(notice.values["misfit"]) < 0.1
+        assert not fit.goodness.is_poor
+        lacking = gmwm.fit(WhiteNoise(), truth.simulate(200_000, 1.0, 4), dt=1.0)
+        (notice,) = (each for each in lacking.notices if each.code == "misfit")
+        assert notice.severity == "bad" and lacking.goodness.is_poor
+        assert "predictions over" in notice.text
+
+    def test_levels_are_judged_without_the_discrepancy_beyond_the_finest(self):
+        fit = fitted(truth=WhiteNoise(1.0) + RandomWalk(0.1), n=4000)
+        at = replace(fit.goodness, allowed=0.0 * fit.goodness.residual)
+        assert np.all(at.judged[:4] == 0.0)  # 1, 2, 4 and 8 samples
+        assert np.array_equal(at.judged[4:], at.residual[4:])
+        fine = replace(at, tau=at.tau / 1000.0)
+        assert np.array_equal(fine.judged[fine.tau < 0.1], 0.0 * fine.tau[fine.tau < 0.1])
+        assert np.array_equal(fine.judged[fine.tau >= 0.1], fine.residual[fine.tau >= 0.1])
+
     def test_gaps_that_leave_no_variance_are_not_judged(self):
         x = TRUTH.simulate(600, 1.0, 1)
         x[::3] = np.nan

@@ -1,0 +1,85 @@
+"""How often the selected model is the true one, or predicts the same, with missing samples.
+
+Run with ``python benchmarks/selection_gaps.py`` (hours; ``--runs 2`` for a first look). True models
+of `gmwm.study.choice` without a rate ramp and a line, complete, with 0.1 % and 1 % of the samples
+missing at random, and with 50 masked bursts of 0.2 s at 100 Hz (20 samples). Counted are
+
+- right: the very terms;
+- equivalent: root mean square of the integral over 60 and over 600 samples within 10 % of that of
+  the true model, start of the walks known;
+- ramps: models with a rate ramp, of which no truth has one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+
+import gmwm
+from gmwm import Model
+from gmwm.budget.integrals import integral_rms
+from gmwm.study.choice import TRUTHS
+
+TIMES = (60.0, 600.0)
+CLOSE = 0.1
+CASES = [m for m in TRUTHS if not any(term.is_drift or term.is_line for term in m.terms)]
+
+
+def bursts(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Fifty bursts of twenty samples."""
+    lost = np.zeros(n, dtype=bool)
+    for start in rng.integers(0, n - 20, 50):
+        lost[start : start + 20] = True
+    return lost
+
+
+GAPS: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
+    "complete": lambda rng, n: np.zeros(n, dtype=bool),
+    "0.1 % random": lambda rng, n: rng.random(n) < 0.001,
+    "1 % random": lambda rng, n: rng.random(n) < 0.01,
+    "50 bursts": bursts,
+}
+
+
+def prediction(model: Model) -> np.ndarray:
+    """Root mean square of the integral at each of `TIMES`."""
+    parts = [integral_rms(term, TIMES, 1.0, known_start=True)[0] for term in model.terms]
+    return np.sqrt(np.sum(np.square(parts), axis=0))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--samples", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    warnings.simplefilter("ignore", gmwm.FitWarning)
+    print(f"{given.samples:,} samples, {given.runs} series each\n")
+    print(f"{'gaps':>12} {'right':>6} {'right or equivalent':>20} {'ramps':>6}  true model")
+    for name, lost in GAPS.items():
+        for index, truth in enumerate(CASES):
+            expected = prediction(truth)
+            right = good = ramps = 0
+            for run in range(given.runs):
+                rng = np.random.default_rng([given.seed, index, run])
+                series = truth.simulate(given.samples, 1.0, rng)
+                series[lost(rng, given.samples)] = np.nan
+                chosen = gmwm.select(series, dt=1.0).model
+                kinds = [Counter(type(term) for term in each.terms) for each in (truth, chosen)]
+                same = kinds[0] == kinds[1]
+                near = bool(np.all(np.abs(prediction(chosen) / expected - 1.0) < CLOSE))
+                right, good = right + same, good + (same or near)
+                ramps += any(term.is_drift for term in chosen.terms)
+            print(
+                f"{name:>12} {right / given.runs:>6.0%} {good / given.runs:>20.0%} {ramps:>6}  "
+                f"{truth.title()}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

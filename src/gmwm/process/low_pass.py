@@ -1,0 +1,224 @@
+"""White noise that a sensor has filtered: the bandwidth of its low-pass, its moving average.
+
+At averaging times well above the memory of the filter it is white noise of density N^2. No filter
+or estimator that integrates the sensor can do better than to take it for that, so that its
+state-space form is that white noise, without a state.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+from scipy import fft
+from scipy.signal import lfilter
+
+from gmwm._core.typing import FloatArray
+from gmwm.process.arma import haar_sum
+from gmwm.process.base import Process, Shape
+from gmwm.process.parameter import parameter
+from gmwm.process.spectral import quadrature
+from gmwm.process.state_space import StateSpace
+
+_GRID_PER_DECADE = 6
+_LOWEST, _HIGHEST = 0.004, 0.45  # of the grid of bandwidths, in cycles per sample
+_LARGEST_LOG = 600.0
+_LAGS = 1 << 17
+
+BUTTERWORTH = float(np.sqrt(0.5))
+"""Damping ratio at which the pass band is as flat as it can be."""
+
+
+class _Filtered(Process):
+    """What white noise behind any low-pass of density 1 at zero frequency has in common."""
+
+    is_band_limited: ClassVar[bool] = True
+    has_finite_state_space: ClassVar[bool] = False
+
+    N: float
+
+    def state_space(self, dt: float) -> StateSpace:
+        """White noise of density N^2, which it acts as beyond the memory of the filter."""
+        self._require_given()
+        return StateSpace.white(self.N**2 / dt)
+
+
+class LowPassNoise(_Filtered):
+    """White noise behind a low-pass, as digital filters are made: sensor bandwidth.
+
+    Parameters
+    ----------
+    N : float, optional
+        Root power spectral density at low frequencies, u/sqrt(Hz).
+    bandwidth : float, optional
+        Frequency at which half of the power is left (-3 dB), Hz.
+    order : float, optional
+        Of the filter, from 0.9 to 16: beyond its bandwidth the power falls by 6 dB per octave and
+        order. It need not be whole.
+    damping : float, optional
+        Damping ratio of a filter of second order, from 0.2 to 2; 0.7071 is a Butterworth filter of
+        any order.
+
+    Notes
+    -----
+    S(f) = N^2 / (1 + c q + q^2), c = 4 damping^2 - 2, with q = q3 (tan(pi f dt) / tan(pi f3
+    dt))^order and 1 + c q3 + q3^2 = 2. These are the Butterworth filters of all orders and the
+    filters of second order of any damping (Bessel, Chebyshev), by the bilinear transform
+    (Oppenheim & Schafer, *Discrete-Time Signal Processing*, sec. 7.2). A bandwidth at or above
+    half the sampling rate leaves the noise white.
+    """
+
+    N: float = parameter("u/sqrt(Hz)", "scale", meaning="density of the filtered white noise")
+    bandwidth: float = parameter("Hz", meaning="sensor bandwidth, -3 dB")
+    order: float = parameter("-", lower=0.9, upper=16.0, meaning="order of the sensor's low-pass")
+    damping: float = parameter("-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass")
+    label: ClassVar[str] = "low-pass noise"
+    prefix: ClassVar[str] = "lowpass_"
+
+    def __init__(
+        self,
+        N: float | None = None,
+        bandwidth: float | None = None,
+        order: float | None = None,
+        damping: float | None = None,
+    ) -> None:
+        super().__init__(N, bandwidth, order, damping)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        with np.errstate(divide="ignore"):
+            log_tangent = np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5)))
+        return self.N**2 * _gain((self.bandwidth, self.order, self.damping), log_tangent, dt)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        tau = np.asarray(tau, dtype=float)
+        shape = (self.bandwidth, self.order, self.damping)
+        return self.N**2 * self.unit_haar_variance(shape, tau, dt)
+
+    def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        tau = np.asarray(tau, dtype=float)
+        averaging = tuple((tau.ravel() / dt).tolist())
+        return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(tau.shape).copy()
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        lag = np.asarray(lag, dtype=int)
+        size = 2 * max(_LAGS, 2 * int(np.max(lag, initial=0)))
+        frequency = np.arange(size // 2 + 1) / size
+        return np.asarray(fft.irfft(self.psd(frequency / dt, dt) / dt, size)[lag])
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        low, high = np.log10(_LOWEST / dt), np.log10(_HIGHEST / dt)
+        points = int(np.ceil((high - low) * _GRID_PER_DECADE))
+        return [
+            (float(bandwidth), order, damping)
+            for bandwidth in np.logspace(low, high, points)
+            for order in (1.0, 2.0, 4.0)
+            for damping in (0.5, BUTTERWORTH, 1.0)
+        ]
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (
+            cls(0.3, 0.1, 2.0, BUTTERWORTH),
+            cls(1.0, 0.31, 1.0, 0.6),
+            cls(2e-3, 0.02, 3.3, 1.0),
+        )
+
+
+class AveragedNoise(_Filtered):
+    """White noise of which each sample is the mean over a window: a moving average.
+
+    Parameters
+    ----------
+    N : float, optional
+        Root power spectral density at low frequencies, u/sqrt(Hz).
+    window : float, optional
+        Length of the window, s. Where it is not a whole number of samples, the last one counts in
+        part; at or below the sampling interval the noise is white.
+    """
+
+    N: float = parameter("u/sqrt(Hz)", "scale", meaning="density of the averaged white noise")
+    window: float = parameter("s", meaning="window of the sensor's moving average")
+    label: ClassVar[str] = "averaged noise"
+    prefix: ClassVar[str] = "averaged_"
+
+    def __init__(self, N: float | None = None, window: float | None = None) -> None:
+        super().__init__(N, window)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        length = max(self.window / dt, 1.0)
+        whole, rest = np.floor(length), length - np.floor(length)
+        x = np.asarray(f) * dt
+        kernel = np.where(
+            x == 0.0, whole, np.sin(np.pi * whole * x) / np.sin(np.pi * np.where(x, x, 0.5))
+        )
+        # Its centre is (whole + 1)/2 samples from that of the last sample, which counts in part.
+        square = kernel**2 + 2.0 * rest * kernel * np.cos(np.pi * (whole + 1.0) * x) + rest**2
+        return np.asarray(self.N**2 * square / length**2)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        covariance = _window_covariance(self.window / dt)
+        lag = np.asarray(lag, dtype=int)
+        inside = lag < covariance.size
+        return self.N**2 / dt * np.where(inside, covariance[np.where(inside, lag, 0)], 0.0)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        tau = np.asarray(tau, dtype=float)
+        covariance = _window_covariance(self.window / dt)
+        flat = [haar_sum(covariance, m) for m in (tau.ravel() / dt)]
+        return self.N**2 / dt * np.reshape(flat, tau.shape)
+
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        weights = _weights(self.window / dt)
+        noise = self.N / np.sqrt(dt) * rng.standard_normal(n + weights.size - 1)
+        return np.asarray(lfilter(weights, [1.0], noise)[weights.size - 1 :])
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        longest = int(min(0.5 / _LOWEST, max(n / 8, 2)))
+        return [(float(m) * dt,) for m in np.unique(np.geomspace(2, max(longest, 2), 40).round())]
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(0.3, 4.0), cls(2.0, 21.6))
+
+
+def _gain(shape: Shape, log_tangent: FloatArray, dt: float) -> FloatArray:
+    """|H|^2 of the low-pass at frequencies of which log tan(pi f dt) is given."""
+    bandwidth, order, damping = shape
+    if bandwidth * dt >= 0.5:
+        return np.ones_like(log_tangent)
+    bend = 4.0 * damping**2 - 2.0
+    half_power = 2.0 / (bend + np.sqrt(bend**2 + 4.0))
+    exponent = np.log(half_power) + order * (log_tangent - np.log(np.tan(np.pi * bandwidth * dt)))
+    q = np.exp(np.minimum(exponent, 0.5 * _LARGEST_LOG))
+    return np.asarray(1.0 / (1.0 + q * (bend + q)))
+
+
+@lru_cache(maxsize=1024)
+def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatArray:
+    """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
+    log_tangent, weight = _nodes(averaging)
+    return np.asarray(weight @ _gain(shape, log_tangent, dt) / dt)
+
+
+@lru_cache(maxsize=8)
+def _nodes(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
+    rounded = tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
+    found = quadrature(rounded)
+    return np.log(np.tan(np.pi * found.frequency)), 2.0 * found.gain * found.weight
+
+
+def _weights(length: float) -> FloatArray:
+    """Weights of a window of ``length`` samples."""
+    length = max(length, 1.0)
+    whole = int(length + 1e-9)
+    weights = np.ones(whole + 1)
+    weights[-1] = max(length - whole, 0.0)
+    return weights / np.sum(weights)
+
+
+def _window_covariance(length: float) -> FloatArray:
+    """Autocovariance of white noise of unit variance behind such a window."""
+    weights = _weights(length)
+    return np.asarray(np.correlate(weights, weights, "full")[weights.size - 1 :])

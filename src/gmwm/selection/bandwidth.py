@@ -1,0 +1,169 @@
+"""The sensor's own low-pass, where the finest levels show one.
+
+White noise behind an ordinary filter falls off faster towards short averaging times than any sum of
+textbook processes. Its shape is sought beside such a sum, so that what else the series holds does
+not matter, and is then one term of given shape for the ranking; the fit of the chosen model
+estimates it anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from gmwm._core.typing import FloatArray
+from gmwm.estimate.moments import dictionary, dictionary_fit
+from gmwm.estimate.problem import Scales, Term, shape_of, solve_nonnegative, weight_root
+from gmwm.process import (
+    BUTTERWORTH,
+    AveragedNoise,
+    LowPassNoise,
+    Process,
+    QuantizationNoise,
+    Shape,
+)
+from gmwm.selection import tuning
+from gmwm.variance import WaveletVariance
+
+_ORDERS = (1.0, 2.0, 3.0, 4.0)
+_ROUNDS = 2
+_REACH = 3.0  # of the search from the best shape of the grid, in logarithms
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """Filtered white noise that a model may have.
+
+    Attributes
+    ----------
+    given : Process
+        Of open amplitude, with the shape that was found.
+    free : Process
+        The same as the fit is to have it: with an open bandwidth, as a low-pass, but of the order
+        and damping that were found, which two or three levels know only together.
+    n_shapes : int
+        Number of shape parameters that were searched.
+    """
+
+    given: Process
+    free: Process
+    n_shapes: int
+
+
+def sensor_bandwidth(
+    wv: WaveletVariance, extra: tuple[Process, ...], penalty: float
+) -> Bandwidth | None:
+    """The low-pass or moving average that describes the finest levels, if one is needed there.
+
+    Parameters
+    ----------
+    wv : WaveletVariance
+    extra : tuple of Process
+        Lines and resonances that the series may have.
+    penalty : float
+        Of the criterion, for each parameter.
+    """
+    reference = dictionary_fit(wv, wv.variance, extra)
+    if reference.discrepancy == 0.0:
+        return None
+    for _ in range(_ROUNDS):
+        alone = _Beside.of(wv, extra, reference.covariance, fastest=0.0).objective
+        tried = []
+        for price, left_out in ((0.0, QuantizationNoise), (penalty, None)):
+            problem = _Beside.of(wv, extra, reference.covariance, tuning.FILTER_LIKE, left_out)
+            tried += [(*problem.best(each), price) for each in _families()]
+        best, objective, _ = min(tried, key=lambda t: t[1] + penalty * t[0].n_shapes + t[2])
+        reference = dictionary_fit(wv, wv.variance, (*extra, best.given))
+    needed = tuning.BANDWIDTH_GAIN * penalty * (1 + best.n_shapes)
+    return best if alone - objective > needed else None
+
+
+def _families() -> Iterator[Process]:
+    """Filters of one, two and three open shapes, simplest first."""
+    for order in _ORDERS:
+        yield LowPassNoise(order=order, damping=BUTTERWORTH)
+    yield AveragedNoise()
+    yield LowPassNoise(damping=BUTTERWORTH)
+    yield LowPassNoise(order=2.0)
+    yield LowPassNoise()
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Least squares of textbook processes and one more term, under one covariance."""
+
+    scales: Scales
+    root: FloatArray
+    matrix: FloatArray
+    target: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        wv: WaveletVariance,
+        extra: tuple[Process, ...],
+        covariance: FloatArray,
+        fastest: float,
+        left_out: type[Process] | None = None,
+    ) -> _Beside:
+        """With Gauss-Markov processes slower than ``fastest`` samples, and without a kind."""
+        scales, root = Scales.of(wv), weight_root(covariance)
+        design, atoms, matrix = dictionary(scales, extra)
+        kinds = [design.terms[i].process for i, _ in atoms]
+        kept = [
+            type(kind) is not left_out
+            and not (kind.ordered_by == "tau" and shape[0] < fastest * scales.dt)
+            for kind, (_, shape) in zip(kinds, atoms, strict=True)
+        ]
+        return cls(scales, root, root @ matrix[:, kept], root @ wv.variance)
+
+    @property
+    def objective(self) -> float:
+        """Weighted sum of squares without one more term."""
+        residual = solve_nonnegative(self.matrix, self.target)[1]
+        return float(residual @ residual)
+
+    def residual(self, process: Process, shape: Shape) -> FloatArray:
+        column = self.root @ self.scales.unit_curve(process, shape)
+        return solve_nonnegative(np.column_stack([self.matrix, column]), self.target)[1]
+
+    def best(self, free: Process) -> tuple[Bandwidth, float]:
+        """A family at its best shape, and the objective there."""
+        term, own = Term.of(free, 0), shape_of(free)
+        grid = {
+            tuple(
+                v if is_free else o for v, o, is_free in zip(s, own, term.free_shape, strict=True)
+            )
+            for s in free.shape_grid(self.scales.dt, self.scales.n)
+        }
+        squares = {shape: float(np.sum(self.residual(free, shape) ** 2)) for shape in grid}
+        start = min(squares, key=squares.__getitem__)
+        if isinstance(free, AveragedNoise):
+            return self._whole_window(free, start)
+        z0 = free.shape_to_free(start)[term.free_shape]
+
+        def residual(z: FloatArray) -> FloatArray:
+            return self.residual(free, term.moved(start, z))
+
+        fitted = least_squares(
+            residual, z0, bounds=(z0 - _REACH, z0 + _REACH), diff_step=1e-4, xtol=1e-4, max_nfev=20
+        )
+        shape = term.moved(start, fitted.x)
+        names = [p.name for p in free.shape_parameters]
+        given = free.with_values(**dict(zip(names, shape, strict=True)))
+        return Bandwidth(given, given.with_values(bandwidth=None), z0.size), 2.0 * float(
+            fitted.cost
+        )
+
+    def _whole_window(self, free: Process, start: Shape) -> tuple[Bandwidth, float]:
+        """The best window of a whole number of samples: a moving average has no other."""
+        middle, dt = int(np.rint(start[0] / self.scales.dt)), self.scales.dt
+        reach = max(middle // 8, 1) + 1
+        lengths = range(max(middle - reach, 2), middle + reach + 1)
+        squares = {m: float(np.sum(self.residual(free, (m * dt,)) ** 2)) for m in lengths}
+        best = min(squares, key=squares.__getitem__)
+        given = free.with_values(window=best * dt)
+        return Bandwidth(given, given, 1), squares[best]
