@@ -31,6 +31,9 @@ from gmwm.variance import MIN_SAMPLES, wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
+_MOVED = {"not-static": ("gyro", "accel"), "tilt": ("accel",)}
+"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
+
 AMBIGUITY = "ambiguity"
 """Code of the notice that several models describe a channel equally well."""
 
@@ -258,7 +261,10 @@ def calibrate(
     }
     source = ", ".join(each.source for each in recordings)
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
-    fits = {name: fitted for name, (fitted, _) in done.items()}
+    moved = {
+        issue.code: issue for each in treated for issue in each.notices if issue.code in _MOVED
+    }
+    fits = {name: _judged(fitted, moved.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
     several = len(recordings) > 1
@@ -341,6 +347,16 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     else:
         return None
     return Notice(code, "bad", channel.name, text, {"missing": missing})
+
+
+def _judged(fitted: Fit, moved: Collection[Notice]) -> Fit:
+    """A fit, not valid where the recording was not at rest."""
+    found = [
+        Notice(issue.code, "bad", "", issue.text, issue.values)
+        for issue in moved
+        if (fitted.wv.quantity or "gyro") in _MOVED[issue.code]
+    ]
+    return replace(fitted, notices=(*found, *fitted.notices)) if found else fitted
 
 
 def _model_of(

@@ -30,6 +30,8 @@ REASONS = {
     "no-region": "regions_found",
     "wrong-slope": "slopes_agree",
     "recordings-differ": "recordings_agree",
+    "not-static": "recording_static",
+    "tilt": "attitude_kept",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
