@@ -175,8 +175,9 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
             ChannelHealth(lsb=step),
             None,
         )
-    events = motion.joined(find_events(errors), dt)
+    events = find_events(errors)
     outliers = contamination(errors, events)
+    events = motion.joined(events, dt)
     usable = errors.known.copy()
     quiet = values.copy()
     for start, stop in events:

@@ -51,7 +51,7 @@ def block_means(values: FloatArray, size: int) -> FloatArray:
     (n // size, k) ndarray
     """
     blocks = values.shape[0] // size
-    rows = values[: blocks * size].reshape(blocks, size, -1)
+    rows = values[: blocks * size].reshape(blocks, size, values.shape[1])
     known = ~np.isnan(rows)
     count = np.count_nonzero(known, axis=1)
     total = np.sum(np.where(known, rows, 0.0), axis=1)
