@@ -599,8 +599,8 @@ def test_a_model_is_fitted_in_place_of_a_selection(run, good_file):
     models = ("--model", "gyro_x=2*GM + WhiteNoise", "--model", "gyro=B", "--model", "Q+N")
     run("calibrate", good_file, *RATE, *FIELD, *models, "--quiet")
     fits = gmwm.load("gmwm-out/calibration.json")
-    assert list(fits["gyro_x"].params) == ["N", "sigma_1", "tau_1", "sigma_2", "tau_2"]
-    assert list(fits["accel_z"].params) == ["Q", "N"]
+    assert set(fits["gyro_x"].params) == {"N", "sigma_1", "tau_1", "sigma_2", "tau_2"}
+    assert set(fits["accel_z"].params) == {"Q", "N"}
 
 
 def test_json_and_quiet(run, good_file, tmp_path):

@@ -6,11 +6,11 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY
+from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
-from gmwm.readers.rotation import TurningGravity, block_means, turning_gravity
 from gmwm.readers.table import label
 
 __all__ = [

@@ -32,6 +32,9 @@ EARTH_SEEN, EARTH_AGREES = 1.5e-6, 3e-3
 """rad/s/sqrt(Hz) (0.005 deg/sqrt(h)), noise of gyros whose mean is the earth's rate to 0.3 % (0.05
 deg/h): of MEMS gyros, one in a thousand has that mean by chance."""
 
+UNITS_APART = 5.0
+"""Ratio of two units up to which both are named where they explain the noise: deg/h and mdeg/s."""
+
 TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
 """Share of the changes of gravity that turning explains, and relative error of the rate, from which
 on it shows a wrong unit; units differ by a factor of 57 and more."""

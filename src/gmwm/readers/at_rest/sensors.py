@@ -14,9 +14,9 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.readers import tuning
+from gmwm.readers.at_rest.rotation import block_means, triad, turning_gravity
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
-from gmwm.readers.rotation import block_means, triad, turning_gravity
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _EARTH = 7.292115e-5  # rad/s, WGS 84
@@ -213,7 +213,13 @@ def _by_size(rate: _Sensor, others: Mapping[str, float]) -> tuple[str, list[str]
             text = f"white noise of {rate.density / _DENSITY:.3g} deg/s/sqrt(Hz)"
         else:
             text = f"a mean rate of {rate.size / _DENSITY:.3g} deg/s"
-        return f"{text} is more than gyros at rest have", likely
+        # Units that differ by less than gyros do cannot be distinguished.
+        near = [
+            unit
+            for unit in likely
+            if abs(math.log(others[unit] / others[likely[0]])) < math.log(tuning.UNITS_APART)
+        ]
+        return f"{text} is more than gyros at rest have", near
     if 0.0 < rate.density < tuning.QUIET_GYRO and rate.size > tuning.QUIET_BIAS:
         likely = [unit for unit, ratio in others.items() if 10.0 < ratio < 100.0]
         text = (
