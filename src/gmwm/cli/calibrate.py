@@ -27,7 +27,7 @@ _NONE_VALID = 1
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
-_OF_RECORDING = ("not-static", "tilt")
+_OF_RECORDING = ("not-static", "tilt", "rate-changes")
 """Codes of notices of a fit that are those of the whole recording."""
 
 
@@ -169,21 +169,25 @@ def _table(result: Calibration) -> Table:
 
 
 def write_files(result: Calibration, folder: Path) -> str:
-    """Write the files; returns what to say of them."""
-    from gmwm._core.files import replaceable
+    """Write the files, all or none; returns what to say of them."""
+    from gmwm._core.files import moved_together, replaceable
     from gmwm.export import write_kalibr
 
-    paths = [replaceable(folder / name) for name in ("calibration.json", "report.html")]
-    kalibr = replaceable(folder / "imu.yaml")
+    names = ["calibration.json", "report.html"]
+    for name in (*names, "imu.yaml"):
+        replaceable(folder / name)
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
-    if {"gyro", "accel"} <= quantities:
-        try:
-            paths.append(write_kalibr(result, kalibr))
-        except InputError as error:
-            lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
-    elif kalibr.exists():
-        lines = [f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer"]
-    result.report(paths[1])
-    result.save(paths[0])
-    return "\n".join([f"wrote {path}" for path in paths] + lines)
+    with moved_together(folder) as new:
+        result.save(new / names[0])
+        result.report(new / names[1])
+        if {"gyro", "accel"} <= quantities:
+            try:
+                write_kalibr(result, new / "imu.yaml")
+                names.append("imu.yaml")
+            except InputError as error:
+                lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
+    kalibr = folder / "imu.yaml"
+    if "imu.yaml" not in names and kalibr.exists():
+        lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
+    return "\n".join([f"wrote {folder / name}" for name in names] + lines)

@@ -209,17 +209,23 @@ class Recording(Mapping[str, Channel]):
         Raises
         ------
         InputError
-            If fewer than 64 samples lie between.
+            If fewer than 64 samples lie between, or the sampling rate changes, so that the times
+            are not those of the file.
         """
         end = self.duration if stop is None else min(float(stop), self.duration)
+        if start == 0.0 and end == self.duration:
+            return self
+        if any(notice.code == "rate-changes" for notice in self.notices):
+            raise InputError(
+                f"{self.source or 'the recording'}: the sampling rate changes, so that a part has "
+                "another rate than the whole: cut the file where it changes"
+            )
         if not (start >= 0.0 and (end - start) * self.rate >= tuning.FEWEST_SAMPLES):
             raise InputError(
                 f"{self.source or 'the recording'} lasts {self.duration:.6g} s and has fewer than "
                 f"{tuning.FEWEST_SAMPLES} samples from {start:g} to {end:g} s: give other times"
             )
         first, last = round(start * self.rate), round(end * self.rate)
-        if (first, last) == (0, self.n):
-            return self
         channels = tuple(replace(c, values=c.values[first:last]) for c in self.channels)
         text = f"the part from {start:.6g} to {end:.6g} s is used; times count from its start"
         part = Notice("part", "note", "", text, {"start": float(start), "stop": end})

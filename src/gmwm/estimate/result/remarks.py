@@ -32,6 +32,7 @@ REASONS = {
     "recordings-differ": "recordings_agree",
     "not-static": "recording_static",
     "tilt": "attitude_kept",
+    "rate-changes": "rate_constant",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
