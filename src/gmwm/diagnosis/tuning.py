@@ -45,7 +45,7 @@ included."""
 
 EXPLAINED, AS_PREDICTED = 0.1, 2.0
 """Share of the changes of the specific force that turning explains, and the ratio to what it should
-explain: recordings at rest have a share below 1e-5 (docs/real-data.md)."""
+explain: recordings at rest have a share below 1e-4 (docs/health.md)."""
 
 SLOW_TILT = 0.05
 """rad (3 deg) by which gravity may turn while nothing is seen to move: 50 mg, more than any
