@@ -21,6 +21,7 @@ HINTS = {
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
     "other-runs": "-o FOLDER",
     "rate": "--rate 100",
+    "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "time-unit": "--rate 100",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",

@@ -183,10 +183,10 @@ def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]
         return ()
     text, likely = found
     values: dict[str, Any] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
-    action = "check the unit"
+    action = "check the unit and the sampling rate"
     if likely:
         values["likely"] = likely[0]
-        action = f"check the unit: {' or '.join(likely)}, not {rate.unit}, would explain it"
+        action = f"{action}: {' or '.join(likely)}, not {rate.unit}, would explain it"
     return (Notice("gyro-unit", "warning", "gyro", text, values, action),)
 
 
