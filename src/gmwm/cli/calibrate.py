@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +95,9 @@ def calibrate(
         recordings = [read_recording(file, **reading) for file in files]
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
-        with progress_bar("calibrating", "channels") as bar:
+        with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
+            if bar is not None:
+                bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
         # The files first: who pipes the table into head must not lose them.

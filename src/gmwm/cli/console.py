@@ -58,7 +58,7 @@ def progress_bar(title: str, unit: str) -> Iterator[Progress]:
                TextColumn("left"))  # fmt: skip
     console = Console(stderr=True)
     with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("are examined", total=None)
+        task = bar.add_task("", total=None)
 
         def advance(done: int, total: int, what: str) -> None:
             bar.update(task, completed=done, total=total, description=what)
