@@ -175,6 +175,16 @@ def test_noise_and_drift_are_no_motion(record, noise, seed):
     assert find_motion(record(**series)).moves == ()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
+    rng = np.random.default_rng(seed)
+    series = {f"accel_{a}": RandomWalk(3e-2).simulate(30_000, 0.01, rng) for a in "xyz"}
+    angle = np.hypot(series["accel_x"][-1], series["accel_y"][-1]) / GRAVITY
+    assert angle > np.radians(0.5)
+    series["accel_z"] += GRAVITY
+    assert find_motion(record(**series)).moves == ()
+
+
 def test_too_short_to_be_examined(record):
     step = np.repeat([0.0, 1.0], 1000)
     assert find_motion(record(gyro_x=step)).moves == ()

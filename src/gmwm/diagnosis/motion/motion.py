@@ -124,7 +124,7 @@ def find_motion(recording: Recording) -> Motion:
         still = _still(level["gyro"], _runs(~changing))
     else:
         still = [] if _never_rests(recording, level["gyro"], size) else [(0, known.size)]
-    still = [run for run in still if _angle(level["accel"][slice(*run)]) < tuning.SLOW_TILT]
+    still = [run for run in still if not _tilts_slowly(level["accel"][slice(*run)])]
     # From block to block of those that are known; the ends are those of the record.
     begins, ends = known * size * recording.dt, (known + 1) * size * recording.dt
     begins[0], ends[-1] = 0.0, recording.duration
@@ -232,6 +232,18 @@ def _angle(force: FloatArray) -> float:
     if product < (0.5 * _GRAVITY) ** 2:
         return 0.0
     return float(np.arccos(np.clip(before @ after / product, -1.0, 1.0)))
+
+
+def _tilts_slowly(force: FloatArray) -> bool:
+    """Whether gravity ends elsewhere than it began, by more than a random walk explains."""
+    angle = _angle(force)
+    if angle < tuning.SLOW_TILT:
+        return False
+    change = force[tuning.MEDIAN_BLOCKS :] - force[: -tuning.MEDIAN_BLOCKS]
+    # About their median: a steady tilt is in all of them.
+    spread = np.median(np.abs(change - np.median(change, axis=0)), axis=0) / norm.ppf(0.75)
+    walk = float(np.max(spread)) * np.sqrt(force.shape[0] / tuning.MEDIAN_BLOCKS)
+    return bool(angle * _GRAVITY > norm.isf(0.5 * tuning.FALSE_ALARM) * walk)
 
 
 def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
