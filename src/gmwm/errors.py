@@ -13,11 +13,20 @@ class InputError(ValueError):
         The message.
     code : str, optional
         What kind of thing is wrong, for programs.
+    mend : str, optional
+        How to correct it, where the command line has words of its own; ends the message.
+
+    Attributes
+    ----------
+    problem : str
+        The message without the mend.
     """
 
-    def __init__(self, text: str, code: str = "") -> None:
-        super().__init__(text)
+    def __init__(self, text: str, code: str = "", mend: str = "") -> None:
+        super().__init__(f"{text}: {mend}" if mend else text)
+        self.problem = text
         self.code = code
+        self.mend = mend
 
 
 class MissingNameError(InputError, KeyError):

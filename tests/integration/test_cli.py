@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration.calibration import Calibration
 from gmwm.cli.calibrate import show
+from gmwm.cli.console import progress_bar
 from gmwm.cli.demo import show_truth
 from gmwm.estimate.result.fit import Fit
 from gmwm.process import as_model
@@ -504,6 +506,155 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
 
 
+@pytest.mark.parametrize("arguments", [("--help",), ("calibrate", "--help"), ("health", "f.csv")])
+@pytest.mark.parametrize("what", ["closed", "full", "head"])
+def test_output_that_nobody_takes(tmp_path, arguments, what):
+    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
+    if arguments[0] == "health":
+        arguments = (*arguments, *ALL)
+    command = shlex.join([sys.executable, "-m", "gmwm", *arguments])
+    if what == "full" and not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    ends = {"closed": " >&-", "full": " >/dev/full", "head": " | true"}
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {command}{ends[what]}"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    if what == "full":
+        assert done.returncode == 2
+        assert done.stderr.startswith("gmwm: the output cannot be written (")
+        assert done.stderr.count("\n") == 1
+    else:
+        # The pipe may be read to its end before it is closed.
+        assert done.returncode in ((0,) if what == "closed" else (0, 141))
+        assert done.stderr == ""
+
+
+# -- what is calibrated, how it is printed, how it ends -------------------------------------------
+
+
+def test_what_is_missing_is_asked_for_at_once(run, tmp_path):
+    rng = np.random.default_rng(1)
+    write_csv(tmp_path / "f.csv", {"gyro_x": rng.normal(size=99), "accel_z": np.ones(99)})
+    code, printed, told = run("calibrate", "f.csv")
+    assert_refused(code, printed, told)
+    assert told == (
+        "gmwm: f.csv has no time column and no rate was given, and it does not give the unit of "
+        "gyro_x and accel_z: give e.g. --rate 100 --gyro-unit deg/s --accel-unit g\n"
+    )
+    *_, told = run("calibrate", "f.csv", "--accel-unit", "g")
+    assert told.endswith(" unit of gyro_x: give e.g. --rate 100 --gyro-unit deg/s\n")
+    *_, told = run("calibrate", "f.csv", "--channels", "accel", *RATE)
+    assert told == "gmwm: f.csv does not give the unit of accel_z: give e.g. --accel-unit g\n"
+    # The line that it asks for is enough.
+    command = re.search(r"give e.g. (.*)$", run("calibrate", "f.csv")[2])[1]
+    assert run("calibrate", "f.csv", *command.split())[0] == 0
+
+
+def test_channels_and_a_stretch(run, good_file):
+    code, printed, told = run(
+        "calibrate", good_file, *RATE, *FIELD, "--channels", "accel_z,gyro_x",
+        "--start", "50", "--stop", "120.5", "-o", "out",
+    )  # fmt: skip
+    assert (code, told) == (0, "")
+    calibration = gmwm.load("out/calibration.json")
+    assert list(calibration) == ["gyro_x", "accel_z"]
+    assert calibration.n == 7050
+    assert "the part from 50 to 120.5 s is used; times count from its start" in printed
+    code, printed, told = run("health", good_file, *RATE, *FIELD, "--channels", "gyro", "--json")
+    assert (code, told) == (0, "")
+    assert list(json.loads(printed)["channels"]) == ["gyro_x", "gyro_y"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--channels", "gyro_z"), "has no channel 'gyro_z': it has gyro_x, gyro_y, accel_z"),
+        (("--channels", ","), "--channels names no channel"),
+        (("--channels", "gyro_z", "--channel", "gyro_x=0"), "add --channel gyro_z=COLUMN"),
+        (("--start", "199.9"), "fewer than 64 samples from 199.9 to 200 s"),
+        (("--start", "60", "--stop", "50"), "fewer than 64 samples"),
+        (("--start", "-1"), "fewer than 64 samples"),
+        (("--stop", "nan"), "fewer than 64 samples"),
+        (("--start", "inf"), "fewer than 64 samples"),
+        (("--model", "N + X"), "'X' is no term: write terms such as N, K, B"),
+        (("--model", "N - K"), "'N - K' is no term"),
+        (("--model", ""), "is no term"),
+        (("--model", "N + N"), "two WhiteNoise"),
+        (("--model", "0 N"), "is no term"),
+        (("--model", "gyro=N"), "gives accel_z no model"),
+        (("--model", "mag=N"), "the channels are gyro_x, gyro_y, accel_z"),
+        (("--model", "N", "--model", "K"), "give one"),
+    ],
+    ids=str,
+)
+def test_choices_that_cannot_be(run, good_file, tmp_path, arguments, words):
+    assert_refused(*run("calibrate", good_file, *RATE, *FIELD, *arguments), (words,))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_model_is_fitted_in_place_of_a_selection(run, good_file):
+    models = ("--model", "gyro_x=2*GM + WhiteNoise", "--model", "gyro=B", "--model", "Q+N")
+    run("calibrate", good_file, *RATE, *FIELD, *models, "--quiet")
+    fits = gmwm.load("gmwm-out/calibration.json")
+    assert set(fits["gyro_x"].params) == {"N", "sigma_1", "tau_1", "sigma_2", "tau_2"}
+    assert set(fits["accel_z"].params) == {"Q", "N"}
+
+
+def test_json_and_quiet(run, good_file, tmp_path):
+    options = (*RATE, *FIELD, "--model", "N", "--channels", "accel_z")
+    code, printed, told = run("calibrate", good_file, *options, "--json")
+    assert (code, told) == (0, "")
+    assert json.loads(printed) == json.loads(Path("gmwm-out/calibration.json").read_text())
+    assert run("calibrate", good_file, *options, "--quiet") == (0, "", "")
+    assert run("health", good_file, *options[:-4], "-q", "-o", "h.json") == (0, "", "")
+    assert json.loads((tmp_path / "h.json").read_text())["schema"] == "gmwm.health"
+
+
+@pytest.fixture(scope="module")
+def turned_file(tmp_path_factory):
+    """Two minutes of six axes, of which the second quarter turns about the vertical."""
+    rng = np.random.default_rng(4)
+    columns = {name: 0.2 * rng.normal(size=12_000) for name in ("gyro_x", "gyro_y", "gyro_z")}
+    columns["gyro_z"][3000:6000] += 60.0
+    columns |= {name: 2e-3 * rng.normal(size=12_000) for name in ("accel_x", "accel_y", "accel_z")}
+    columns["accel_z"] += 1.0
+    return write_csv(tmp_path_factory.mktemp("data") / "turned.csv", columns)
+
+
+def test_exit_status_where_no_axis_is_valid(run, turned_file):
+    code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, "--model", "N")
+    assert code == 1
+    assert told == "gmwm: no channel has a valid model, for the reasons in the report\n"
+    shown = " ".join(printed.split())
+    assert "not static: it turns at up to 60" in shown
+    assert "120 s, too short for slow errors of minutes and more" in shown
+    assert shown.count("not static") == 1
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    assert Path("gmwm-out/calibration.json").exists()
+    # The options that it names mend it.
+    options = re.search(r"; (--start \S+ --stop [\d.]+)\)", shown)[1]
+    code, printed, told = run(
+        "calibrate", turned_file, *RATE, *FIELD, "--model", "N", *options.split()
+    )
+    assert (code, told) == (0, "")
+    assert "not static" not in printed
+    shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
+    assert "1 if none has" in shown
+
+
+def test_the_bar_names_the_channel(monkeypatch, capsys):
+    for name in ("TERM", "FORCE_COLOR"):
+        monkeypatch.setenv(name, {"TERM": "xterm", "FORCE_COLOR": "1"}[name])
+    monkeypatch.setenv("COLUMNS", "80")
+    with progress_bar("calibrating", "channels") as advance:
+        advance(1, 6, "gyro_y")
+    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", capsys.readouterr().err)
+    assert re.search(r"calibrating .* 1/6 channels gyro_y", shown)
+
+
 # -- health ---------------------------------------------------------------------------------------
 
 
@@ -519,7 +670,7 @@ def shaken_csv(path):
 def test_health_says_what_is_wrong(run, tmp_path):
     shaken_csv(tmp_path / "static.csv")
     units = ("--gyro-unit", "deg/s", "--accel-unit", "g")
-    code, printed, told = run("health", "static.csv", *RATE, *units, "--json", "health.json")
+    code, printed, told = run("health", "static.csv", *RATE, *units, "-o", "health.json")
     assert (code, told) == (0, "")
     assert max(map(len, printed.splitlines())) <= WIDTH
     words = " ".join(printed.split())
@@ -565,8 +716,8 @@ def test_health_refuses_what_it_cannot_use(run, tmp_path):
     for arguments, words in (
         (("absent.csv", *RATE, *SI), "absent.csv does not exist"),
         (("static.csv", *SI), "--rate 100"),
-        (("static.csv", *RATE, *SI, "--json", "taken"), "a folder of that name is in the way"),
-        (("static.csv", *RATE, *SI, "--json", "no/where.json"), "cannot be written"),
+        (("static.csv", *RATE, *SI, "-o", "taken"), "a folder of that name is in the way"),
+        (("static.csv", *RATE, *SI, "-o", "no/where.json"), "cannot be written"),
         (("static.csv", *RATE, *SI, "--channel", "gyro_x"), "write NAME=COLUMN"),
     ):
         code, printed, told = run("health", *arguments)

@@ -6,11 +6,14 @@ periodograms, independently of this package.
 
 import numpy as np
 import pytest
+from scipy.ndimage import median_filter
 from scipy.signal import welch
 
 import gmwm
 from gmwm import Resonance, Sinusoid
 from gmwm._core.units import factor
+from gmwm.diagnosis.motion import find_motion
+from gmwm.readers import turning_gravity
 from places import SHARED
 
 ADIS = SHARED / "data/adis16405"
@@ -67,6 +70,31 @@ def test_every_channel(number):
     large = [e for e in found.of(code="event") if abs(e.values["height"]) > np.radians(10.0)]
     shaken = {e.where for e in large if e.where.startswith("gyro")}
     assert shaken == ({"gyro_x"} if number == 4 else set())
+
+
+@pytest.mark.parametrize(
+    "number", [1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3, 4))]
+)
+def test_recordings_are_at_rest(number):
+    rec = recording(number)
+    codes = {"gravity", "swapped", "gyro-unit"}
+    assert codes.isdisjoint(notice.code for notice in rec.notices)
+    assert find_motion(rec).moves == ()
+    # Running medians of five means of a second, five seconds apart.
+    limits = {"gyro": np.radians(0.16), "accel": np.radians(0.3) * 9.80665}
+    for name, channel in rec.items():
+        means = np.asarray(channel.values, dtype=float).reshape(-1, 100).mean(axis=1)
+        level = median_filter(means, 5)
+        assert np.max(np.abs(level[5:] - level[:-5])) < limits[name.split("_")[0]], name
+    turning = turning_gravity(rec, 100)
+    assert turning.explained < 1e-4
+
+
+def test_deg_per_second_for_radians_is_reported():
+    path = ADIS / "adis16405_1.csv.gz"
+    rec = gmwm.read(path, rate=100, units={"gyro": "rad/s", "accel": "g"}, channels=COLUMNS)
+    (notice,) = rec.notices
+    assert (notice.code, notice.values["likely"]) == ("gyro-unit", "deg/s")
 
 
 def test_shock_is_left_out_and_no_more():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import stat
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -50,6 +52,43 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """
     with moved_into_place(path) as name, open(name, "w", encoding="utf-8") as stream:
         yield stream
+
+
+@contextmanager
+def moved_together(folder: Path) -> Iterator[Path]:
+    """A temporary folder to be filled; its files take their places together when all went well.
+
+    What stands in ``folder`` then is of one run: an interrupt comes before or after.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=".gmwm-", dir=folder) as name:
+            yield Path(name)
+            with _interrupts_after():
+                for each in sorted(Path(name).iterdir()):
+                    os.replace(each, folder / each.name)
+    except OSError as error:
+        raise InputError(_sentence(folder, error)) from None
+
+
+@contextmanager
+def _interrupts_after() -> Iterator[None]:
+    """Put an interrupt off to the end; other threads get none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if waiting:
+            signal.raise_signal(signal.SIGINT)
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:

@@ -31,6 +31,13 @@ from gmwm.variance import MIN_SAMPLES, wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
+_SPOILING = {
+    "not-static": ("gyro", "accel"),
+    "tilt": ("accel",),
+    "rate-changes": ("gyro", "accel"),
+}
+"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
+
 AMBIGUITY = "ambiguity"
 """Code of the notice that several models describe a channel equally well."""
 
@@ -179,9 +186,10 @@ def calibrate(
     The recording is examined first: samples of shocks and spikes are left out, periodic lines and
     resonances are terms that a selected model may have, and the wavelet variances of a channel
     with outliers all over the record are robust; a channel of which each sample is written several
-    times is taken at its own rate. Notices report what was found and done. A channel that is
-    constant, or of which more than half of the samples are missing, is skipped;
-    auxiliary channels (temperature, voltage, clock) have no model.
+    times is taken at its own rate. Fits of a recording that was not static, or whose rate changed,
+    are not valid, nor those of an accelerometer that was tilted. Notices report what was found and
+    done. A channel that is constant, or of which more than half of the samples are missing, is
+    skipped; auxiliary channels (temperature, voltage, clock) have no model.
 
     Parameters
     ----------
@@ -258,7 +266,9 @@ def calibrate(
     }
     source = ", ".join(each.source for each in recordings)
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
-    fits = {name: fitted for name, (fitted, _) in done.items()}
+    issues = [issue for each in treated for issue in each.notices]
+    spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
+    fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
     several = len(recordings) > 1
@@ -341,6 +351,16 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     else:
         return None
     return Notice(code, "bad", channel.name, text, {"missing": missing})
+
+
+def _judged(fitted: Fit, spoiling: Collection[Notice]) -> Fit:
+    """A fit, not valid where the whole recording is no static one at one rate."""
+    found = [
+        Notice(issue.code, "bad", "", issue.text, issue.values)
+        for issue in spoiling
+        if (fitted.wv.quantity or "gyro") in _SPOILING[issue.code]
+    ]
+    return replace(fitted, notices=(*found, *fitted.notices)) if found else fitted
 
 
 def _model_of(

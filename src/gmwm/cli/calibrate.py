@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
-from gmwm.cli.options import read_recording, reading_options
+from gmwm.cli.hints import with_option
+from gmwm.cli.model_text import models_of_channels, written_models
+from gmwm.cli.options import part_options, printing_options, read_recording, reading_options
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,8 +22,14 @@ if TYPE_CHECKING:
     from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration
 
-_SHOWN_OTHERWISE = ("gap", "dead", "infinite", "length")
-"""Codes of issues that the head line, notices of the reader or reasons to skip say already."""
+_NONE_VALID = 1
+"""Exit status."""
+
+_SHOWN_OTHERWISE = ("gap", "dead", "infinite")
+"""Codes of issues that notices of the reader or reasons to skip say already."""
+
+_OF_RECORDING = ("not-static", "tilt", "rate-changes")
+"""Codes of notices of a fit that are those of the whole recording."""
 
 
 def output_option(default: str) -> Callable[[Any], Any]:
@@ -38,6 +48,11 @@ def output_option(default: str) -> Callable[[Any], Any]:
                 type=click.Path(path_type=Path))  # fmt: skip
 @output_option("gmwm-out")
 @reading_options
+@part_options
+@click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
+              help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
+                   "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
+                   "repeat.")  # fmt: skip
 @click.option("--leave", "left", multiple=True,
               type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
               metavar="WHAT",
@@ -45,16 +60,16 @@ def output_option(default: str) -> Callable[[Any], Any]:
                    "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@printing_options
 def calibrate(
     files: tuple[Path, ...],
     output: Path,
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
+    models: tuple[str, ...],
     left: tuple[str, ...],
     jobs: int,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
 ) -> None:
     """Calibrate every channel of a static recording, or of several of one sensor.
 
@@ -64,6 +79,9 @@ def calibrate(
     the field, the files hold everything in SI units. Several recordings of one sensor have one
     model, with a test whether they agree.
 
+    Exit status: 0 if a channel has a valid model, 1 if none has (the files are written all the
+    same), 2 if the input cannot be used.
+
     \b
     Examples:
       gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
@@ -72,21 +90,30 @@ def calibrate(
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, calibrate as run
 
+    given = written_models(models)
     with folder_to_fill(output) as folder:
-        recordings = [
-            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
-            for file in files
-        ]
-        with progress_bar("calibrating", "channels") as bar:
+        recordings = [read_recording(file, **reading) for file in files]
+        names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
+        model = models_of_channels(given, tuple(names))
+        with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
+            if bar is not None:
+                bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = run(recordings, screening=chosen, jobs=jobs, progress=bar)
+            result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
         # The files first: who pipes the table into head must not lose them.
         written = write_files(result, folder)
-    show(result)
-    click.echo(written)
+    if as_json:
+        click.echo(json.dumps(result.to_dict(), allow_nan=False))
+    elif not quiet:
+        show(result)
+        click.echo(written)
+    if not any(fit.valid for fit in result.values()):
+        click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
+        click.get_current_context().exit(_NONE_VALID)
 
 
 def show(result: Calibration) -> None:
+    from gmwm._core.notices import worst_first
     from gmwm.estimate.result import JointFit
     from gmwm.report import duration_text
 
@@ -97,15 +124,16 @@ def show(result: Calibration) -> None:
         highlight=False,
     )
     print_whole(console, _table(result))
-    for notice in result.notices:
-        if _is_shown(notice):
-            console.print(f"- {notice}", highlight=False)
+    for notice in worst_first([each for each in result.notices if _is_shown(each)]):
+        console.print(f"- {with_option(notice)}", highlight=False)
     for name, why in result.skipped.items():
         console.print(f"- {name} skipped: {why.text}", highlight=False)
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             console.print(f"- {name}: {fit.agreement}", highlight=False)
         for notice in fit.notices:
+            if notice.code in _OF_RECORDING:
+                continue
             console.print(f"- {name}: {notice}", highlight=False)
 
 
@@ -115,6 +143,8 @@ def _is_shown(notice: Notice) -> bool:
 
     if notice.code in (*READING, "events-left-out"):
         return True
+    if notice.code == "length":
+        return notice.severity != "good"
     return notice.severity in ("warning", "bad") and notice.code not in _SHOWN_OTHERWISE
 
 
@@ -142,22 +172,25 @@ def _table(result: Calibration) -> Table:
 
 
 def write_files(result: Calibration, folder: Path) -> str:
-    """Write the files; returns what to say of them."""
-    from gmwm._core.files import replaceable
+    """Write the files, all or none; returns what to say of them."""
+    from gmwm._core.files import moved_together, replaceable
     from gmwm.export import export
 
-    paths = [replaceable(folder / name) for name in ("calibration.json", "report.html")]
-    kalibr = replaceable(folder / "imu.yaml")
+    names = ["calibration.json", "report.html"]
+    for name in (*names, "imu.yaml"):
+        replaceable(folder / name)
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
-    if {"gyro", "accel"} <= quantities:
-        try:
-            export(result, "kalibr", path=kalibr)
-            paths.append(kalibr)
-        except InputError as error:
-            lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
-    elif kalibr.exists():
-        lines = [f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer"]
-    result.report(paths[1])
-    result.save(paths[0])
-    return "\n".join([f"wrote {path}" for path in paths] + lines)
+    with moved_together(folder) as new:
+        result.save(new / names[0])
+        result.report(new / names[1])
+        if {"gyro", "accel"} <= quantities:
+            try:
+                export(result, "kalibr", path=new / "imu.yaml")
+                names.append("imu.yaml")
+            except InputError as error:
+                lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
+    kalibr = folder / "imu.yaml"
+    if "imu.yaml" not in names and kalibr.exists():
+        lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
+    return "\n".join([f"wrote {folder / name}" for name in names] + lines)

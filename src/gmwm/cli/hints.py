@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm._core.notices import Notice
 
 HINTS = {
     "accel-unit-missing": "--accel-unit g",
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
+    "channels-swapped": "--channel accel_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
@@ -14,6 +21,7 @@ HINTS = {
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
     "other-runs": "-o FOLDER",
     "rate": "--rate 100",
+    "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "time-unit": "--rate 100",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
@@ -21,6 +29,18 @@ HINTS = {
 
 
 def with_hint(error: InputError) -> str:
-    """The message of an error with the option that mends it."""
-    hint = HINTS.get(error.code)
-    return f"{error} (on the command line: {hint})" if hint else str(error)
+    """The message of an error, its mend in the words of the command line."""
+    hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
+    if not hint:
+        return str(error)
+    if error.mend:
+        return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
+    return f"{error} (on the command line: {hint})"
+
+
+def with_option(notice: Notice) -> Notice:
+    """A notice with the options that choose its static stretch."""
+    if notice.code not in ("not-static", "tilt") or "start" not in notice.values:
+        return notice
+    start, stop = notice.values["start"], notice.values["stop"]
+    return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
+from contextlib import suppress
+from io import StringIO
 
 import click
 
@@ -19,7 +23,7 @@ from gmwm.cli.numbers import bound, reduce
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError
 
-_EXIT_INPUT = 2
+_EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as shells have them
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -36,16 +40,44 @@ for _command in (
 
 def main() -> None:
     """Entry point: bad input is one sentence and exit code 2, never a traceback."""
+    # None where who started us closed them: what is printed then goes nowhere.
+    sys.stdout, sys.stderr = sys.stdout or StringIO(), sys.stderr or StringIO()
     try:
-        cli.main(standalone_mode=False)
+        status = _run()
+        sys.stdout.flush()
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        _discard_output()
+        status = _EXIT_PIPE
+        if error.errno not in (errno.EPIPE, errno.EINVAL):
+            status = _failed(f"the output cannot be written ({error.strerror}): send it elsewhere")
+    sys.exit(status)
+
+
+def _run() -> int:
+    """Run the command; its exit status."""
+    try:
+        return int(cli.main(standalone_mode=False) or 0)
     except InputError as error:
-        click.echo(f"gmwm: {with_hint(error)}", err=True)
-        sys.exit(_EXIT_INPUT)
-    except click.exceptions.Exit as error:
-        sys.exit(error.exit_code)
+        return _failed(with_hint(error))
     except click.ClickException as error:
-        click.echo(f"gmwm: {error.format_message()}", err=True)
-        sys.exit(_EXIT_INPUT)
+        return _failed(error.format_message())
     except click.Abort:
-        click.echo("gmwm: interrupted, no file is half-written", err=True)
-        sys.exit(130)
+        _failed("interrupted, no file is half-written")
+        return _EXIT_INTERRUPTED
+    except SystemExit:  # of click and rich, where nobody reads on, as head does
+        _discard_output()
+        return _EXIT_PIPE
+
+
+def _failed(sentence: str) -> int:
+    with suppress(OSError):
+        click.echo(f"gmwm: {sentence}", err=True)
+    return _EXIT_INPUT
+
+
+def _discard_output() -> None:
+    """Let what is still in the buffer go nowhere: at its end Python tries to write it again."""
+    with suppress(OSError), open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +25,36 @@ _OPTIONS = (
 )  # fmt: skip
 
 
+_PART = (
+    click.option("--channels", "only", metavar="NAME,...",
+                 help="Only these channels: gyro_x,accel_z, or gyro for all of them."),
+    click.option("--start", type=float, metavar="S", help="Leave out what is before, in seconds."),
+    click.option("--stop", type=float, metavar="S", help="Leave out what is after."),
+)  # fmt: skip
+
+_PRINTING = (
+    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, in SI units."),
+    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+)
+
+
 def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of `read_recording`."""
-    for option in reversed(_OPTIONS):
+    """Give a command the options of `read_recording` that say what the file is."""
+    return _with(command, _OPTIONS)
+
+
+def part_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Those of `read_recording` that choose channels and a stretch."""
+    return _with(command, _PART)
+
+
+def printing_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How results are printed."""
+    return _with(command, _PRINTING)
+
+
+def _with(command: Callable[..., Any], options: Sequence[Any]) -> Callable[..., Any]:
+    for option in reversed(options):
         command = option(command)
     return command
 
@@ -39,6 +66,9 @@ def read_recording(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    only: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
 ) -> Recording:
     """Read a recording as the options say.
 
@@ -50,9 +80,31 @@ def read_recording(
     from gmwm.readers import read
 
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    return read(
-        file, rate=rate, units=units, channels=roles(channels), time=time_reference(time_column)
+    recording = read(
+        file,
+        rate=rate,
+        units=units,
+        channels=_chosen(roles(channels), only),
+        time=time_reference(time_column),
     )
+    return recording.part(0.0 if start is None else start, stop)
+
+
+def _chosen(
+    columns: dict[str, str | int] | None, only: str | None
+) -> dict[str, str | int] | list[str] | None:
+    """Channels with their columns, or their names alone."""
+    if only is None:
+        return columns
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    if not names:
+        raise InputError("--channels names no channel: write names, e.g. gyro_x,accel_z")
+    if columns is None:
+        return names
+    for name in names:
+        if name not in columns:
+            raise InputError(f"--channels {only}: add --channel {name}=COLUMN, or leave it out")
+    return {name: columns[name] for name in names}
 
 
 def _column(text: str) -> str | int:

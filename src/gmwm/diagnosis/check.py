@@ -15,6 +15,7 @@ from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
 from gmwm.diagnosis.repeated import repetition, repetition_notice, thinned
 from gmwm.diagnosis.resolution import rounding_notice, step_size
@@ -40,10 +41,10 @@ class _Examined:
 def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """Find what is wrong with a static recording, or needs a term of its own in the model.
 
-    Gaps, dead and stuck channels, saturation, spikes and shocks, outliers spread over the record,
-    rounding, periodic lines, resonances, drift, changes of the noise, an uneven clock, dependence
-    on temperature and between channels. Each kind of notice is made in at most about one of a
-    thousand channels of clean Gaussian noise.
+    Motion, gaps, dead and stuck channels, saturation, spikes and shocks, outliers spread over the
+    record, rounding, periodic lines, resonances, drift, changes of the noise, an uneven clock,
+    dependence on temperature and between channels. Each kind of notice is made in at most about
+    one of a thousand channels of clean Gaussian noise.
 
     Parameters
     ----------
@@ -74,13 +75,14 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
         )
     # What is missing is counted anew, channel by channel.
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
-    whole = [_length(recording), *read, *_clock(recording)]
+    motion = find_motion(recording)
+    whole = [_length(recording), *motion_notices(motion), *read, *_clock(recording)]
     examined: dict[str, _Examined] = {}
     channels = recording.inertial
     for channel in channels:
         if progress is not None:
             progress(len(examined), len(channels), channel.name)
-        examined[channel.name] = _unrepeated(channel)
+        examined[channel.name] = _unrepeated(channel, motion)
     if progress is not None:
         progress(len(channels), len(channels), "")
     shared = gap_notices(channels, recording.dt)
@@ -91,7 +93,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     notices = worst_first(whole + [found for found in shared if not found.where])
     for name, one in examined.items():
         own = one.notices + [found for found in shared if found.where == name]
-        if not any(found.severity in _SEVERE for found in own):
+        if not motion.moves and not any(found.severity in _SEVERE for found in own):
             own.append(_clean(name))
         notices += worst_first(own)
     return Health(
@@ -135,12 +137,12 @@ def _clean(name: str) -> Notice:
     return Notice("clean", "good", name, text)
 
 
-def _unrepeated(channel: Channel) -> _Examined:
+def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
     """A channel at its own rate, if each sample of it is written several times."""
     found = repetition(channel)
     if found is None:
-        return _examined(channel)
-    one = _examined(thinned(channel, found))
+        return _examined(channel, motion)
+    one = _examined(thinned(channel, found), motion)
     events = tuple(
         (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
         for start, stop in one.facts.events
@@ -150,7 +152,7 @@ def _unrepeated(channel: Channel) -> _Examined:
     return _Examined([repetition_notice(channel, found), *one.notices], facts, None)
 
 
-def _examined(channel: Channel) -> _Examined:
+def _examined(channel: Channel, motion: Motion) -> _Examined:
     name, unit, dt = channel.name, channel.unit, channel.dt
     values = np.asarray(channel.values, dtype=float)
     dead = dead_notice(channel)
@@ -175,6 +177,7 @@ def _examined(channel: Channel) -> _Examined:
         )
     events = find_events(errors)
     outliers = contamination(errors, events)
+    events = motion.joined(events, dt)
     usable = errors.known.copy()
     quiet = values.copy()
     for start, stop in events:
@@ -183,7 +186,7 @@ def _examined(channel: Channel) -> _Examined:
     found = [
         stuck_notice(name, unit, dt, values, step, errors),
         saturation_notice(name, unit, present, step),
-        event_notice(name, unit, dt, values, events, errors.level),
+        event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
         rounding_notice(name, unit, step, errors.level),
         variance_notice(name, unit, dt, errors, usable, step),

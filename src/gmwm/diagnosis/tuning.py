@@ -11,6 +11,56 @@ LONG_RECORD = 3600.0
 JITTER, LARGE_JITTER = 0.1, 0.3
 """Root mean square of the steps of time stamps, in sampling intervals, for a note and a warning."""
 
+# -- motion ---------------------------------------------------------------------------------------
+
+MOTION_BLOCK, FEWEST_OF_MOTION = 1.0, 16
+"""s, and samples at least, of the means in which motion is looked for: handling is slower, fast
+noise averages out."""
+
+MEDIAN_BLOCKS = 5
+"""Means of a running median, and between two that are compared: shocks ring for less than two."""
+
+FEWEST_BLOCKS = 30
+"""Means below which a recording is too short for it."""
+
+TURNS = 0.0175
+"""rad/s (1 deg/s) by which the rate of a sensor at rest does not change within some seconds; that
+of the real recordings of docs/real-data.md does by 0.15 deg/s at most in 40 channel hours."""
+
+TILTS = 0.0175
+"""rad (1 deg), the same of the direction of gravity: 0.3 deg at most in those recordings."""
+
+QUIET = 0.2
+"""Quantile of the changes that gives their noise where the sensor moves most of the time."""
+
+BEYOND_NOISE = 2.0
+"""Times the quantile of Gaussian noise: a scale from a few dozen blocks is known to half of it."""
+
+SHORTEST_STATIC = 10
+"""Blocks between two changes that show a level."""
+
+LONGEST_TILT = 30.0
+"""s that a change from one attitude at rest to another may take, five blocks on either side
+included."""
+
+EXPLAINED, AS_PREDICTED = 0.1, 2.0
+"""Share of the changes of the specific force that turning explains, and the ratio to what it should
+explain: recordings at rest have a share below 1e-4 (docs/health.md)."""
+
+SLOW_TILT = 0.05
+"""rad (3 deg) by which gravity may turn while nothing is seen to move: 50 mg, more than any
+accelerometer drifts."""
+
+WILD, BEYOND_WHITE = 0.1, 10.0
+"""rad/s between quantiles of the rate, and times what fast noise leaves, of a gyro alone that is
+never at rest: biases of the cheapest wander by a fiftieth."""
+
+PARTS_OF_MOTION = 8
+"""Parts of a record, of which most must show that: one shock does not."""
+
+SWAYS = 1e-3
+"""rad from block to block below which turning does no harm."""
+
 # -- missing, stuck and saturated samples ---------------------------------------------------------
 
 MUCH_MISSING, TOO_MUCH_MISSING = 0.1, 0.5

@@ -6,22 +6,27 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY
+from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.names import TIME, bare, meaning, stated_seconds
+from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
 from gmwm.readers.table import label
 
 __all__ = [
     "AUXILIARY",
+    "AXES",
     "READING",
     "TIME",
     "Channel",
     "CsvTable",
     "Recording",
+    "TurningGravity",
     "bare",
+    "block_means",
     "label",
     "meaning",
     "read",
     "stated_seconds",
+    "turning_gravity",
 ]

@@ -1,29 +1,23 @@
-"""The unit of each channel: as the user gives it, else as the header does, and as gravity shows."""
+"""The unit of each channel: as the user gives it, else as the header does."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
-from gmwm.readers import tuning
-from gmwm.readers.names import AXES, meaning
-from gmwm.readers.recording import Recording
+from gmwm.readers.names import meaning
 from gmwm.readers.roles import Roles
 from gmwm.readers.table import Table
 
 _SAME_UNIT = 1e-6  # relative; the same unit in two spellings differs by rounding
 
-_GRAVITY = factor("g", SI_UNIT["accel"])
-_TRIAD = tuple(f"accel_{axis}" for axis in AXES)
-_UNITS = ("m/s^2", "g", "mg", "ug")
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
 
 
 def channel_units(
-    table: Table, roles: Roles, units: Mapping[str, str]
+    table: Table, roles: Roles, units: Mapping[str, str], lacks_rate: bool = False
 ) -> tuple[dict[str, str], tuple[Notice, ...]]:
     """Find the unit of every channel.
 
@@ -33,6 +27,8 @@ def channel_units(
     roles : Roles
     units : mapping of str to str
         What the user gave, by sensor or by channel; the latter goes first.
+    lacks_rate : bool, optional
+        Whether the sampling rate is missing too, which is then asked for at once.
 
     Returns
     -------
@@ -44,25 +40,30 @@ def channel_units(
     Raises
     ------
     InputError
-        If a unit is missing, unknown, or not one of what the channel measures.
+        If a unit is missing, unknown, or not one of what the channel measures; or the rate is
+        missing.
     """
     _check_keys(units, roles)
     found: dict[str, str] = {}
     from_header: dict[str, str] = {}
     overruled: dict[str, str] = {}
+    missing: dict[str, str | None] = {}
     for channel, column in roles.channels.items():
         sensor = _sensor(channel, table.names[column])
         in_header = meaning(table.names[column]).unit
         given = units.get(channel, units.get(sensor or ""))
         unit = given if given is not None else in_header
         if unit is None:
-            raise _missing(table, channel, sensor)
+            missing[channel] = sensor
+            continue
         _check(table, channel, sensor, unit)
         found[channel] = unit
         if given is None:
             from_header[channel] = unit
         elif in_header is not None and not _same(in_header, given):
             overruled[channel] = f"{in_header}, not {given}"
+    if missing or lacks_rate:
+        raise _incomplete(table.source, missing, lacks_rate)
     return found, tuple(_notices(from_header, overruled))
 
 
@@ -102,19 +103,26 @@ def _same(unit: str, other: str) -> bool:
         return False
 
 
-def _missing(table: Table, channel: str, sensor: str | None) -> InputError:
-    if sensor is None:
-        return InputError(
-            f"{table.source} does not give the unit of {channel}: give it, e.g. "
-            f'units={{"{channel}": "deg/s"}}',
-            "unit-missing",
-        )
-    example = _EXAMPLES[sensor]
-    return InputError(
-        f"{table.source} does not give the unit of {channel}: give it, e.g. "
-        f'units={{"{sensor}": "{example}"}}',
-        f"{sensor}-unit-missing",
-    )
+def _incomplete(source: str, missing: Mapping[str, str | None], lacks_rate: bool) -> InputError:
+    """Whatever the file and the user leave out, asked for in one sentence."""
+    problems, codes, mends = [], [], []
+    # One channel of each sensor stands for the others: they are mended together.
+    first: dict[str, str] = {}
+    for channel, sensor in missing.items():
+        first.setdefault(sensor or channel, channel)
+    if lacks_rate:
+        problems.append("has no time column and no rate was given")
+        codes.append("rate")
+        mends.append("rate=100")
+    if first:
+        problems.append(f"does not give the unit of {' and '.join(first.values())}")
+        codes += [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in first]
+        examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in first]
+        mends.append(f"units={{{', '.join(examples)}}}")
+    it = "it in Hz" if lacks_rate and not first else "it" if len(codes) == 1 else "them"
+    text = f"{source} {', and it '.join(problems)}"
+    mend = f"give {it}, e.g. {', '.join(mends)}"
+    return InputError(text, " ".join(dict.fromkeys(codes)), mend)
 
 
 def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[Notice]:
@@ -132,53 +140,3 @@ def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> li
         text = f"the names of the columns contradict the units given: {parts}"
         notices.append(Notice("units-contradicted", "warning", "", text, overruled))
     return notices
-
-
-def gravity_notices(
-    recording: Recording, unit_of: Mapping[str, str], given: Mapping[str, str]
-) -> tuple[Notice, ...]:
-    """Compare the mean of the accelerometer with gravity.
-
-    A mean that is no gravity in the unit used, but is in another one, shows that the unit is
-    wrong; any other mean may be that of data without gravity.
-
-    Parameters
-    ----------
-    recording : Recording
-    unit_of : mapping of str to str
-        Unit of each channel in the file.
-    given : mapping of str to str
-        Units that the user gave, by channel or sensor.
-
-    Raises
-    ------
-    InputError
-        If the unit is wrong and comes from the file.
-    """
-    if not all(name in recording for name in _TRIAD):
-        return ()
-    used = {unit_of[name] for name in _TRIAD}
-    norm = math.hypot(*(recording[name].mean for name in _TRIAD))
-    if len(used) > 1 or not norm > 0.0 or _is_gravity(norm):
-        return ()
-    unit = used.pop()
-    in_file = norm / factor(unit, SI_UNIT["accel"])
-    likely = [name for name in _UNITS if _is_gravity(in_file * factor(name, SI_UNIT["accel"]))]
-    if not likely:
-        return ()
-    text = (
-        f"the mean of the accelerometer is {in_file:.4g} {unit} long, which is gravity in "
-        f"{likely[0]}"
-    )
-    if not any(key in given for key in ("accel", *_TRIAD)):
-        raise InputError(
-            f'{recording.source}: {text}: give the unit, units={{"accel": "{likely[0]}"}}',
-            "accel-unit-missing",
-        )
-    values = {"norm": norm, "unit": unit, "likely": likely[0]}
-    action = f"check the unit: everything of the accelerometer is off by {_GRAVITY / norm:.4g}"
-    return (Notice("gravity", "bad", "accel", text, values, action),)
-
-
-def _is_gravity(norm: float) -> bool:
-    return abs(norm / _GRAVITY - 1.0) < tuning.GRAVITY_AGREES

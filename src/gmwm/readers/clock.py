@@ -126,8 +126,9 @@ class Clock:
         rate = 1.0 / (step * seconds)
         if expected is not None and not agree(rate, expected):
             raise InputError(
-                f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated: "
-                "leave out the rate to use that of the stamps, or give time=False to ignore them"
+                f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated",
+                "rate-contradicted",
+                "leave out the rate to use that of the stamps, or give time=False to ignore them",
             )
         text = (
             f"time stamps (column {self.column}, {_UNITS.get(seconds, self.own_unit)}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -17,7 +17,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
-from gmwm.readers.channel_units import channel_units, gravity_notices
+from gmwm.readers.at_rest import rest_notices
+from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.names import meaning, stated_seconds
@@ -30,7 +31,7 @@ def read(
     path: str | os.PathLike[str],
     rate: float | None = None,
     units: Mapping[str, str] | None = None,
-    channels: Mapping[str, Reference] | None = None,
+    channels: Mapping[str, Reference] | Collection[str] | None = None,
     time: Reference | Literal[False] | None = None,
 ) -> Recording:
     """Read a static recording of an inertial sensor.
@@ -45,13 +46,13 @@ def read(
     units : mapping of str to str, optional
         Unit of ``"gyro"`` and of ``"accel"``, or of single channels, e.g.
         ``{"gyro": "deg/s", "accel": "g"}``. Not needed where the header has them.
-    channels : mapping of str to (str or int), optional
-        Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``. Only
-        these are read. A name that begins with ``gyro`` or ``accel`` states what the column
-        measures; for any other its unit does (``"temp": "T1"`` in degC or K is auxiliary). By
-        default columns are known by their names; without
-        names, six are gyro and accelerometer x, y, z, seven have time before them, one or three
-        (with time: four) belong to the only sensor in ``units``.
+    channels : mapping of str to (str or int), or collection of str, optional
+        Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``; or
+        names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read.
+        A name that begins with ``gyro`` or ``accel`` states what the column measures; for any other
+        its unit does (``"temp": "T1"`` in degC or K is auxiliary). By default columns are known by
+        their names; without names, six are gyro and accelerometer x, y, z, seven have time before
+        them, one or three (with time: four) belong to the only sensor in ``units``.
     time : str, int or False, optional
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
         header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
@@ -81,11 +82,10 @@ def read(
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
     # Complain before a long file is read, not after.
-    if roles.time is None:
-        _required_rate(table, stated)
-    elif stated is None:
+    if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
-    unit_of, unit_notices = channel_units(table, roles, units)
+    lacks_rate = roles.time is None and stated is None
+    unit_of, unit_notices = channel_units(table, roles, units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
@@ -100,12 +100,12 @@ def read(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices),
     )
-    gravity = gravity_notices(recording, unit_of, units)
+    at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     return replace(
         recording,
         channels=(*recording.channels, *further),
-        notices=(*gravity, *recording.notices),
+        notices=(*at_rest, *recording.notices),
         jitter=timing.jitter if timing is not None else None,
     )
 
@@ -128,15 +128,6 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
             "the rate to use that of the file"
         )
     return rate
-
-
-def _required_rate(table: Table, stated: float | None) -> float:
-    if stated is None:
-        raise InputError(
-            f"{table.source} has no time column and no rate was given: give it in Hz, rate=100",
-            "rate",
-        )
-    return stated
 
 
 def _load(
@@ -187,7 +178,7 @@ def _timing(
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
-        return _required_rate(table, stated), None, ()
+        return stated or 0.0, None, ()  # without one, it was asked for with the units
     name = table.names[time]
     clock = Clock(
         source=table.source,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 
 import numpy as np
@@ -18,7 +18,7 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
-    | {"missing-samples"}
+    | {"missing-samples", "part"}
 )
 """Codes of the notices about how a file was read."""
 
@@ -192,6 +192,46 @@ class Recording(Mapping[str, Channel]):
     def duration(self) -> float:
         """Length, s."""
         return self.n * self.dt
+
+    def part(self, start: float = 0.0, stop: float | None = None) -> Recording:
+        """The recording between two times.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            s from the first sample; by default to the end.
+
+        Returns
+        -------
+        Recording
+            Its own times count from ``start``.
+
+        Raises
+        ------
+        InputError
+            If fewer than 64 samples lie between, or the sampling rate changes, so that the times
+            are not those of the file.
+        """
+        end = self.duration if stop is None else min(float(stop), self.duration)
+        if start == 0.0 and end == self.duration:
+            return self
+        if any(notice.code == "rate-changes" for notice in self.notices):
+            raise InputError(
+                f"{self.source or 'the recording'}: the sampling rate changes, so that a part has "
+                "another rate than the whole: cut the file where it changes"
+            )
+        if not (start >= 0.0 and (end - start) * self.rate >= tuning.FEWEST_SAMPLES):
+            raise InputError(
+                f"{self.source or 'the recording'} lasts {self.duration:.6g} s and has fewer than "
+                f"{tuning.FEWEST_SAMPLES} samples from {start:g} to {end:g} s: give other times"
+            )
+        first, last = round(start * self.rate), round(end * self.rate)
+        channels = tuple(replace(c, values=c.values[first:last]) for c in self.channels)
+        text = f"the part from {start:.6g} to {end:.6g} s is used; times count from its start"
+        part = Notice("part", "note", "", text, {"start": float(start), "stop": end})
+        kept = [notice for notice in self.notices if notice.code != "missing-samples"]
+        notices = (*kept, part, *_notices_of_gaps(channels))
+        return replace(self, channels=channels, notices=notices)
 
     def __getitem__(self, name: str) -> Channel:
         for channel in self.channels:

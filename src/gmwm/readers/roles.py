@@ -134,7 +134,7 @@ def assign_roles(
     columns: Columns,
     tentative: bool,
     units: Mapping[str, str],
-    channels: Mapping[str, Reference] | None,
+    channels: Mapping[str, Reference] | Collection[str] | None,
     time: Reference | Literal[False] | None,
 ) -> Roles:
     """Decide which column is which channel.
@@ -158,7 +158,7 @@ def assign_roles(
     """
     given_time = None if time is None or time is False else columns.find(time, "time")
     notices: list[Notice] = []
-    if channels is not None:
+    if isinstance(channels, Mapping):
         chosen = _given_channels(columns, channels)
         stamps = [i for i in _time_columns(columns) if i not in chosen.values()]
     else:
@@ -175,10 +175,11 @@ def assign_roles(
                 )
             chosen, stamp = _by_number(columns, rest, bool(known - {None}), units)
             stamps = [stamp] if stamp is not None else stamps
+        chosen = _only(columns, chosen, channels)
     chosen_time = _choose_time(columns, given_time, stamps, time, notices)
     auxiliary = _given_auxiliary(columns, chosen, units)
     chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
-    if channels is None:
+    if not isinstance(channels, Mapping):
         left = {*chosen.values(), chosen_time, *(() if time is not False else stamps)}
         auxiliary += _found_auxiliary(columns, left, chosen, units)
     if auxiliary:
@@ -239,6 +240,24 @@ def _given_channels(columns: Columns, channels: Mapping[str, Reference]) -> dict
     if not channels:
         raise InputError(f"channels names no channel: give the column of each, e.g. {_EXAMPLE}")
     return {name: columns.find(reference, name) for name, reference in channels.items()}
+
+
+def _only(columns: Columns, found: dict[str, int], names: Collection[str] | None) -> dict[str, int]:
+    """Those channels that the caller names, if he names some."""
+    if names is None:
+        return found
+    wanted = {names} if isinstance(names, str) else set(names)
+    for name in wanted:
+        if name not in found and not any(name == each.partition("_")[0] for each in found):
+            raise InputError(
+                f"{columns.source} has no channel {name!r}: it has {', '.join(found)}",
+                "channel-unknown",
+            )
+    return {
+        name: column
+        for name, column in found.items()
+        if not wanted.isdisjoint((name, name.partition("_")[0]))
+    }
 
 
 def _named_channels(columns: Columns) -> dict[str, int]:

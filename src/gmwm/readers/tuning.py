@@ -13,6 +13,32 @@ GRAVITY_AGREES = 0.1
 """Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
 are a few per cent, units differ by a factor of ten."""
 
+GRAVITY_SURE, GRAVITY_NOISE = 0.05, 0.03
+"""The same where gravity stands in the columns of a gyro, and its noise: that of an accelerometer
+is below 20 mg, while a bias of 1 deg/s has noise of a tenth of it."""
+
+NOISIEST_GYRO = 8.7e-3
+"""rad/s/sqrt(Hz) (0.5 deg/s/sqrt(Hz)): twice that of gyros for 20,000 deg/s, ten times that of the
+cheapest usual ones."""
+
+LARGEST_BIAS = 0.7
+"""rad/s (40 deg/s): data sheets of the cheapest gyros allow 20 deg/s at rest, seldom more."""
+
+QUIET_GYRO, QUIET_BIAS = 2.9e-6, 2e-4
+"""rad/s/sqrt(Hz) (0.01 deg/sqrt(h)) and rad/s (41 deg/h, the earth's rate included): a gyro of less
+noise than the one has no bias above the other."""
+
+EARTH_SEEN, EARTH_AGREES = 1.5e-6, 3e-3
+"""rad/s/sqrt(Hz) (0.005 deg/sqrt(h)), noise of gyros whose mean is the earth's rate to 0.3 % (0.05
+deg/h): of MEMS gyros, one in a thousand has that mean by chance."""
+
+UNITS_APART = 5.0
+"""Ratio of two units up to which both are named where they explain the noise: deg/h and mdeg/s."""
+
+TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
+"""Share of the changes of gravity that turning explains, and relative error of the rate, from which
+on it shows a wrong unit; units differ by a factor of 57 and more."""
+
 # -- the clock ------------------------------------------------------------------------------------
 
 RATES_AGREE = 0.01

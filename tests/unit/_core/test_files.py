@@ -2,10 +2,11 @@
 
 import errno
 import os
+import signal
 
 import pytest
 
-from gmwm._core.files import output_folder, written
+from gmwm._core.files import moved_together, output_folder, written
 from gmwm.errors import InputError
 
 
@@ -133,3 +134,33 @@ def test_output_folder_is_tried_before_any_work(tmp_path, monkeypatch):
     monkeypatch.setattr("gmwm._core.files.tempfile.TemporaryFile", refuse)
     with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\)"):
         output_folder(tmp_path)
+
+
+def test_files_of_one_run_stand_together(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).write_text("old")
+    with pytest.raises(RuntimeError), moved_together(tmp_path) as folder:
+        (folder / "a").write_text("new")
+        raise RuntimeError
+    assert [(tmp_path / name).read_text() for name in "ab"] == ["old", "old"]
+    with moved_together(tmp_path) as folder:
+        for name in ("a", "b", "c"):
+            (folder / name).write_text("new")
+        assert (tmp_path / "a").read_text() == "old"
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(
+        "abc", "new"
+    )
+
+
+def test_an_interrupt_comes_before_or_after_the_files(tmp_path, monkeypatch):
+    replace = os.replace
+
+    def interrupted(source, target):
+        signal.raise_signal(signal.SIGINT)
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt), moved_together(tmp_path) as folder:
+        for name in ("a", "b"):
+            (folder / name).write_text("new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]

@@ -594,3 +594,12 @@ def test_a_channel_of_repeated_samples_is_calibrated_at_its_own_rate():
     # White noise of one sample a 10 ms: N^2 = variance dt.
     assert found["accel_x"]["N"].value == pytest.approx(0.1, rel=0.03)
     assert "repeated-samples" in {notice.code for notice in found.notices}
+
+
+def test_fits_of_a_record_whose_rate_changed_are_not_valid():
+    notice = Notice("rate-changes", "bad", "", "the sampling rate goes from 100 to 71 Hz")
+    noise = np.random.default_rng(1).normal(size=5000)
+    rec = Recording.from_arrays({"gyro_x": noise}, 100.0, {"gyro": "deg/s"}, "", [notice])
+    fit = gmwm.calibrate(rec, WhiteNoise())["gyro_x"]
+    assert not fit.valid
+    assert [name for name, has in fit.reasons.items() if not has] == ["rate_constant"]

@@ -19,6 +19,17 @@ def test_a_hint_follows_the_message():
     assert with_hint(InputError("the rate is missing")) == "the rate is missing"
 
 
+def test_a_mend_is_said_in_the_words_of_the_command_line():
+    error = InputError("there is no rate and no unit", "rate gyro-unit-missing", "give rate=100")
+    assert str(error) == "there is no rate and no unit: give rate=100"
+    assert with_hint(error) == (
+        "there is no rate and no unit: give e.g. --rate 100 --gyro-unit deg/s"
+    )
+    error = InputError("the rates differ", "rate-contradicted", "give time=False")
+    assert with_hint(error) == f"the rates differ: {HINTS['rate-contradicted']}"
+    assert with_hint(InputError("wrong", "unknown-code", "do this")) == "wrong: do this"
+
+
 @pytest.mark.parametrize("code", HINTS)
 def test_every_option_that_is_named_exists(code):
     options = {name for command in cli.commands.values() for p in command.params for name in p.opts}

@@ -177,3 +177,27 @@ def test_infinite_samples_are_refused(value):
     values = np.array([1.0, np.nan, value, 2.0])
     with pytest.raises(InputError, match="'gyro_x' is infinite at index 2: give a number, or NaN"):
         Recording.from_arrays({"gyro_x": values}, 1.0, {"gyro_x": "deg/s"})
+
+
+def test_part_of_a_recording():
+    values = np.arange(1000.0)
+    values[100:110] = np.nan
+    rec = Recording.from_arrays({"gyro_x": values}, 10.0, {"gyro": "rad/s"})
+    assert rec.part() is rec
+    assert rec.part(0.0, 1e9) is rec
+    part = rec.part(20.0, 90.0)
+    np.testing.assert_array_equal(part["gyro_x"].values, values[200:900])
+    assert [notice.code for notice in part.notices] == ["part"]
+    assert part.notices[0].values == {"start": 20.0, "stop": 90.0}
+    assert [notice.code for notice in rec.part(5.0).notices] == ["part", "missing-samples"]
+    for start, stop in ((-1.0, None), (0.0, 6.3), (95.0, None), (np.nan, None), (0.0, np.nan)):
+        with pytest.raises(InputError, match="fewer than 64 samples"):
+            rec.part(start, stop)
+
+
+def test_a_part_of_a_record_whose_rate_changes_is_refused():
+    notice = Notice("rate-changes", "bad", "", "the rate changes")
+    rec = Recording.from_arrays({"gyro_x": np.arange(1e3)}, 10.0, {"gyro": "rad/s"}, "", [notice])
+    assert rec.part() is rec
+    with pytest.raises(InputError, match="cut the file where it changes"):
+        rec.part(0.0, 50.0)

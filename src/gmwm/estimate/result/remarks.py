@@ -31,6 +31,9 @@ REASONS = {
     "no-region": "regions_found",
     "wrong-slope": "slopes_agree",
     "recordings-differ": "recordings_agree",
+    "not-static": "recording_static",
+    "tilt": "attitude_kept",
+    "rate-changes": "rate_constant",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 

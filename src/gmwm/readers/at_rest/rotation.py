@@ -1,0 +1,100 @@
+"""Whether gravity turns in the frame of a sensor as its gyros say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.readers.names import AXES
+from gmwm.readers.recording import Recording
+
+
+@dataclass(frozen=True)
+class TurningGravity:
+    """Changes of the specific force against those that the angular rate explains.
+
+    Attributes
+    ----------
+    factor : float
+        Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
+    explained : float
+        Share of the squared changes that the prediction explains: zero for noise.
+    change : float
+        Root mean square of the predicted changes, m/s^2.
+    """
+
+    factor: float
+    explained: float
+    change: float
+
+
+def triad(recording: Recording, sensor: str) -> FloatArray | None:
+    """Samples of three axes, (n, 3), if the recording has them all."""
+    names = [f"{sensor}_{axis}" for axis in AXES]
+    if not all(name in recording for name in names):
+        return None
+    return np.column_stack([recording[name].values for name in names])
+
+
+def block_means(values: FloatArray, size: int) -> FloatArray:
+    """Means of blocks of ``size`` rows; NaN where three quarters of one are missing.
+
+    Parameters
+    ----------
+    values : (n, k) ndarray
+    size : int
+
+    Returns
+    -------
+    (n // size, k) ndarray
+    """
+    blocks = values.shape[0] // size
+    rows = values[: blocks * size].reshape(blocks, size, values.shape[1])
+    known = ~np.isnan(rows)
+    count = np.count_nonzero(known, axis=1)
+    total = np.sum(np.where(known, rows, 0.0), axis=1)
+    return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
+
+
+def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningGravity | None:
+    """Compare the specific force with the angular rate.
+
+    In the frame of a sensor that turns, gravity changes by da/dt = -w x a. The noises of gyros and
+    accelerometers are independent, so that they explain nothing of each other; a factor other than
+    one is that of a wrong unit. The mean of the rate, which is mostly bias, is left out.
+
+    Parameters
+    ----------
+    recording : Recording
+    size : int
+        Samples of the blocks, between the means of which changes are compared.
+    parts : int, optional
+        Of the record, of which each is compared for itself; the medians are returned.
+
+    Returns
+    -------
+    TurningGravity or None
+        None if an axis is missing or nothing changes.
+    """
+    rate, force = triad(recording, "gyro"), triad(recording, "accel")
+    if rate is None or force is None or recording.n < 4 * size:
+        return None
+    change = np.cross(np.nan_to_num(rate - np.nanmedian(rate, axis=0)), np.nan_to_num(force))
+    # The same means of the integral as of the force: both changes are filtered alike.
+    integral = np.cumsum(change, axis=0) * -recording.dt
+    predicted = np.diff(block_means(integral, size), axis=0)
+    observed = np.diff(block_means(force, size), axis=0)
+    found = []
+    for x, y in zip(np.array_split(predicted, parts), np.array_split(observed, parts), strict=True):
+        known = ~np.isnan(y)
+        squares, product = np.sum(x[known] ** 2), np.sum(x[known] * y[known])
+        total = np.sum(y[known] ** 2)
+        if squares > 0.0 and total > 0.0:
+            change = np.sqrt(squares / np.count_nonzero(known))
+            found.append((product / squares, product**2 / (squares * total), change))
+    if not found:
+        return None
+    factor, explained, change = np.median(found, axis=0)
+    return TurningGravity(float(factor), float(explained), float(change))

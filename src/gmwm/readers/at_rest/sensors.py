@@ -1,0 +1,243 @@
+"""What sensors at rest read: gravity, a small rate, noise of a known order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm as normal
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT, factor
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.at_rest.rotation import block_means, triad, turning_gravity
+from gmwm.readers.names import AXES
+from gmwm.readers.recording import Recording
+
+_GRAVITY = factor("g", SI_UNIT["accel"])
+_EARTH = 7.292115e-5  # rad/s, WGS 84
+_DENSITY = factor("deg/s", SI_UNIT["gyro"])  # rad/s/sqrt(Hz) in deg/s/sqrt(Hz)
+_ACCEL_UNITS = ("m/s^2", "g", "mg", "ug")
+_GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+
+
+def rest_notices(
+    recording: Recording,
+    unit_of: Mapping[str, str],
+    given: Mapping[str, str],
+    are_columns_given: bool,
+) -> tuple[Notice, ...]:
+    """Compare the means and the noise of the sensors with those of sensors at rest.
+
+    Only what contradicts what was assumed and agrees with something else counts: an accelerometer
+    may have no gravity (of data without it), and a gyro may turn.
+
+    Parameters
+    ----------
+    recording : Recording
+    unit_of : mapping of str to str
+        Unit of each channel in the file.
+    given : mapping of str to str
+        Units that the user gave, by channel or sensor.
+    are_columns_given : bool
+        Whether the user said which column is which channel.
+
+    Raises
+    ------
+    InputError
+        If the unit of the accelerometer or the columns are wrong, and were not given.
+    """
+    rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
+    swapped = _swapped(recording, rate, force, are_columns_given)
+    if swapped:
+        return swapped
+    return (*_gravity(recording, force, given), *_gyro_unit(recording, rate))
+
+
+class _Sensor:
+    """Three axes in one unit: their mean and their noise.
+
+    Attributes
+    ----------
+    unit : str
+        In the file.
+    size : float
+        Length of the mean vector, SI.
+    scatter : float
+        Standard deviation of the fast noise of an axis, SI.
+    density : float
+        White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a second
+        leave, so that neither a filter's band nor a drift counts.
+    """
+
+    def __init__(self, unit: str, values: FloatArray, dt: float) -> None:
+        self.unit = unit
+        self.size = float(np.linalg.norm(np.nanmean(values, axis=0)))
+        second = max(round(1.0 / dt), 1)
+        fast, slow = _steps(values), _steps(block_means(values, second))
+        self.scatter = float(np.max(fast))
+        densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
+        self.density = float(np.max(densities))
+
+    @classmethod
+    def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
+        """None if an axis is missing or empty, or the axes have several units."""
+        values = triad(recording, sensor)
+        units = {unit_of[name] for name in unit_of if name in {f"{sensor}_{a}" for a in AXES}}
+        if values is None or len(units) > 1 or np.any(np.all(np.isnan(values), axis=0)):
+            return None
+        found = cls(units.pop(), values, recording.dt)
+        return found if found.size > 0.0 else None
+
+
+def _steps(values: FloatArray) -> FloatArray:
+    """Robust standard deviation of white noise from differences, axis by axis; 0 if unknown."""
+    steps = np.abs(np.diff(values, axis=0))
+    found = np.zeros(values.shape[1])
+    for axis, column in enumerate(steps.T):
+        known = column[~np.isnan(column)]
+        if known.size:
+            found[axis] = np.median(known) / (normal.ppf(0.75) * math.sqrt(2.0))
+    return found
+
+
+def _is_gravity(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> bool:
+    return abs(length / _GRAVITY - 1.0) < tolerance
+
+
+def _gravity_units(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> list[str]:
+    """Units in which a number of the file is gravity."""
+    return [
+        unit
+        for unit in _ACCEL_UNITS
+        if _is_gravity(length * factor(unit, SI_UNIT["accel"]), tolerance)
+    ]
+
+
+def _swapped(
+    recording: Recording, rate: _Sensor | None, force: _Sensor | None, are_columns_given: bool
+) -> tuple[Notice, ...]:
+    """Gravity in the gyro's columns, and none in the accelerometer's."""
+    if rate is None or force is None:
+        return ()
+    in_file = rate.size / factor(rate.unit, SI_UNIT["gyro"])
+    units = _gravity_units(in_file, tuning.GRAVITY_SURE)
+    other = force.size / factor(force.unit, SI_UNIT["accel"])
+    if not units or _gravity_units(other) or rate.scatter > tuning.GRAVITY_NOISE * rate.size:
+        return ()
+    text = (
+        f"the mean of the gyro's columns is {in_file:.4g} long, gravity in {units[0]}, and "
+        f"that of the accelerometer's {other:.4g}, which is not: the two are swapped"
+    )
+    if not are_columns_given:
+        raise InputError(
+            f"{recording.source}: {text}",
+            "channels-swapped",
+            'give the columns, e.g. channels={"accel_x": 0, "gyro_x": 3}',
+        )
+    values = {"gyro": rate.size, "accel": force.size, "likely": units[0]}
+    return (Notice("swapped", "bad", "", text, values, "check which column is which channel"),)
+
+
+def _gravity(
+    recording: Recording, force: _Sensor | None, given: Mapping[str, str]
+) -> tuple[Notice, ...]:
+    """A mean that is no gravity in the unit used, but is in another one."""
+    if force is None:
+        return ()
+    in_file = force.size / factor(force.unit, SI_UNIT["accel"])
+    likely = _gravity_units(in_file)
+    if _is_gravity(force.size) or not likely:
+        return ()
+    text = (
+        f"the mean of the accelerometer is {in_file:.4g} {force.unit} long, which is gravity in "
+        f"{likely[0]}"
+    )
+    if not any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES))):
+        raise InputError(
+            f"{recording.source}: {text}",
+            "accel-unit-missing",
+            f'give the unit, units={{"accel": "{likely[0]}"}}',
+        )
+    values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
+    off = _GRAVITY / force.size
+    action = f"check the unit: everything of the accelerometer is off by {off:.4g}"
+    return (Notice("gravity", "bad", "accel", text, values, action),)
+
+
+def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]:
+    """A unit that the noise, the mean, the earth's rate or turning gravity contradicts."""
+    if rate is None:
+        return ()
+    ratios = {
+        unit: factor(unit, SI_UNIT["gyro"]) / factor(rate.unit, SI_UNIT["gyro"])
+        for unit in _GYRO_UNITS
+    }
+    others = {unit: ratio for unit, ratio in ratios.items() if abs(math.log(ratio)) > 0.1}
+    found = _by_turning(recording, others) or _by_size(rate, others) or _by_earth(rate, others)
+    if found is None:
+        return ()
+    text, likely = found
+    values: dict[str, Any] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
+    action = "check the unit and the sampling rate"
+    if likely:
+        values["likely"] = likely[0]
+        action = f"{action}: {' or '.join(likely)}, not {rate.unit}, would explain it"
+    return (Notice("gyro-unit", "warning", "gyro", text, values, action),)
+
+
+def _by_turning(recording: Recording, others: Mapping[str, float]) -> tuple[str, list[str]] | None:
+    found = turning_gravity(recording, max(round(1.0 / recording.dt), 1))
+    if found is None or found.explained < tuning.TURNING_EXPLAINED:
+        return None
+    for unit, ratio in others.items():
+        if abs(math.log(abs(found.factor) / ratio)) < tuning.TURNING_AGREES:
+            text = f"gravity turns {found.factor:.3g} times as fast as the gyros read"
+            return text, [unit]
+    return None
+
+
+def _by_size(rate: _Sensor, others: Mapping[str, float]) -> tuple[str, list[str]] | None:
+    """Noise or a mean larger than that of any gyro, or a mean that belies the noise."""
+    if not _is_plausible(rate.density, rate.size):
+        likely = [
+            unit
+            for unit, ratio in others.items()
+            if ratio < 1.0 and _is_plausible(rate.density * ratio, rate.size * ratio)
+        ]
+        if rate.density > tuning.NOISIEST_GYRO:
+            text = f"white noise of {rate.density / _DENSITY:.3g} deg/s/sqrt(Hz)"
+        else:
+            text = f"a mean rate of {rate.size / _DENSITY:.3g} deg/s"
+        # Units that differ by less than gyros do cannot be distinguished.
+        near = [
+            unit
+            for unit in likely
+            if abs(math.log(others[unit] / others[likely[0]])) < math.log(tuning.UNITS_APART)
+        ]
+        return f"{text} is more than gyros at rest have", near
+    if 0.0 < rate.density < tuning.QUIET_GYRO and rate.size > tuning.QUIET_BIAS:
+        likely = [unit for unit, ratio in others.items() if 10.0 < ratio < 100.0]
+        text = (
+            f"white noise of {60.0 * rate.density / _DENSITY:.2g} deg/sqrt(h) is that of a fibre-"
+            f"optic gyro, and a mean rate of {3600.0 * rate.size / _DENSITY:.3g} deg/h is not"
+        )
+        return text, likely
+    return None
+
+
+def _is_plausible(density: float, mean: float) -> bool:
+    return density < tuning.NOISIEST_GYRO and mean < tuning.LARGEST_BIAS
+
+
+def _by_earth(rate: _Sensor, others: Mapping[str, float]) -> tuple[str, list[str]] | None:
+    """The earth's rate, in another unit."""
+    for unit, ratio in others.items():
+        is_quiet = 0.0 < rate.density * ratio < tuning.EARTH_SEEN
+        if is_quiet and abs(rate.size * ratio / _EARTH - 1.0) < tuning.EARTH_AGREES:
+            return f"the mean rate is that of the earth in {unit}", [unit]
+    return None

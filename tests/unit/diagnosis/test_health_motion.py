@@ -1,0 +1,206 @@
+"""Recordings that moved: when, and when they did not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.diagnosis.motion import find_motion
+
+RATE = 100.0
+GRAVITY = 9.80665
+BIAS = np.radians([0.4, -0.4, -0.3])
+
+
+def turned(rate, attitude=(0.0, 0.0, GRAVITY)):
+    """Gravity in the frame of a sensor that turns at ``rate`` (n, 3), rad/s."""
+    force = np.empty((rate.shape[0], 3))
+    now = np.array(attitude)
+    turning = np.any(rate, axis=1)
+    for k, w in enumerate(rate):
+        force[k] = now
+        if turning[k]:
+            angle = np.linalg.norm(w) / RATE
+            axis = -w / np.linalg.norm(w)
+            # Rodrigues' formula.
+            now = (
+                now * np.cos(angle)
+                + np.cross(axis, now) * np.sin(angle)
+                + axis * (axis @ now) * (1.0 - np.cos(angle))
+            )
+    return force
+
+
+def turn(n, start, stop, speed, axis):
+    rate = np.zeros((n, 3))
+    rate[int(start * RATE) : int(stop * RATE)] = np.radians(speed) * np.array(axis, dtype=float)
+    return rate
+
+
+@pytest.fixture
+def moved(record):
+    """A six-axis recording of a sensor that turns at a given rate, with the noise of a MEMS."""
+
+    def _moved(rate, seed=0, gyro=3e-3, accel=2e-2, only=""):
+        rng = np.random.default_rng(seed)
+        n = rate.shape[0]
+        series = {
+            "gyro": rate + BIAS + gyro * rng.normal(size=(n, 3)),
+            "accel": turned(rate) + accel * rng.normal(size=(n, 3)),
+        }
+        return record(
+            **{
+                f"{sensor}_{axis}": values[:, i]
+                for sensor, values in series.items()
+                for i, axis in enumerate("xyz")
+                if sensor.startswith(only)
+            }
+        )
+
+    return _moved
+
+
+@pytest.mark.parametrize(("seed", "only"), [(0, ""), (1, ""), (2, "gyro")])
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.6, 0, 0.8)])
+def test_a_turn_and_the_stretches_before_and_after(moved, seed, only, axis):
+    found = gmwm.health(moved(turn(30_000, 100, 200, 60.0, axis), seed, only=only))
+    assert [n.code for n in found.notices if n.severity == "bad"] == ["not-static"]
+    (notice,) = found.of(code="not-static")
+    assert notice.values["rate"] == pytest.approx(np.radians(60.0), rel=0.01)
+    motion = find_motion(moved(turn(30_000, 100, 200, 60.0, axis), seed, only=only))
+    (first, second) = motion.static
+    assert first == (0.0, pytest.approx(97.0, abs=3.0))
+    assert second == (pytest.approx(203.0, abs=3.0), 300.0)
+    assert not found.of(code="clean")
+
+
+@pytest.mark.parametrize("start", [100, 150])
+def test_most_of_the_record_may_turn(moved, start):
+    (stretch,) = find_motion(moved(turn(30_000, start, 300, 60.0, (0, 0, 1)))).static
+    assert stretch == (0.0, pytest.approx(start, abs=6.0))
+
+
+@pytest.mark.parametrize("angle", [5.0, -2.0, 20.0])
+@pytest.mark.parametrize("only", ["", "accel"])
+def test_a_tilt_is_no_spike(moved, angle, only):
+    rec = moved(turn(30_000, 150, 151, angle, (0.6, 0.8, 0)), only=only)
+    found = gmwm.health(rec)
+    assert [n.code for n in found.notices if n.severity == "bad"] == ["tilt"]
+    (notice,) = found.of(code="tilt")
+    assert notice.values["angle"] == pytest.approx(np.radians(abs(angle)), rel=0.05)
+    assert notice.values["time"] == pytest.approx(150.5, abs=2.0)
+    assert notice.values["stop"] - notice.values["start"] == pytest.approx(146.0, abs=4.0)
+    assert not found.of(code="event")
+    # The turn itself is left out of the gyros from its begin to its end.
+    if not only:
+        masked = found.masked(rec)["gyro_x"].values[15_000:15_100]
+        assert np.all(np.isnan(masked))
+
+
+def test_a_shock_is_no_motion(moved):
+    rate = turn(30_000, 150, 150.15, 100.0, (1, 0, 0))
+    rate += turn(30_000, 150.15, 150.3, -100.0, (1, 0, 0))
+    found = gmwm.health(moved(rate))
+    assert not [n for n in found.notices if n.severity == "bad"]
+    assert found.of("gyro_x", "event")
+
+
+def test_handling_by_hand(moved):
+    rng = np.random.default_rng(5)
+    rate = np.zeros((30_000, 3))
+    box = np.ones(100) / 100.0
+    for i in range(3):
+        rate[10_000:20_000, i] = np.convolve(rng.normal(size=10_000), box, mode="same") * 3.0
+    motion = find_motion(moved(rate))
+    assert [np.round(stretch, -1).tolist() for stretch in motion.static] == [[0, 100], [200, 300]]
+    # All of the time: by gravity, which turns as the gyros say, or by gyros alone.
+    rate = np.tile(rate[10_000:20_000], (2, 1))
+    for only in ("", "gyro"):
+        motion = find_motion(moved(rate, only=only))
+        assert motion.static == ()
+        assert [(move.start, move.stop) for move in motion.moves] == [(0.0, 200.0)]
+
+
+def test_a_boat_sways(moved):
+    t = np.arange(30_000) / RATE
+    rate = np.radians(0.6) * np.cos(2.0 * np.pi * t / 8.0)[:, np.newaxis] * [1.0, 0.0, 0.0]
+    found = gmwm.health(moved(rate))
+    (notice,) = found.of(code="not-static")
+    assert "start" not in notice.values
+    # Gyros that move and accelerometers that do not are no motion, but a fault or a vibration.
+    still = moved(np.zeros((30_000, 3)))
+    both = gmwm.Recording(
+        (*moved(rate, only="gyro").channels, *(still[f"accel_{a}"] for a in "xyz"))
+    )
+    assert not gmwm.health(both).of(code="not-static")
+
+
+def test_a_slow_tilt(moved):
+    motion = find_motion(moved(turn(30_000, 0, 300, 5.0 / 300.0, (1, 0, 0))))
+    (move,) = motion.moves
+    assert move.tilt == pytest.approx(np.radians(5.0), rel=0.05)
+    assert not move.is_tilt
+    assert motion.static == ()
+
+
+def test_missing_samples_hide_no_tilt(moved):
+    rec = moved(turn(30_000, 150, 151, 5.0, (1, 0, 0)))
+    for channel in rec.values():
+        channel.values[14_500:16_500] = np.nan
+        channel.values[::3] = np.nan
+    (move,) = find_motion(rec).moves
+    assert move.is_tilt
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    "noise",
+    [
+        WhiteNoise(3e-2),
+        WhiteNoise(1e-4) + RandomWalk(3e-3),
+        BiasInstability(1e-2),
+        WhiteNoise(1e-4) + GaussMarkov(0.02, 5.0),
+        WhiteNoise(1e-4) + RateRamp(5e-5),
+    ],
+    ids=str,
+)
+def test_noise_and_drift_are_no_motion(record, noise, seed):
+    # Far beyond what sensors have: the levels change by more than a degree per second.
+    rng = np.random.default_rng(seed)
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    series = {name: noise.simulate(30_000, 0.01, rng) for name in names}
+    series["accel_z"] += GRAVITY
+    assert find_motion(record(**series)).moves == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
+    rng = np.random.default_rng(seed)
+    series = {f"accel_{a}": RandomWalk(3e-2).simulate(30_000, 0.01, rng) for a in "xyz"}
+    angle = np.hypot(series["accel_x"][-1], series["accel_y"][-1]) / GRAVITY
+    assert angle > np.radians(0.5)
+    series["accel_z"] += GRAVITY
+    assert find_motion(record(**series)).moves == ()
+
+
+def test_too_short_to_be_examined(record):
+    step = np.repeat([0.0, 1.0], 1000)
+    assert find_motion(record(gyro_x=step)).moves == ()
+
+
+def test_fits_of_what_moved_are_not_valid(moved):
+    cal = gmwm.calibrate(moved(turn(30_000, 100, 200, 60.0, (0, 0, 1))), WhiteNoise())
+    assert not any(fit.valid or fit.reasons["recording_static"] for fit in cal.values())
+    assert "not-static" in {notice.code for notice in cal.notices}
+    cal = gmwm.calibrate(moved(turn(30_000, 150, 151, 5.0, (1, 0, 0))), WhiteNoise())
+    kept = {name: fit.reasons["attitude_kept"] for name, fit in cal.items()}
+    assert kept == {name: name.startswith("gyro") for name in cal}
+    again = gmwm.calibration.Calibration.from_content(cal.content())
+    assert [fit.valid for fit in again.values()] == [fit.valid for fit in cal.values()]
+
+
+def test_static_stretches_alone_are_valid(moved):
+    cal = gmwm.calibrate(moved(np.zeros((30_000, 3))), WhiteNoise())
+    assert all(fit.valid for fit in cal.values())
