@@ -1,5 +1,21 @@
 """The exceptions and warnings of the package."""
 
+_LONGEST = 800  # characters of a message: it may list names, and quotes no document
+
+
+def printable(text: str) -> str:
+    """A text on one line: blanks for line ends, escapes for what a terminal would obey.
+
+    Names from files are untrusted: they may hold control characters, halves of surrogate pairs
+    (file names that are not UTF-8) or marks that turn the direction of writing.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() else " " if each in "\t\n\r" else ascii(each)[1:-1]
+        for each in text
+    )
+
 
 class InputError(ValueError):
     """What the user gave cannot be used.
@@ -16,7 +32,8 @@ class InputError(ValueError):
     """
 
     def __init__(self, text: str, code: str = "") -> None:
-        super().__init__(text)
+        text = printable(text)
+        super().__init__(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
         self.code = code
 
 

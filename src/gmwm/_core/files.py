@@ -58,7 +58,7 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If nothing is there, or a directory.
+        If nothing is there, or no file: a directory, a pipe or a device.
     """
     found = Path(path)
     try:
@@ -67,6 +67,11 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
     if stat.S_ISDIR(mode):
         raise InputError(f"{path} is a directory: name a file in it")
+    if not stat.S_ISREG(mode):
+        raise InputError(
+            f"{path} is a pipe or a device, which can be read only once: write its content to a "
+            "file first"
+        )
     return found
 
 

@@ -20,6 +20,8 @@ from gmwm.readers import Recording
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 _INDENT = 11
 
 
@@ -69,15 +71,15 @@ class ChannelHealth:
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> ChannelHealth:
-        """Inverse of `dataclasses.asdict`, after a round trip through JSON."""
-        repeated = content.get("repetition")
+        """Inverse of `dataclasses.asdict`, after a round trip through JSON and its form."""
+        repeated = content["repetition"]
         return cls(
-            lines=tuple((float(f), float(a)) for f, a in content["lines"]),
-            resonances=tuple((float(f), float(d)) for f, d in content["resonances"]),
-            events=tuple((int(start), int(stop)) for start, stop in content["events"]),
-            lsb=float(content["lsb"]),
-            outliers=float(content["outliers"]),
-            repetition=repeated and Repetition(int(repeated["times"]), int(repeated["first"])),
+            lines=tuple(content["lines"]),
+            resonances=tuple(content["resonances"]),
+            events=tuple(content["events"]),
+            lsb=content["lsb"],
+            outliers=content["outliers"],
+            repetition=repeated and Repetition(repeated["times"], repeated["first"]),
         )
 
 
@@ -234,16 +236,22 @@ class Health(Document):
         }
 
     @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.diagnosis.form import HealthForm
+
+        return HealthForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         return cls(
             notices=tuple(map(Notice.from_dict, content["notices"])),
             channels={
-                str(name): ChannelHealth.from_content(item)
+                name: ChannelHealth.from_content(item)
                 for name, item in content["channels"].items()
             },
-            source=str(content["source"]),
-            rate=float(content["rate_hz"]),
-            n=int(content["n"]),
+            source=content["source"],
+            rate=content["rate_hz"],
+            n=content["n"],
         )
 
 

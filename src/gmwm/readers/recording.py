@@ -11,7 +11,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
-from gmwm.errors import InputError, MissingNameError
+from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.readers import tuning
 
 READING = frozenset(
@@ -47,6 +47,10 @@ class Channel:
     dt: float
     quantity: str | None = None
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("name", "unit"):
+            object.__setattr__(self, name, printable(getattr(self, name)))
 
     @property
     def is_auxiliary(self) -> bool:
@@ -111,6 +115,9 @@ class Recording(Mapping[str, Channel]):
     source: str = ""
     notices: tuple[Notice, ...] = ()
     jitter: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", printable(self.source))
 
     @classmethod
     def from_arrays(
