@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from io import TextIOWrapper
 
 import click
 
 from gmwm import __version__
+from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.demo import demo
@@ -14,7 +16,7 @@ from gmwm.cli.health import health
 from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
 from gmwm.cli.reproduce import reproduce
-from gmwm.errors import InputError
+from gmwm.errors import InputError, printable
 
 _EXIT_INPUT = 2
 
@@ -31,15 +33,22 @@ for _command in (calibrate, demo, budget, health, navigate, reproduce):
 
 def main() -> None:
     """Entry point: bad input is one sentence and exit code 2, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # What the encoding of a terminal lacks is written as an escape.
+            stream.reconfigure(errors="backslashreplace")
     try:
         cli.main(standalone_mode=False)
     except InputError as error:
         click.echo(f"gmwm: {with_hint(error)}", err=True)
         sys.exit(_EXIT_INPUT)
+    except MemoryError:
+        click.echo(f"gmwm: {OUT_OF_MEMORY}", err=True)
+        sys.exit(_EXIT_INPUT)
     except click.exceptions.Exit as error:
         sys.exit(error.exit_code)
     except click.ClickException as error:
-        click.echo(f"gmwm: {error.format_message()}", err=True)
+        click.echo(f"gmwm: {printable(error.format_message())}", err=True)
         sys.exit(_EXIT_INPUT)
     except click.Abort:
         click.echo("gmwm: interrupted, no file is half-written", err=True)

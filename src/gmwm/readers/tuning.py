@@ -13,6 +13,10 @@ GRAVITY_AGREES = 0.1
 """Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
 are a few per cent, units differ by a factor of ten."""
 
+BYTES_PER_SAMPLE = 20
+"""Of memory while a file is read: a column as it is read, the same in SI units, and one of the
+others joined from its blocks."""
+
 # -- the clock ------------------------------------------------------------------------------------
 
 RATES_AGREE = 0.01
