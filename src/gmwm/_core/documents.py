@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from gmwm._core import checks
-from gmwm._core.files import existing_file, written
+from gmwm._core.files import opened, written
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         If the file is missing or too large, is not JSON, or is nested too deeply.
     """
     try:
-        with existing_file(path).open("rb") as stream:
+        with opened(path) as stream:
             text = stream.read(_LARGEST + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None

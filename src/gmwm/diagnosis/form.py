@@ -9,6 +9,8 @@ from pydantic import Field, model_validator
 
 from gmwm._core.forms import Form, NotNegative, Notices, Positive, Rate, Samples, Text
 
+_OR_LIST = Field(strict=False)  # JSON has no tuples
+
 Index = Annotated[int, Field(ge=0)]
 
 
@@ -28,9 +30,9 @@ class RepetitionForm(Form):
 class ChannelHealthForm(Form):
     """Of `ChannelHealth`."""
 
-    lines: Sequence[tuple[Positive, NotNegative]]
-    resonances: Sequence[tuple[Positive, Positive]]
-    events: Sequence[tuple[Index, Samples]]
+    lines: Sequence[Annotated[tuple[Positive, NotNegative], _OR_LIST]]
+    resonances: Sequence[Annotated[tuple[Positive, Positive], _OR_LIST]]
+    events: Sequence[Annotated[tuple[Index, Samples], _OR_LIST]]
     lsb: NotNegative
     outliers: Annotated[float, Field(ge=0.0, le=1.0)]
     repetition: RepetitionForm | None

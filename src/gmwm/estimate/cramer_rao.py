@@ -111,10 +111,12 @@ class CramerRao(Document):
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
-        keys = tuple(content["keys"])
+        keys, model = tuple(content["keys"]), model_from_list(content["model"])
+        if not {*keys} <= {*model.params}:
+            raise InputError(f"its keys are not those of its model {model!r}")
         shape = (len(keys), len(keys))
         return cls(
-            model=model_from_list(content["model"]),
+            model=model,
             n=content["n"],
             dt=content["dt_s"],
             keys=keys,

@@ -80,6 +80,12 @@ def read(
     stated = _stated_rate(table, rate)
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
+    if not roles.channels:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
     # Complain before a long file is read, not after.
     if roles.time is None:
         _required_rate(table, stated)

@@ -79,12 +79,22 @@ class Channel:
         return float(np.nansum(self.values)) / present if present else np.nan
 
     @property
-    def is_constant(self) -> bool:
-        """Whether every sample that is there has the same value: a dead channel."""
+    def spread(self) -> float:
+        """Largest less smallest of the samples that are there, u; zero if none is."""
         values = np.asarray(self.values, dtype=float)
         # fmin and fmax pass over NaN.
         lowest = np.fmin.reduce(values, initial=np.inf)
-        return not lowest < np.fmax.reduce(values, initial=-np.inf)
+        return max(float(np.fmax.reduce(values, initial=-np.inf) - lowest), 0.0)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether every sample that is there has the same value: a dead channel."""
+        return self.spread == 0.0
+
+    @property
+    def is_of_a_sensor(self) -> bool:
+        """Whether it varies by as much as the noise of a sensor may, by many decades."""
+        return tuning.LEAST_SPREAD < self.spread < tuning.LARGEST_SPREAD
 
     def __str__(self) -> str:
         missing = self.missing

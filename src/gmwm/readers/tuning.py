@@ -13,6 +13,9 @@ GRAVITY_AGREES = 0.1
 """Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
 are a few per cent, units differ by a factor of ten."""
 
+LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
+"""u: fourth powers of the data must not overflow."""
+
 BYTES_PER_SAMPLE = 20
 """Of memory while a file is read: a column as it is read, the same in SI units, and one of the
 others joined from its blocks."""

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gmwm._core import checks
-from gmwm._core.files import existing_file
+from gmwm._core.files import opened
 from gmwm.errors import InputError
 
 _LARGEST = 1 << 20
-"""Characters of a document that a person writes."""
+"""Bytes of a document that a person writes."""
 
 
 def read_document(path: Path) -> dict[str, Any]:
@@ -27,11 +27,11 @@ def read_document(path: Path) -> dict[str, Any]:
         If it cannot be read, is not YAML or not a mapping, or has a key twice.
     """
     try:
-        with existing_file(path).open(encoding="utf-8-sig") as stream:
+        with opened(path) as stream:
             text = stream.read(_LARGEST + 1)
         if len(text) > _LARGEST:
-            raise InputError(f"{path}: has more than {_LARGEST:,} characters: check the path")
-        content = _load(text)
+            raise InputError(f"{path}: has more than {_LARGEST:,} bytes: check the path")
+        content = _load(text.decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
     except InputError:
@@ -73,5 +73,6 @@ def _reason(error: Exception) -> str:
     problem = getattr(error, "problem", None)
     if mark is None or problem is None:
         text = checks.shown(" ".join(str(error).split())).strip("'\"")
-    return text if isinstance(error, ValueError | yaml.YAMLError) else f"a value does not fit its tag: {text}"
+        fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
+        return text if fits else f"a value does not fit its tag, {text}"
     return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
