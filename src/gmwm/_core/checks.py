@@ -26,12 +26,19 @@ _REPR.maxlevel, _REPR.maxstring, _REPR.maxother, _REPR.maxlong = 3, 200, 200, 20
 
 def shown(value: Any) -> str:
     """A value as messages quote it: one short line."""
-    return textwrap.shorten(_REPR.repr(value), 60, placeholder=" ...")
+    return _cut(_REPR.repr(value), 60)
 
 
 def line(text: str) -> str:
     """A text of others, such as another library's message, as messages quote it: one short line."""
-    return textwrap.shorten(text, 120, placeholder=" ...")
+    return _cut(text, 120)
+
+
+def _cut(text: str, length: int) -> str:
+    words = textwrap.shorten(text, length, placeholder=" ...")
+    if len(words) > length // 2 or len(text) <= length:
+        return words
+    return f"{text[: length - 4]} ..."  # of one long word nothing would be left
 
 
 def is_number(value: Any) -> bool:
