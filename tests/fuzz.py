@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - tables of hostile values
 """Damaged inputs: every file that gmwm reads, mutated, is used or refused in one sentence.
 
 ``python tests/fuzz.py --cases 70000`` draws as many over all kinds of files, prints how many were
@@ -260,7 +261,11 @@ def yaml_text(rng: random.Random, text: str) -> bytes:
 def archive(rng: random.Random) -> bytes:
     """An NPZ file with odd entries."""
     rows, stream = noise(), io.BytesIO()
-    entries: dict[str, Any] = {"t": 0.01 * np.arange(len(rows)), "gyro": rows[:, :3], "ax": rows[:, 3]}
+    entries: dict[str, Any] = {
+        "t": 0.01 * np.arange(len(rows)),
+        "gyro": rows[:, :3],
+        "ax": rows[:, 3],
+    }
     odd = (
         np.float32(3), rows.astype(complex), rows > 0, np.array(["a"] * len(rows)), rows[:, :, None],
         np.zeros((0, 3)), np.zeros(len(rows), "M8[s]"), rows.astype(np.float16), rows[::-1, :3],
@@ -301,7 +306,9 @@ class Kind:
     use: Callable[[random.Random, Path], Any]
 
 
-def file_of(name: str, make: Callable[[random.Random], bytes]) -> Callable[[random.Random, Path], Path]:
+def file_of(
+    name: str, make: Callable[[random.Random], bytes]
+) -> Callable[[random.Random, Path], Path]:
     def write(rng: random.Random, folder: Path) -> Path:
         path = folder / name
         path.write_bytes(make(rng))
@@ -481,12 +488,12 @@ class Tally:
     failures: int = 0
 
 
-class Slow(Exception):
+class TooSlowError(Exception):
     """An input that takes too long."""
 
 
 def _too_slow(*_: Any) -> None:
-    raise Slow(f"more than {SECONDS} s")
+    raise TooSlowError(f"more than {SECONDS} s")
 
 
 def attempt(name: str, seed: int, case: int, folder: Path) -> str | None:

@@ -101,7 +101,9 @@ def samples(value: Any, least: int = 1) -> int:
         mend = f"give an integer number of samples, {least} or more"
     n = whole("n", value, least, mend)
     if n > MOST_SAMPLES:
-        raise InputError(f"n = {shown(value)}: that is too long, give at most {MOST_SAMPLES:,} samples")
+        raise InputError(
+            f"n = {shown(value)}: that is too long, give at most {MOST_SAMPLES:,} samples"
+        )
     return n
 
 
@@ -110,7 +112,9 @@ def sampling_interval(value: Any) -> float:
     mend = "give a positive sampling interval in seconds"
     dt = positive("dt", value, mend)
     if not SHORTEST_INTERVAL <= dt <= LONGEST_INTERVAL:
-        raise InputError(f"dt = {shown(value)}: {mend}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}")
+        raise InputError(
+            f"dt = {shown(value)}: {mend}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}"
+        )
     return dt
 
 

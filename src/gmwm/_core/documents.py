@@ -83,8 +83,8 @@ class Document:
         version = content.get("schema_version")
         if version != cls.SCHEMA_VERSION:
             raise InputError(
-                f"schema version {checks.shown(version)} is not known here (known is {cls.SCHEMA_VERSION}): "
-                f"make the {what} again or update gmwm"
+                f"schema version {checks.shown(version)} is not known here (known is "
+                f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
             )
         try:
             return cls.from_content(cls.form().checked(content))

@@ -289,8 +289,8 @@ def _on_cluster(
         client = Client(address, timeout="10s")
     except TypeError as error:  # what distributed raises for tls:// without certificates
         raise InputError(
-            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its certificates, "
-            "distributed.comm.tls in its configuration"
+            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its "
+            "certificates, distributed.comm.tls in its configuration"
         ) from None
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None

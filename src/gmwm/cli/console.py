@@ -19,9 +19,7 @@ def new_console(width: int | None = None) -> Console:
 
     # Piped output is as wide as a terminal that people use, not as rich guesses. Names come from
     # files: brackets and colons in them are no markup.
-    return Console(
-        width=width or (None if sys.stdout.isatty() else 80), markup=False, emoji=False
-    )
+    return Console(width=width or (None if sys.stdout.isatty() else 80), markup=False, emoji=False)
 
 
 def print_whole(console: Console, table: Table) -> None:

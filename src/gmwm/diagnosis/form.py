@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from gmwm._core.forms import Form, NotNegative, Notices, Positive, Rate, Samples, Text
+from gmwm._core.forms import Form, Notices, NotNegative, Positive, Rate, Samples, Text
 
 _OR_LIST = Field(strict=False)  # JSON has no tuples
 

@@ -246,8 +246,7 @@ class Health(Document):
         return cls(
             notices=tuple(map(Notice.from_dict, content["notices"])),
             channels={
-                name: ChannelHealth.from_content(item)
-                for name, item in content["channels"].items()
+                name: ChannelHealth.from_content(item) for name, item in content["channels"].items()
             },
             source=content["source"],
             rate=content["rate_hz"],

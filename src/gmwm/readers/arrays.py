@@ -263,12 +263,15 @@ def _columns_of_array(source: str, array: _Array) -> list[_Column]:
     if array.like.ndim == 2:
         return _unnamed(source, array)
     raise InputError(
-        f"{source} has shape {array.like.shape}: save samples along rows, one column for each channel"
+        f"{source} has shape {array.like.shape}: save samples along rows, one column for each "
+        "channel"
     )
 
 
 def _columns_of_fields(array: _Array) -> list[_Column]:
-    return [pair for name in array.like.dtype.names or () for pair in _axes_or_itself(name, array[name])]
+    return [
+        pair for name in array.like.dtype.names or () for pair in _axes_or_itself(name, array[name])
+    ]
 
 
 def _columns_of_entries(source: str, entries: Mapping[str, _Array]) -> list[_Column]:
@@ -298,7 +301,9 @@ def _unnamed(source: str, array: _Array) -> list[_Column]:
 
 def _is_triad(name: str, array: _Array) -> bool:
     """Whether an array holds the three axes of a sensor, by its name."""
-    return array.like.ndim == 2 and array.like.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
+    return (
+        array.like.ndim == 2 and array.like.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
+    )
 
 
 def _axes_or_itself(name: str, array: _Array) -> list[_Column]:

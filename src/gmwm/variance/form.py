@@ -48,9 +48,7 @@ class WaveletVarianceForm(Form):
     variance: Annotated[Sequence[NotNegative], Field(min_length=1, max_length=64)]
     mean: Levels
     block: Samples
-    blocks: Annotated[
-        Sequence[float | None], Field(min_length=1, max_length=tuning.MOST_BLOCKS)
-    ]
+    blocks: Annotated[Sequence[float | None], Field(min_length=1, max_length=tuning.MOST_BLOCKS)]
     wavelet: Text
     efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
     driftless: Levels | None
@@ -61,7 +59,9 @@ class WaveletVarianceForm(Form):
     def _together(self) -> Self:
         size = len(self.tau)
         complete = (
-            self.n.bit_length() - 1 if self.wavelet == "haar" else wavelet(self.wavelet).levels(self.n)
+            self.n.bit_length() - 1
+            if self.wavelet == "haar"
+            else wavelet(self.wavelet).levels(self.n)
         )
         if size > complete or (self.gaps is None and size < complete):
             raise ValueError(f"{size} levels where {self.n:,} samples have {complete}")
@@ -74,7 +74,9 @@ class WaveletVarianceForm(Form):
         if self.block * len(self.blocks) > self.n:
             raise ValueError("blocks hold more samples than there are")
         if self.gaps is not None:
-            if self.gaps.missing >= self.n or not size == len(self.gaps.counts) == len(self.gaps.change):
+            if self.gaps.missing >= self.n or not size == len(self.gaps.counts) == len(
+                self.gaps.change
+            ):
                 raise ValueError("gaps are those of another series")
             covariance(self.gaps.inflation, size, "inflation")
         if self.data_covariance is not None:

@@ -101,7 +101,9 @@ def test_a_wrong_value_is_named_with_its_place(stored, tmp_path, kind, place, va
     assert words in refusal(path)
 
 
-@pytest.mark.parametrize("kind", ["calibration", "joint", "health", "selection", "bootstrap", "bound"])
+@pytest.mark.parametrize(
+    "kind", ["calibration", "joint", "health", "selection", "bootstrap", "bound"]
+)
 def test_every_result_comes_back(stored, tmp_path, kind):
     result = stored[kind]
     path = result.save(tmp_path / "stored.json")

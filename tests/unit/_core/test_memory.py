@@ -23,7 +23,7 @@ def test_the_user_may_say_how_much(monkeypatch):
 @pytest.mark.parametrize("text", ["", "much", "0", "-1", "nan", "inf", "1e12"])
 def test_what_is_no_amount(monkeypatch, text):
     monkeypatch.setenv(memory.VARIABLE, text)
-    with pytest.raises(InputError, match="GMWM_MEMORY = .*: give a positive number of gigabytes"):
+    with pytest.raises(InputError, match=r"GMWM_MEMORY = .*: give a positive number of gigabytes"):
         memory.budget()
 
 

@@ -35,7 +35,7 @@ def little(monkeypatch):
 
 
 def refused(path, **options):
-    with pytest.raises(InputError, match="GB of memory, and 0.01 GB may be used") as caught:
+    with pytest.raises(InputError, match=r"GB of memory, and 0.01 GB may be used") as caught:
         read(path, rate=100, units=UNITS, **options)
     assert str(caught.value).startswith(path.name)
 
