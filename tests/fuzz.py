@@ -111,7 +111,7 @@ def mutated_json(rng: random.Random, text: str) -> bytes:
     if rng.random() < 0.15:
         return mutated_text(rng, text.encode())
     content = json.loads(text)
-    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+    for _ in range(rng.choice((0, 1, 1, 1, 2, 3))):
         content = _changed(rng, content)
     return json.dumps(content).encode()
 
@@ -146,7 +146,7 @@ def _replaced(rng: random.Random, value: Any) -> Any:
 
 def mutated_bytes(rng: random.Random, data: bytes) -> bytes:
     """Bytes of a binary file, most often near its ends, where the headers are."""
-    for _ in range(rng.choice((1, 1, 2, 4))):
+    for _ in range(rng.choice((0, 1, 1, 2, 4))):
         u = rng.random()
         place = int(len(data) * rng.choice((u, u**3, 1.0 - u**3)))
         new = rng.choice((b"", rng.randbytes(rng.randrange(1, 4)), b"9", b"(", b"O", b"'", b"\xff"))
