@@ -1,5 +1,21 @@
 """The exceptions and warnings of the package."""
 
+_LONGEST = 800  # characters of a message: it may list names, and quotes no document
+
+
+def printable(text: str) -> str:
+    """A text on one line: blanks for line ends, escapes for what a terminal would obey.
+
+    Names from files are untrusted: they may hold control characters, halves of surrogate pairs
+    (file names that are not UTF-8) or marks that turn the direction of writing.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() else " " if each in "\t\n\r" else ascii(each)[1:-1]
+        for each in text
+    )
+
 
 class InputError(ValueError):
     """What the user gave cannot be used.
@@ -23,8 +39,9 @@ class InputError(ValueError):
     """
 
     def __init__(self, text: str, code: str = "", mend: str = "") -> None:
-        super().__init__(f"{text}: {mend}" if mend else text)
-        self.problem = text
+        self.problem = printable(text)
+        text = f"{self.problem}: {printable(mend)}" if mend else self.problem
+        super().__init__(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
         self.code = code
         self.mend = mend
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from numbers import Real
+from reprlib import Repr
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,32 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 
-_SHORTEST, _LONGEST = 1e-9, 1e6  # sampling interval, s
-_MOST = 10**11  # samples: 800 GB
+SHORTEST_INTERVAL, LONGEST_INTERVAL = 1e-9, 1e6
+"""Sampling intervals that a sensor may have, s."""
+
+MOST_SAMPLES = 10**11
+"""800 GB."""
+
+# What is nested deeply, or refers to itself many times over, is not written out.
+_REPR = Repr()
+_REPR.maxlevel, _REPR.maxstring, _REPR.maxother, _REPR.maxlong = 3, 200, 200, 200
 
 
 def shown(value: Any) -> str:
     """A value as messages quote it: one short line."""
-    return textwrap.shorten(repr(value), 60, placeholder=" ...")
+    return _cut(_REPR.repr(value), 60)
+
+
+def line(text: str) -> str:
+    """A text of others, such as another library's message, as messages quote it: one short line."""
+    return _cut(text, 120)
+
+
+def _cut(text: str, length: int) -> str:
+    words = textwrap.shorten(text, length, placeholder=" ...")
+    if len(words) > length // 2 or len(text) <= length:
+        return words
+    return f"{text[: length - 4]} ..."  # of one long word nothing would be left
 
 
 def is_number(value: Any) -> bool:
@@ -80,8 +100,10 @@ def samples(value: Any, least: int = 1) -> int:
     if least > 1:
         mend = f"give an integer number of samples, {least} or more"
     n = whole("n", value, least, mend)
-    if n > _MOST:
-        raise InputError(f"n = {shown(value)}: that is too long, give at most {_MOST:,} samples")
+    if n > MOST_SAMPLES:
+        raise InputError(
+            f"n = {shown(value)}: that is too long, give at most {MOST_SAMPLES:,} samples"
+        )
     return n
 
 
@@ -89,8 +111,10 @@ def sampling_interval(value: Any) -> float:
     """A sampling interval ``dt`` that a sensor may have, s."""
     mend = "give a positive sampling interval in seconds"
     dt = positive("dt", value, mend)
-    if not _SHORTEST <= dt <= _LONGEST:
-        raise InputError(f"dt = {shown(value)}: {mend}, {_SHORTEST:g} to {_LONGEST:g}")
+    if not SHORTEST_INTERVAL <= dt <= LONGEST_INTERVAL:
+        raise InputError(
+            f"dt = {shown(value)}: {mend}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}"
+        )
     return dt
 
 

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from gmwm._core.files import written
+from gmwm._core import checks
+from gmwm._core.files import opened, written
 from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm._core.forms import Form
+
+_LARGEST = 1 << 25
+"""Bytes of a document: forty times those of six channels; read, it needs thirty times as many."""
+
+_DEEPEST = 32
+"""Levels of lists and mappings in a document; what is saved has 12 at most."""
 
 
 class Document:
     """A result that can be saved, and comes back from its file by `load_document`.
 
-    A subclass names its ``SCHEMA`` and gives ``content`` and ``from_content``.
+    A subclass names its ``SCHEMA`` and gives ``content``, ``form`` and ``from_content``.
     """
 
     SCHEMA: ClassVar[str] = ""
@@ -37,7 +48,14 @@ class Document:
     @classmethod
     @abstractmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`; errors of missing or wrong parts are those of Python."""
+        """Inverse of `content`, checked by `form`; other errors are those of Python."""
+
+    @classmethod
+    def form(cls) -> type[Form]:
+        """What each key of the content must hold."""
+        from gmwm._core.forms import Form
+
+        return Form
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
@@ -65,15 +83,18 @@ class Document:
         version = content.get("schema_version")
         if version != cls.SCHEMA_VERSION:
             raise InputError(
-                f"schema version {version!r} is not known here (known is {cls.SCHEMA_VERSION}): "
-                f"make the {what} again or update gmwm"
+                f"schema version {checks.shown(version)} is not known here (known is "
+                f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
             )
         try:
-            return cls.from_content(content)
+            return cls.from_content(cls.form().checked(content))
         except InputError as error:
             raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise InputError(f"the {what} is damaged ({error!r}): make it again") from None
+        except (
+            LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError
+        ) as error:  # fmt: skip
+            which = f"{type(error).__name__}: {checks.line(str(error))}"
+            raise InputError(f"the {what} is damaged ({which}): make it again") from None
 
     @staticmethod
     def _kind_of(content: Any) -> type[Document] | None:
@@ -108,19 +129,52 @@ class Document:
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
-    """Content of a JSON file.
+    """Content of a JSON file; its numbers are finite.
 
     Raises
     ------
     InputError
-        If the file is missing or is not JSON.
+        If the file is missing or too large, is not JSON, or is nested too deeply.
     """
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        with opened(path) as stream:
+            text = stream.read(_LARGEST + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
+    if len(text) > _LARGEST:
+        raise InputError(
+            f"{path}: has more than {_LARGEST >> 20} MB, which no result has: check the path"
+        )
+    try:
+        content = json.loads(text, parse_constant=_finite, parse_float=_finite)
+        _check_depth(content)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not JSON ({error}): give a file that was saved") from None
+        which = checks.line(str(error))
+        raise InputError(f"{path}: is not JSON ({which}): give a file that was saved") from None
+    return content
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:20]} is no finite number")
+    return value
+
+
+def _check_depth(content: Any) -> None:
+    """Refuse what would be followed deeper than a program can."""
+    layer, depth = [content], 0
+    while layer:
+        depth += 1
+        if depth > _DEEPEST:
+            raise ValueError(f"nested deeper than {_DEEPEST} levels")
+        layer = [
+            child
+            for each in layer
+            if isinstance(each, dict | list)
+            for child in (each.values() if isinstance(each, dict) else each)
+            if isinstance(child, dict | list)
+        ]
 
 
 def load_document(path: str | os.PathLike[str]) -> Any:

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 from gmwm.errors import InputError
 
@@ -97,7 +97,7 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If nothing is there, or a directory.
+        If nothing is there, or no file: a directory, a pipe or a device.
     """
     found = Path(path)
     try:
@@ -106,7 +106,29 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
     if stat.S_ISDIR(mode):
         raise InputError(f"{path} is a directory: name a file in it")
+    _check_regular(found, mode)
     return found
+
+
+def opened(path: str | os.PathLike[str]) -> BinaryIO:
+    """A file, open for reading.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    InputError
+        If it is a pipe or a device.
+    """
+    found = Path(path)
+    _check_regular(found, found.stat().st_mode)
+    return found.open("rb")
+
+
+def _check_regular(path: Path, mode: int) -> None:
+    # Opened, it may wait for ever, or give for ever.
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise InputError(f"{path} is a pipe or a device: write its content to a file first")
 
 
 def replaceable(path: Path) -> Path:

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gmwm.errors import printable
+
 Severity = Literal["good", "note", "warning", "bad"]
 
 SEVERITIES: tuple[Severity, ...] = ("bad", "warning", "note", "good")
@@ -44,6 +46,10 @@ class Notice:
     values: Mapping[str, Any] = field(default_factory=dict)
     action: str = ""
     source: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("code", "where", "text", "action", "source"):
+            object.__setattr__(self, name, printable(getattr(self, name)))
 
     def __str__(self) -> str:
         place = "".join(f"{part}: " for part in (self.source, self.where) if part)

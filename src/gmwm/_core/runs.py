@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core import checks, memory
 from gmwm._core.files import folder_to_fill, moved_into_place
 from gmwm._core.typing import Progress
 from gmwm.errors import InputError
@@ -157,8 +158,9 @@ class _Store:
     def _read(self, part: Path) -> None:
         try:
             study, runs, values = _content(part)
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-            _log.warning("%s is damaged (%s): its runs are done again", part, error)
+        except Exception as error:  # numpy, zipfile and zlib raise a dozen types
+            which = checks.line(str(error))
+            _log.warning("%s is damaged (%s): its runs are done again", part, which)
             return
         if study != self._study:
             names = sorted(k for k in {*study, *self._study} if study.get(k) != self._study.get(k))
@@ -177,6 +179,8 @@ class _Store:
 
 def _content(part: Path) -> tuple[dict[str, Any], list[int], Values]:
     """The study, the numbers of the runs and their values."""
+    with zipfile.ZipFile(part) as archive:
+        memory.require(sum(each.file_size for each in archive.infolist()), part.name)
     with part.open("rb") as file, np.load(file) as content:
         runs = content["run"]
         values = {
@@ -283,6 +287,11 @@ def _on_cluster(
         # A scheme that nobody speaks is refused before any thread is started.
         get_backend(parse_address(address)[0])
         client = Client(address, timeout="10s")
+    except TypeError as error:  # what distributed raises for tls:// without certificates
+        raise InputError(
+            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its "
+            "certificates, distributed.comm.tls in its configuration"
+        ) from None
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None
     with client:

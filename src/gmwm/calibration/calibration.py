@@ -31,6 +31,8 @@ from gmwm.variance import MIN_SAMPLES, wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 _SPOILING = {
     "not-static": ("gyro", "accel"),
     "tilt": ("accel",),
@@ -141,15 +143,19 @@ class Calibration(Mapping[str, Fit], Document):
         }
 
     @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.calibration.form import CalibrationForm
+
+        return CalibrationForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         return cls(
-            fits={str(name): Fit.from_dict(item) for name, item in content["channels"].items()},
-            skipped={
-                str(name): Notice.from_dict(item) for name, item in content["skipped"].items()
-            },
-            source=str(content["source"]),
-            rate=float(content["rate_hz"]),
-            n=int(content["n"]),
+            fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
+            skipped={name: Notice.from_dict(item) for name, item in content["skipped"].items()},
+            source=content["source"],
+            rate=content["rate_hz"],
+            n=content["n"],
             notices=tuple(map(Notice.from_dict, content["notices"])),
         )
 

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 def new_console(width: int | None = None) -> Console:
     from rich.console import Console
 
-    # Piped output is as wide as a terminal that people use, not as rich guesses.
-    return Console(width=width or (None if sys.stdout.isatty() else 80))
+    # Piped output is as wide as a terminal that people use, not as rich guesses. Names come from
+    # files: brackets and colons in them are no markup.
+    return Console(width=width or (None if sys.stdout.isatty() else 80), markup=False, emoji=False)
 
 
 def print_whole(console: Console, table: Table) -> None:
@@ -53,11 +54,14 @@ def progress_bar(title: str, unit: str) -> Iterator[Progress]:
         TimeRemainingColumn,
     )
 
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(),
-               TextColumn(unit + " {task.description}"), TimeRemainingColumn(),
-               TextColumn("left"))  # fmt: skip
     console = Console(stderr=True)
-    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    if not console.is_terminal:
+        yield lambda done, total, what: None
+        return
+    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(),
+               TextColumn(unit + " {task.description}", markup=False), TimeRemainingColumn(),
+               TextColumn("left"))  # fmt: skip
+    with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=None)
 
         def advance(done: int, total: int, what: str) -> None:

@@ -6,11 +6,12 @@ import errno
 import os
 import sys
 from contextlib import suppress
-from io import StringIO
+from io import StringIO, TextIOWrapper
 
 import click
 
 from gmwm import __version__
+from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify
@@ -21,7 +22,7 @@ from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
 from gmwm.cli.numbers import bound, reduce
 from gmwm.cli.reproduce import reproduce
-from gmwm.errors import InputError
+from gmwm.errors import InputError, printable
 
 _EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as shells have them
 
@@ -42,6 +43,10 @@ def main() -> None:
     """Entry point: bad input is one sentence and exit code 2, never a traceback."""
     # None where who started us closed them: what is printed then goes nowhere.
     sys.stdout, sys.stderr = sys.stdout or StringIO(), sys.stderr or StringIO()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # What the encoding of a terminal lacks is written as an escape.
+            stream.reconfigure(errors="backslashreplace")
     try:
         status = _run()
         sys.stdout.flush()
@@ -61,8 +66,10 @@ def _run() -> int:
         return int(cli.main(standalone_mode=False) or 0)
     except InputError as error:
         return _failed(with_hint(error))
+    except MemoryError:
+        return _failed(OUT_OF_MEMORY)
     except click.ClickException as error:
-        return _failed(error.format_message())
+        return _failed(printable(error.format_message()))
     except click.Abort:
         _failed("interrupted, no file is half-written")
         return _EXIT_INTERRUPTED

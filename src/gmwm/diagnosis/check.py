@@ -165,6 +165,13 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         return _Examined(
             [Notice("infinite", "bad", name, text, action=repair)], ChannelHealth(), None
         )
+    if not channel.is_of_a_sensor:
+        text = f"varies by {channel.spread:.1g} {unit}, as no sensor does"
+        return _Examined(
+            [Notice("size", "bad", name, text, {"spread": channel.spread}, "check the unit")],
+            ChannelHealth(),
+            None,
+        )
     present = values[~np.isnan(values)]
     step = step_size(present)
     errors = innovations(values, step)
@@ -223,6 +230,8 @@ def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump,
     for line in lines:
         margin = (line.stop - line.start) // 2
         occupied[max(line.start - margin, 0) : line.stop + margin] = True
+    if 2 * np.count_nonzero(occupied) > occupied.size:
+        return lines, ()  # a square wave: hardly anything is left to be a background
     rest = bands(power, occupied)
     return lines, find_resonances(power, rest, background(power, rest), occupied)
 

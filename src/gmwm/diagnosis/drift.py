@@ -121,6 +121,9 @@ def variance_notice(
     means = np.array([np.mean(part) for part in squares])
     spread = np.array([np.var(part) / part.size for part in squares])
     usual = float(np.median(means))
+    halves = np.split(np.arange(tuning.TENTHS), 2)
+    if min(np.count_nonzero(means[half]) for half in halves) < 2:
+        return None  # half of the record is predicted without any error
     loudest = int(np.argmax(means))
     jump = np.sqrt(means[loudest] / usual) - 1.0
     tail = norm.isf(tuning.FALSE_ALARM / tuning.TENTHS) * np.sqrt(spread[loudest]) / usual

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from gmwm._core.documents import Document
+from gmwm._core.forms import Form, Notices, NotNegative, Positive, Rate, Samples, Text
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     import pandas
 
 _INDENT = 11
+
+_OR_LIST = Field(strict=False)  # JSON has no tuples
+
+Index = Annotated[int, Field(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -69,15 +75,15 @@ class ChannelHealth:
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> ChannelHealth:
-        """Inverse of `dataclasses.asdict`, after a round trip through JSON."""
-        repeated = content.get("repetition")
+        """Inverse of `dataclasses.asdict`, after a round trip through JSON and its form."""
+        repeated = content["repetition"]
         return cls(
-            lines=tuple((float(f), float(a)) for f, a in content["lines"]),
-            resonances=tuple((float(f), float(d)) for f, d in content["resonances"]),
-            events=tuple((int(start), int(stop)) for start, stop in content["events"]),
-            lsb=float(content["lsb"]),
-            outliers=float(content["outliers"]),
-            repetition=repeated and Repetition(int(repeated["times"]), int(repeated["first"])),
+            lines=tuple(content["lines"]),
+            resonances=tuple(content["resonances"]),
+            events=tuple(content["events"]),
+            lsb=content["lsb"],
+            outliers=content["outliers"],
+            repetition=repeated and Repetition(repeated["times"], repeated["first"]),
         )
 
 
@@ -90,7 +96,7 @@ class Health(Document):
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "not-static", "tilt", "clock", "gap", "dead", "infinite",
-        "stuck", "saturation", "repeated-samples", "event", "outliers", "rounding", "line",
+        "size", "stuck", "saturation", "repeated-samples", "event", "outliers", "rounding", "line",
         "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
@@ -234,16 +240,19 @@ class Health(Document):
         }
 
     @classmethod
+    def form(cls) -> type[Form]:
+        return HealthForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         return cls(
             notices=tuple(map(Notice.from_dict, content["notices"])),
             channels={
-                str(name): ChannelHealth.from_content(item)
-                for name, item in content["channels"].items()
+                name: ChannelHealth.from_content(item) for name, item in content["channels"].items()
             },
-            source=str(content["source"]),
-            rate=float(content["rate_hz"]),
-            n=int(content["n"]),
+            source=content["source"],
+            rate=content["rate_hz"],
+            n=content["n"],
         )
 
 
@@ -251,3 +260,47 @@ def _wrapped(notice: Notice) -> list[str]:
     """Severity in front, text and action beside it."""
     text = notice.text + (f"; {notice.action}" if notice.action else "")
     return wrapped(text, first=f"  {notice.severity:{_INDENT - 2}}", indent=_INDENT)
+
+
+# -- what a stored one holds --------------------------------------------------------------------
+
+
+class RepetitionForm(Form):
+    """Of `Repetition`."""
+
+    times: Annotated[int, Field(ge=2)]
+    first: Index
+
+    @model_validator(mode="after")
+    def _together(self) -> Self:
+        if self.first >= self.times:
+            raise ValueError("first is not below times")
+        return self
+
+
+class ChannelHealthForm(Form):
+    """Of `ChannelHealth`."""
+
+    lines: Annotated[list[Annotated[tuple[Positive, NotNegative], _OR_LIST]], _OR_LIST]
+    resonances: Annotated[list[Annotated[tuple[Positive, Positive], _OR_LIST]], _OR_LIST]
+    events: Annotated[list[Annotated[tuple[Index, Samples], _OR_LIST]], _OR_LIST]
+    lsb: NotNegative
+    outliers: Annotated[float, Field(ge=0.0, le=1.0)]
+    repetition: RepetitionForm | None
+
+
+class HealthForm(Form):
+    """Of `Health`."""
+
+    source: Text
+    rate_hz: Rate
+    n: Samples
+    notices: Notices
+    channels: dict[Text, ChannelHealthForm]
+
+    @model_validator(mode="after")
+    def _together(self) -> Self:
+        for name, channel in self.channels.items():
+            if any(not start < stop <= self.n for start, stop in channel.events):
+                raise ValueError(f"an event of {name} is no interval of samples")
+        return self

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from gmwm.estimate.problem import Scales, drift_key, shape_of
 from gmwm.estimate.result import Fit, plain
 from gmwm.process import Model, Process, as_model
 from gmwm.variance import PooledVariance
+
+if TYPE_CHECKING:
+    from gmwm._core.forms import Form
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,11 +59,15 @@ class Bootstrap(Document):
         return {"keys": list(self.keys), "draws": draws}
 
     @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.estimate.form import BootstrapForm
+
+        return BootstrapForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
-        keys = tuple(map(str, content["keys"]))
-        draws = np.array(content["draws"], dtype=float).reshape(-1, len(keys))
-        return cls(keys, draws)
+        return cls(tuple(content["keys"]), np.array(content["draws"], dtype=float))
 
     @property
     def stderr(self) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -41,6 +41,9 @@ from gmwm.process import (
 )
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
+
+if TYPE_CHECKING:
+    from gmwm._core.forms import Form
 
 _MOST_WORK = 1e9  # multiplications of the exact recursion, some seconds
 _VAGUE = 1e6  # variance of the unknown constant, in variances of the series
@@ -100,18 +103,26 @@ class CramerRao(Document):
         }
 
     @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.estimate.form import CramerRaoForm
+
+        return CramerRaoForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
-        keys = tuple(map(str, content["keys"]))
+        keys, model = tuple(content["keys"]), model_from_list(content["model"])
+        if not {*keys} <= {*model.params}:
+            raise InputError(f"its keys are not those of its model {model!r}")
         shape = (len(keys), len(keys))
         return cls(
-            model=model_from_list(content["model"]),
-            n=int(content["n"]),
-            dt=float(content["dt_s"]),
+            model=model,
+            n=content["n"],
+            dt=content["dt_s"],
             keys=keys,
             covariance=np.array(content["covariance"], dtype=float).reshape(shape),
             wavelet_covariance=np.array(content["wavelet_covariance"], dtype=float).reshape(shape),
-            exact=bool(content["exact"]),
+            exact=content["exact"],
         )
 
     @property

@@ -8,17 +8,20 @@ rate.
 
 from __future__ import annotations
 
+import math
 import warnings
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core import memory
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -27,12 +30,13 @@ from gmwm.readers.names import AXES, CANONICAL, meaning
 from gmwm.readers.table import LARGEST, label, usable
 
 _AnyArray = npt.NDArray[Any]
-_Column = tuple[str, _AnyArray]
 
 _NPY_MAGIC = b"\x93NUMPY"
 _ZIP_MAGIC = b"PK"
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
+
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0}
 
 # Stands for an entry of an NPZ file that is not a plain array: it does no harm unless it is wanted.
 _OBJECTS = np.empty(0, dtype=object)
@@ -47,13 +51,35 @@ _KINDS = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class _Array:
+    """An array, or a part of one, that is not read yet.
+
+    Attributes
+    ----------
+    like : ndarray
+        Of its shape and type, without its content: one element in memory.
+    read : callable
+        Gives the array itself.
+    """
+
+    like: _AnyArray
+    read: Callable[[], _AnyArray]
+
+    def __getitem__(self, part: Any) -> _Array:
+        return _Array(self.like[part], lambda: self.read()[part])
+
+
+_Column = tuple[str, _Array]
+
+
 @dataclass(frozen=True)
 class ArrayTable:
     """Columns of arrays."""
 
     source: str
     names: tuple[str, ...]
-    arrays: tuple[_AnyArray, ...]
+    arrays: tuple[_Array, ...]
     rate: float | None = None
     tentative: bool = False
     notices: tuple[Notice, ...] = ()
@@ -94,8 +120,11 @@ class ArrayTable:
         Raises
         ------
         InputError
-            If a column is not made of real numbers, one is infinite, or lengths differ.
+            If a column is not made of real numbers, one is infinite, or lengths differ; if there
+            is not enough memory for them.
         """
+        samples = sum(self.arrays[column].like.size for column in columns)
+        memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
         found = {column: self._column(column) for column in columns}
         longest = max(columns, key=lambda column: found[column].size)
         for column, values in found.items():
@@ -112,12 +141,14 @@ class ArrayTable:
         return f"row {row} (counted from 0)"
 
     def _column(self, index: int) -> FloatArray:
-        array, place = self.arrays[index], f"{self.source}, column {label(self.names, index)}"
-        if array.dtype.kind not in "iuf":
-            kind = _KINDS.get(array.dtype.kind, "something else than numbers")
+        like, place = self.arrays[index].like, f"{self.source}, column {label(self.names, index)}"
+        if like.dtype.kind not in "iuf":
+            kind = _KINDS.get(like.dtype.kind, "something else than numbers")
             raise InputError(f"{place} holds {kind}: save real numbers")
-        if array.ndim != 1:
-            raise InputError(f"{place} has shape {array.shape}: save one axis as one column")
+        if like.ndim != 1:
+            raise InputError(f"{place} has shape {like.shape}: save one axis as one column")
+        with _damage_named(self.source):
+            array = self.arrays[index].read()
         with np.errstate(all="ignore"):  # what leaves the range of float64 is refused below
             values = np.array(array, dtype=np.float64)
         if not usable(values):
@@ -137,6 +168,10 @@ def _damage_named(source: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about headers of old versions
             yield
+    except InputError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{source}: {memory.OUT_OF_MEMORY}", "memory") from error
     except PermissionError as error:
         raise InputError(f"{source} cannot be read: check its permissions") from error
     except Exception as error:  # numpy, zipfile and zlib raise a dozen types for damaged bytes
@@ -151,98 +186,127 @@ def _is_about_objects(error: Exception) -> bool:
     return isinstance(error, ValueError) and "object" in str(error).lower()
 
 
-def _load_npy(path: Path) -> _AnyArray:
+def _load_npy(path: Path) -> _Array:
     with _damage_named(path.name):
         with path.open("rb") as stream:
             magic = stream.read(len(_NPY_MAGIC))
         if magic == _NPY_MAGIC:
             # Mapped: a header that promises more than there is asks for no memory.
             array: _AnyArray = np.load(path, mmap_mode="r", allow_pickle=False)
-            return array
+            return _array_of(array)
     raise InputError(f"{path.name} is not an NPY file: write it with numpy.save")
 
 
-def _load_npz(path: Path) -> dict[str, _AnyArray]:
-    # Opened here: numpy leaves a damaged archive open.
-    with _damage_named(path.name), path.open("rb") as stream:
-        magic = stream.read(len(_ZIP_MAGIC))
-        # Without the magic number at the beginning, numpy would read it as pickled objects.
-        if magic == _ZIP_MAGIC and zipfile.is_zipfile(stream):
-            stream.seek(0)
-            with np.load(stream, allow_pickle=False) as archive:
-                return {name: _entry(archive, name) for name in archive.files}
+def _load_npz(path: Path) -> dict[str, _Array]:
+    with _damage_named(path.name):
+        with path.open("rb") as stream:
+            magic = stream.read(len(_ZIP_MAGIC))
+        if magic == _ZIP_MAGIC and zipfile.is_zipfile(path):
+            # The columns of an entry are asked for one after another.
+            read = lru_cache(maxsize=1)(partial(_read_entry, path))
+            with zipfile.ZipFile(path) as archive:
+                return {
+                    info.filename.removesuffix(".npy"): _entry(archive, info, read)
+                    for info in archive.infolist()
+                }
     raise InputError(f"{path.name} is not an NPZ file: write it with numpy.savez")
 
 
-def _entry(archive: Mapping[str, Any], name: str) -> _AnyArray:
-    try:
-        entry = archive[name]
-    except ValueError as error:
-        if not _is_about_objects(error):
-            raise
-        return _OBJECTS
-    return entry if isinstance(entry, np.ndarray) else _OBJECTS
+def _entry(
+    archive: zipfile.ZipFile, info: zipfile.ZipInfo, read: Callable[[str], _AnyArray]
+) -> _Array:
+    """An entry of which the header is read."""
+    with archive.open(info) as stream:
+        if stream.read(len(_NPY_MAGIC)) != _NPY_MAGIC:
+            return _array_of(_OBJECTS)
+    with archive.open(info) as stream:
+        version = np.lib.format.read_magic(stream)
+        header = _HEADERS.get(version, np.lib.format.read_array_header_2_0)(stream)
+    shape, _, dtype = header
+    if dtype.hasobject:
+        return _array_of(_OBJECTS)
+    if math.prod(shape) * dtype.itemsize > info.file_size:
+        raise ValueError("a header that promises more than there is")
+    return _Array(np.broadcast_to(np.empty((), dtype), shape), lambda: read(info.filename))
 
 
-def _stated_rate(source: str, entries: Mapping[str, _AnyArray]) -> float | None:
+def _read_entry(path: Path, name: str) -> _AnyArray:
+    with zipfile.ZipFile(path) as archive:
+        memory.require(archive.getinfo(name).file_size, path.name)
+        with archive.open(name) as stream:
+            array: _AnyArray = np.lib.format.read_array(stream, allow_pickle=False)
+    return array
+
+
+def _array_of(array: _AnyArray) -> _Array:
+    return _Array(array, lambda: array)
+
+
+def _stated_rate(source: str, entries: Mapping[str, _Array]) -> float | None:
     for name, array in entries.items():
-        key = name.lower()
-        if key not in (*_RATES, *_INTERVALS) or array.size != 1 or array.dtype.kind not in "iuf":
+        key, like = name.lower(), array.like
+        if key not in (*_RATES, *_INTERVALS) or like.size != 1 or like.dtype.kind not in "iuf":
             continue
-        value = float(array.reshape(-1)[0])
+        with _damage_named(source):
+            value = float(array.read().reshape(-1)[0])
         if not 0.0 < value < LARGEST:
             raise InputError(f"{source}: {name} = {value} is not positive: correct it")
         return value if key in _RATES else 1.0 / value
     return None
 
 
-def _columns_of_array(source: str, array: _AnyArray) -> list[_Column]:
-    if array.dtype.names and array.ndim == 1:
+def _columns_of_array(source: str, array: _Array) -> list[_Column]:
+    if array.like.dtype.names and array.like.ndim == 1:
         return _columns_of_fields(array)
-    if array.ndim == 1:
+    if array.like.ndim == 1:
         return [("", array)]
-    if array.ndim == 2:
+    if array.like.ndim == 2:
         return _unnamed(source, array)
     raise InputError(
-        f"{source} has shape {array.shape}: save samples along rows, one column for each channel"
+        f"{source} has shape {array.like.shape}: save samples along rows, one column for each "
+        "channel"
     )
 
 
-def _columns_of_fields(array: _AnyArray) -> list[_Column]:
-    return [pair for name in array.dtype.names or () for pair in _axes_or_itself(name, array[name])]
+def _columns_of_fields(array: _Array) -> list[_Column]:
+    return [
+        pair for name in array.like.dtype.names or () for pair in _axes_or_itself(name, array[name])
+    ]
 
 
-def _columns_of_entries(source: str, entries: Mapping[str, _AnyArray]) -> list[_Column]:
+def _columns_of_entries(source: str, entries: Mapping[str, _Array]) -> list[_Column]:
     """Columns of all arrays with more than one value; those without a name first."""
     named: list[_Column] = []
     matrices: list[_Column] = []
     for name, array in entries.items():
-        if array.dtype.names and array.ndim == 1:
+        if array.like.dtype.names and array.like.ndim == 1:
             named += _columns_of_fields(array)
-        elif array.ndim == 2 and not _is_triad(name, array):
+        elif array.like.ndim == 2 and not _is_triad(name, array):
             matrices.append((name, array))
-        elif array.size != 1:
+        elif array.like.size != 1:
             named += _axes_or_itself(name, array)
     if len(matrices) == 1:
         return _unnamed(source, matrices[0][1]) + named
     return named + matrices
 
 
-def _unnamed(source: str, array: _AnyArray) -> list[_Column]:
-    rows, width = array.shape
+def _unnamed(source: str, array: _Array) -> list[_Column]:
+    rows, width = array.like.shape
     if width > rows and width >= tuning.FEWEST_SAMPLES:
         raise InputError(
-            f"{source} has shape {array.shape}: samples run along the rows here, save array.T"
+            f"{source} has shape {array.like.shape}: samples run along the rows here, save array.T"
         )
     return [("", array[:, i]) for i in range(width)]
 
 
-def _is_triad(name: str, array: _AnyArray) -> bool:
+def _is_triad(name: str, array: _Array) -> bool:
     """Whether an array holds the three axes of a sensor, by its name."""
-    return array.ndim == 2 and array.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
+    return (
+        array.like.ndim == 2 and array.like.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
+    )
 
 
-def _axes_or_itself(name: str, array: _AnyArray) -> list[_Column]:
+def _axes_or_itself(name: str, array: _Array) -> list[_Column]:
     if _is_triad(name, array):
         return [(f"{name}_{axis}", array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]

@@ -16,13 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
+from gmwm._core import memory
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, number, split_line
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
-from gmwm.readers.text_file import blocks
+from gmwm.readers.text_file import blocks, content_size
 
 _HEAD = 1 << 18
 
@@ -91,9 +93,12 @@ class CsvTable:
         ------
         InputError
             At the first line with a wrong number of fields or with text for a number; if there
-            is none, for the first number that is infinite.
+            is none, for the first number that is infinite; if there is not enough memory.
         """
         infinite = _Infinite()
+        allowed = memory.budget()
+        self._require(self._estimated_samples(len(columns)))
+        held = 0
         parts: list[list[FloatArray]] = [[] for _ in columns]
         for line, block in blocks(self.path, self.layout.offset, self.layout.line):
             found = _parse_with_arrow(block, self.layout, columns)
@@ -101,9 +106,21 @@ class CsvTable:
                 found = _parse_by_field(line, block, self, columns, infinite)
             for part, values in zip(parts, found, strict=True):
                 part.append(values)
+                held += values.size
+            if held * tuning.BYTES_PER_SAMPLE > allowed:
+                self._require(max(held, self._estimated_samples(len(columns))))
         infinite.complain(self.source)
         # One column at a time lets the blocks go before the next one is joined.
         return {column: np.concatenate(parts.pop(0)) for column in columns}
+
+    def _require(self, samples: float) -> None:
+        memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
+
+    def _estimated_samples(self, columns: int) -> float:
+        """How many numbers that many columns hold, by the size of the file and its first lines."""
+        _, head = next(blocks(self.path, self.layout.offset, size=_HEAD), (1, b""))
+        lines = max(len(head.splitlines()), 1)
+        return content_size(self.path) / max(len(head) / lines, 1.0) * columns
 
     def where(self, row: int) -> str:
         """The line of a row of data."""

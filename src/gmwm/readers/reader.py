@@ -81,6 +81,12 @@ def read(
     stated = _stated_rate(table, rate)
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
+    if not roles.channels:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])

@@ -11,7 +11,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
-from gmwm.errors import InputError, MissingNameError
+from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.readers import tuning
 
 READING = frozenset(
@@ -48,6 +48,10 @@ class Channel:
     quantity: str | None = None
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        for name in ("name", "unit"):
+            object.__setattr__(self, name, printable(getattr(self, name)))
+
     @property
     def is_auxiliary(self) -> bool:
         """Whether it is kept for what it explains, and no error model is fitted to it."""
@@ -75,12 +79,22 @@ class Channel:
         return float(np.nansum(self.values)) / present if present else np.nan
 
     @property
-    def is_constant(self) -> bool:
-        """Whether every sample that is there has the same value: a dead channel."""
+    def spread(self) -> float:
+        """Largest less smallest of the samples that are there, u; zero if none is."""
         values = np.asarray(self.values, dtype=float)
         # fmin and fmax pass over NaN.
         lowest = np.fmin.reduce(values, initial=np.inf)
-        return not lowest < np.fmax.reduce(values, initial=-np.inf)
+        return max(float(np.fmax.reduce(values, initial=-np.inf) - lowest), 0.0)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether every sample that is there has the same value: a dead channel."""
+        return self.spread == 0.0
+
+    @property
+    def is_of_a_sensor(self) -> bool:
+        """Whether it varies by as much as the noise of a sensor may, by many decades."""
+        return tuning.LEAST_SPREAD < self.spread < tuning.LARGEST_SPREAD
 
     def __str__(self) -> str:
         missing = self.missing
@@ -111,6 +125,9 @@ class Recording(Mapping[str, Channel]):
     source: str = ""
     notices: tuple[Notice, ...] = ()
     jitter: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", printable(self.source))
 
     @classmethod
     def from_arrays(

@@ -14,8 +14,9 @@ from gmwm.errors import InputError
 BLOCK = 1 << 20
 """Bytes read at once: large enough for speed, small beside the columns of a long recording."""
 
-_LONGEST_LINE = 1 << 24
+_LONGEST_LINE = 1 << 20
 _GZIP_MAGIC = b"\x1f\x8b"
+_SIZE_AT_END = 4  # bytes of a gzip file, RFC 1952
 _BLANK = b" \t\r\n"
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
@@ -66,6 +67,18 @@ def blocks(
                 )
         if end := _end_of_content(text):
             yield line, text[:end]
+
+
+def content_size(path: Path) -> int:
+    """Bytes after decompression, at least, as far as that is known before reading."""
+    with _open(path) as stream:
+        size = path.stat().st_size
+        if isinstance(stream, gzip.GzipFile):
+            with path.open("rb") as packed:
+                packed.seek(-min(_SIZE_AT_END, size), 2)
+                # Modulo 4 GB, and of the last part only if there are several.
+                size = max(size, int.from_bytes(packed.read(_SIZE_AT_END), "little"))
+    return size
 
 
 def count_lines(text: bytes) -> int:

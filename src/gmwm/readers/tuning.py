@@ -39,6 +39,13 @@ TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
 """Share of the changes of gravity that turning explains, and relative error of the rate, from which
 on it shows a wrong unit; units differ by a factor of 57 and more."""
 
+LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
+"""u: fourth powers of the data must not overflow."""
+
+BYTES_PER_SAMPLE = 20
+"""Of memory while a file is read: a column as it is read, the same in SI units, and one of the
+others joined from its blocks."""
+
 # -- the clock ------------------------------------------------------------------------------------
 
 RATES_AGREE = 0.01

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 from gmwm.budget import (
@@ -54,8 +53,7 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
         ],
         "parts": _parts(known),
         "notes": known.notes,
-        # "</" would end the script element, also within a string.
-        "figure": json.dumps(figure, allow_nan=False).replace("</", "<\\/"),
+        "figure": figure,
     }
 
 

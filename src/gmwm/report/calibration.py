@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from gmwm.estimate import Estimate, Fit
 from gmwm.report.budget import navigation
 from gmwm.report.figure import deviation_figure, residual_figure
 from gmwm.report.health import ambiguity, health
+from gmwm.report.page import DRAW, rendered
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
 _DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
@@ -47,21 +47,17 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str]) -> Path
 
 def page(calibration: Calibration) -> str:
     """The report as HTML text."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    environment = Environment(
-        loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
-    )
-    template = environment.get_template("template.html")
-    return template.render(
+    return rendered(
+        "template.html",
+        scripts=(get_plotlyjs(), DRAW),
         calibration=calibration,
         version=gmwm.__version__,
         length=duration_text(calibration.duration),
         health=health(calibration),
         channels=[_channel(name, fit, calibration) for name, fit in calibration.fits.items()],
         navigation=navigation(calibration),
-        plotly_js=get_plotlyjs(),
     )
 
 
@@ -104,15 +100,10 @@ def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
         "sentence": sentence(fit),
         "ambiguity": ambiguity(calibration, name),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
-        "figure": _script(deviation_figure(fit)),
-        "residuals": _script(residual_figure(fit)),
+        "figure": deviation_figure(fit),
+        "residuals": residual_figure(fit),
         "fitness": _fitness(fit),
     }
-
-
-def _script(figure: dict[str, Any]) -> str:
-    # "</" would end the script element, also within a string.
-    return json.dumps(figure, allow_nan=False).replace("</", "<\\/")
 
 
 def _fitness(fit: Fit) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import gmwm
 from gmwm._core.files import written
 from gmwm.ins.field import Navigated
+from gmwm.report.page import rendered
 from gmwm.report.validation import svg
 
 
@@ -24,13 +25,9 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
     InputError
         If the file cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
-    )
     sensors = navigated.measured.sensors
-    text = environment.get_template("navigated.html").render(
+    text = rendered(
+        "navigated.html",
         title=navigated.measured.title,
         version=gmwm.__version__,
         verdict=navigated.verdict.text,

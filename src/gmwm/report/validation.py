@@ -13,6 +13,7 @@ import numpy as np
 import gmwm
 from gmwm._core.files import written
 from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.report.page import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,14 +36,10 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
     InputError
         If the file cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
-    )
     study, experiment = validation.study, validation.experiment
     outages = [_outage(validation, i) for i in range(len(study.outages))]
-    text = environment.get_template("validation.html").render(
+    text = rendered(
+        "validation.html",
         title=experiment.title,
         version=gmwm.__version__,
         duration=f"{study.truth.duration:g}",

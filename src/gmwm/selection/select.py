@@ -30,6 +30,8 @@ from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 RULES = ("criterion", "merge")
 _SHOWN = 12
 _REDUNDANT = ("amplitude-bound", "search-limit", "redundant-term", "indistinct-terms")
@@ -127,6 +129,12 @@ class Selection(Document):
             "chosen": self.ranking.index(self.chosen),
             "fit": self.fit.to_dict(),
         }
+
+    @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.selection.form import SelectionForm
+
+        return SelectionForm
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:

@@ -16,7 +16,6 @@ from gmwm.variance.gaps import Runs
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
-_SMALLEST, _LARGEST = 1e-60, 1e60  # fourth powers of the data must not overflow
 MIN_SAMPLES = 8
 """Fewest samples of which a wavelet variance is made."""
 
@@ -147,12 +146,13 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
             f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
             "can be determined of its noise"
         )
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if low == high:
-        raise InputError(f"{where} is constant ({low:g}): a dead channel has no noise model")
-    if not _SMALLEST < high - low < _LARGEST:
+    if channel.is_constant:
         raise InputError(
-            f"{where} varies by {high - low:.1g}: that is not sensor noise, check the unit"
+            f"{where} is constant ({np.nanmin(values):g}): a dead channel has no noise model"
+        )
+    if not channel.is_of_a_sensor:
+        raise InputError(
+            f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
         )
     return values, runs
 

@@ -303,12 +303,20 @@ class WaveletVariance:
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> WaveletVariance:
-        """Inverse of `to_dict`."""
+        """Inverse of `to_dict`.
+
+        Raises
+        ------
+        InputError
+            With the place of the first thing that cannot be used.
+        """
+        from gmwm.variance.form import WaveletVarianceForm
+
+        content = WaveletVarianceForm.checked(content)
         arrays = {
             k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")
         }
-        numbers = {"n": int(content["n"]), "dt": float(content["dt"])}
-        found: dict[str, Any] = {**content, **arrays, **numbers}
+        found: dict[str, Any] = {**content, **arrays}
         if content.get("gaps") is not None:
             found["gaps"] = GapEffects.from_dict(content["gaps"])
         for name in ("data_covariance", "driftless"):

@@ -503,7 +503,7 @@ def test_notices_survive_the_file(tmp_path):
     content = json.loads(path.read_text())
     content["notices"] = [{"code": "line"}]
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match="the calibration is damaged"):
+    with pytest.raises(InputError, match=r"there is no notices.0.severity"):
         gmwm.load(path)
 
 

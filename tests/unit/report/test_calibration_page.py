@@ -4,7 +4,9 @@ import json
 import re
 import shutil
 import subprocess
+from base64 import b64encode
 from dataclasses import replace
+from hashlib import sha256
 from html.parser import HTMLParser
 
 import numpy as np
@@ -29,8 +31,8 @@ from gmwm.report.figure import deviation_figure
 
 DT = 0.01
 VOID = {"meta", "link", "br", "img", "input", "hr"}
-NAVIGATION = 'Plotly.newPlot("plot-navigation", '
-RESIDUALS = 'Plotly.newPlot("plot-residuals-'
+NAVIGATION = "plot-navigation"
+RESIDUALS = "plot-residuals-"
 
 
 class Page(HTMLParser):
@@ -72,6 +74,10 @@ class Page(HTMLParser):
             if {"td", "th"} & set(self._open):
                 self.cells[-1][-1] += data
 
+    @property
+    def plotly(self):
+        return self.scripts[-2]
+
     def count(self, tag):
         return sum(name == tag for name, _ in self.elements)
 
@@ -81,19 +87,20 @@ class Page(HTMLParser):
 
     def figures(self):
         """The channels' figures, as given to plotly, in strict JSON; see `navigation_figure`."""
-        others = (NAVIGATION, RESIDUALS)
-        return [
-            self._figure(script)
-            for script in self.scripts[1:]
-            if not any(words in script for words in others)
-        ]
+        return [figure for place, figure in self._drawn() if re.fullmatch(r"plot-\d+", place)]
 
     def residual_figures(self):
-        return [self._figure(script) for script in self.scripts[1:] if RESIDUALS in script]
+        return [figure for place, figure in self._drawn() if RESIDUALS in place]
 
     def navigation_figure(self):
-        (script,) = [script for script in self.scripts[1:] if NAVIGATION in script]
-        return self._figure(script)
+        (found,) = [figure for place, figure in self._drawn() if place == NAVIGATION]
+        return found
+
+    def _drawn(self):
+        elements = [attributes for tag, attributes in self.elements if tag == "script"]
+        for attributes, script in zip(elements, self.scripts, strict=True):
+            if attributes.get("type") == "application/json":
+                yield attributes["data-plot"], self._figure(script)
 
     @staticmethod
     def _figure(script):
@@ -101,8 +108,7 @@ class Page(HTMLParser):
         def refuse(constant):
             raise AssertionError(f"{constant} in a figure")
 
-        body = re.search(r"var figure = (.*);\n", script)
-        return json.loads(body.group(1), parse_constant=refuse)
+        return json.loads(script, parse_constant=refuse)
 
 
 def channel(name, values, quantity):
@@ -160,13 +166,24 @@ def test_nothing_is_fetched(parsed):
     for style in parsed.styles:
         assert "@import" not in style
         assert "url(" not in style
-    for script in parsed.scripts[1:]:
-        assert "http" not in script
+    for script in parsed.scripts:
+        assert "http" not in script or script is parsed.plotly
 
 
 def test_plotly_is_inside(parsed):
-    assert len(parsed.scripts[0]) > 1_000_000
-    assert "plotly.js v" in parsed.scripts[0][:200]
+    assert len(parsed.plotly) > 1_000_000
+    assert "plotly.js v" in parsed.plotly[:200]
+
+
+def test_nothing_runs_but_the_two_scripts_of_the_page(parsed):
+    policies = [a["content"] for _, a in parsed.elements if "Policy" in a.get("http-equiv", "")]
+    rules = dict(rule.strip().split(" ", 1) for rule in policies[0].split(";"))
+    assert rules["default-src"] == "'none'"
+    hashes = {
+        f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'"
+        for script in parsed.scripts[-2:]
+    }
+    assert set(rules["script-src"].split()) == hashes
 
 
 # -- complete -------------------------------------------------------------------------------------
@@ -178,7 +195,7 @@ def test_every_channel_is_there(parsed, calibration):
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
     assert links == [f"#{name}" for name in calibration]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
-    assert len(plots) == len(parsed.scripts) - 1 == 2 * len(calibration) + 1
+    assert len(plots) == len(parsed.scripts) - 2 == 2 * len(calibration) + 1
     assert len(set(plots)) == len(plots)
     for name, script in zip(plots, parsed.scripts[1:], strict=True):
         assert f'Plotly.newPlot("{name}", ' in script
@@ -478,7 +495,7 @@ def test_needed_length_in_words(seconds, words):
 # -- safe -----------------------------------------------------------------------------------------
 
 
-HOSTILE = "<script>alert(\"1\")</script> & <b>'x'</b>"
+HOSTILE = "<!--<script>alert(\"1\")</script> & <b>'x'</b>"
 
 
 def test_names_are_text_not_markup(calibration):
@@ -498,7 +515,7 @@ def test_names_are_text_not_markup(calibration):
     shown = Page(page(replace(hostile, notices=unread)))
     assert f"note {HOSTILE}" in shown.text
     shown = Page(page(hostile))
-    assert len(shown.scripts) == 4
+    assert len(shown.scripts) == 5
     assert shown.count("b") == len(gyro.params)  # those of the table alone
     for words in ("models of", "skip", "why", "Found", "Done", "tie", "A"):
         assert f"{words} {HOSTILE}" in shown.text
@@ -511,7 +528,7 @@ def test_units_are_text_not_markup(calibration):
     fit = calibration["voltage"]
     hostile = replace(fit, wv=replace(fit.wv, unit=HOSTILE))
     shown = Page(page(replace(calibration, fits={"voltage": hostile}, skipped={})))
-    assert len(shown.scripts) == 3
+    assert len(shown.scripts) == 4
     (figure,) = shown.figures()
     # Plotly knows a little markup of its own, which does no harm.
     assert "alert" in figure["layout"]["yaxis"]["title"]["text"]
@@ -576,15 +593,20 @@ def test_a_browser_without_network_draws_every_figure(html, calibration, tmp_pat
     if browser is None:
         pytest.skip("chromium is not installed")
     path = tmp_path / "report.html"
-    path.write_text(html, encoding="utf-8")
+    # What got in all the same would not run.
+    foreign = '<script>document.title = "foreign"</script><img src="http://127.0.0.1/x.png">'
+    path.write_text(html.replace("<h1>", f"{foreign}<h1>", 1), encoding="utf-8")
     command = [
         browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
         "--disable-background-networking", "--disable-component-update", "--disable-sync",
         "--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={tmp_path / 'profile'}",
-        "--virtual-time-budget=8000", "--dump-dom", path.as_uri(),
+        "--enable-logging=stderr", "--virtual-time-budget=8000", "--dump-dom", path.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, timeout=60, check=True)
     drawn = done.stdout.decode()
+    assert "<title>foreign" not in drawn
+    refused = re.findall(r"CONSOLE.*Content Security Policy directive", done.stderr.decode())
+    assert len(refused) == 2, done.stderr.decode()
     starts = [match.start() for match in re.finditer(r'<div class="plot[^>]* id="plot-\d+"', drawn)]
     assert len(starts) == len(calibration)
     for start, end in zip(starts, [*starts[1:], len(drawn)], strict=True):

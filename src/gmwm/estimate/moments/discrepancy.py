@@ -55,7 +55,8 @@ def _well_known(
     What a coarse level lacks or has too much is chance, and allowing for it at all levels would
     let go of the fine ones.
     """
-    relative = np.sqrt(np.diag(covariance)) / np.maximum(target, 1e-300)
+    with np.errstate(over="ignore"):  # of a level without any variance nothing is known
+        relative = np.sqrt(np.diag(covariance)) / np.maximum(target, 1e-300)
     known = np.flatnonzero(relative < tuning.DISCREPANCY_KNOWN)
     if known.size == 0:
         known = np.array([int(np.argmin(relative))])

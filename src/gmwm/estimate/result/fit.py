@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
+    from gmwm._core.forms import Form
+
 METHOD_NAMES = {
     "gmwm": "GMWM",
     "simulated": "simulated moments",
@@ -414,6 +416,12 @@ class Fit(Document):
             "valid": self.valid,
             "units": {estimate.key: estimate.unit for estimate in self.estimates},
         }
+
+    @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.estimate.result.form import FitForm
+
+        return FitForm
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:

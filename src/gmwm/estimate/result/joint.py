@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,9 +16,12 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
 from gmwm.estimate.result.fit import Fit
-from gmwm.estimate.result.serialization import fields_of, number, plain
+from gmwm.estimate.result.serialization import fields_of, or_nan, plain
 from gmwm.process import Model
 from gmwm.variance import PooledVariance, WaveletVariance
+
+if TYPE_CHECKING:
+    from gmwm._core.forms import Form
 
 _CELLS = 4  # numbers in a line of the table
 
@@ -96,6 +99,12 @@ class JointFit(Fit):
         }
 
     @classmethod
+    def form(cls) -> type[Form]:
+        from gmwm.estimate.result.form import JointFitForm
+
+        return JointFitForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
         parts = tuple(Fit.from_dict(part) for part in content["parts"])
@@ -103,9 +112,9 @@ class JointFit(Fit):
         return cls(
             **fields,
             parts=parts,
-            equality_p=number("equality_p", content["equality_p"]),
-            curves_p=number("curves_p", content["curves_p"]),
-            spread={key: number(key, value) for key, value in content["spread"].items()},
+            equality_p=or_nan(content["equality_p"]),
+            curves_p=or_nan(content["curves_p"]),
+            spread=content["spread"],
         )
 
 

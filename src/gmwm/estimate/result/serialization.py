@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.estimate.result.region import Region
@@ -46,14 +45,12 @@ def plain(value: float) -> float | None:
 
 
 def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a fit, from what `fit_content` made.
+    """The fields of a fit, from what `fit_content` made and `FitForm` checked.
 
     Raises
     ------
     InputError
-        If parts of it do not belong together, or a number is none.
-    KeyError, TypeError, ValueError
-        If it is damaged.
+        If parts of it do not belong together.
     """
     model = model_from_list(content["model"])
     params = {key: value or 0.0 for key, value in model.params.items()}
@@ -68,34 +65,24 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
         "keys": tuple(content["keys"]),
         "covariance": np.array(content["covariance"], dtype=float).reshape(p, p),
         "upper_bounds": {
-            key: number(key, bound, infinity) for key, bound in content["upper_bounds"].items()
+            key: or_nan(bound, infinity) for key, bound in content["upper_bounds"].items()
         },
-        "objective": number("objective", content["objective"]),
-        "chi_square": number("chi_square", content["chi_square"]),
-        "chi_square_allowed": number("chi_square_allowed", content["chi_square_allowed"]),
-        "dof": number("dof", content["dof"], kind=int),
-        "discrepancy": number("discrepancy", content["discrepancy"]),
-        "method": str(content["method"]),
-        "weights": str(content["weights"]),
+        "objective": or_nan(content["objective"]),
+        "chi_square": or_nan(content["chi_square"]),
+        "chi_square_allowed": or_nan(content["chi_square_allowed"]),
+        "dof": content["dof"],
+        "discrepancy": content["discrepancy"],
+        "method": content["method"],
+        "weights": content["weights"],
         "notices": tuple(map(Notice.from_dict, content["notices"])),
-        "log_likelihood": number("log_likelihood", content["log_likelihood"]),
-        "trace": tuple(number("trace", value) for value in content["trace"]),
-        "slope_dof": number("slope_dof", content["slope_dof"], infinity),
-        "error_growth": {key: number(key, k) for key, k in content["error_growth"].items()},
+        "log_likelihood": or_nan(content["log_likelihood"]),
+        "trace": tuple(content["trace"]),
+        "slope_dof": or_nan(content["slope_dof"], infinity),
+        "error_growth": content["error_growth"],
         "regions": tuple(Region(**region) for region in content["regions"]),
     }
 
 
-def number(name: str, value: Any, missing: float = float("nan"), kind: type = float) -> Any:
-    """A stored number; what stands for it where there is none.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
-    if value is None:
-        return missing
-    if not checks.is_number(value):
-        raise InputError(f"{name} = {checks.shown(value)} is not a number")
-    return kind(value)
+def or_nan(value: float | None, missing: float = float("nan")) -> float:
+    """A stored number, or what stands for it where there is none."""
+    return missing if value is None else value

@@ -7,7 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gmwm._core import checks
+from gmwm._core.files import opened
 from gmwm.errors import InputError
+
+_LARGEST = 1 << 20
+"""Bytes of a document that a person writes."""
 
 
 def read_document(path: Path) -> dict[str, Any]:
@@ -22,13 +26,17 @@ def read_document(path: Path) -> dict[str, Any]:
     InputError
         If it cannot be read, is not YAML or not a mapping, or has a key twice.
     """
-    import yaml
-
     try:
-        content = _load(path.read_text(encoding="utf-8-sig"))
+        with opened(path) as stream:
+            text = stream.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise InputError(f"{path}: has more than {_LARGEST:,} bytes: check the path")
+        content = _load(text.decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
         raise InputError(f"{path}: is not YAML ({_reason(error)}): correct it") from None
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
@@ -59,8 +67,12 @@ def _load(text: str) -> Any:
 
 def _reason(error: Exception) -> str:
     """What is wrong, and in which line, without the parser's own picture of it."""
+    import yaml
+
     mark = getattr(error, "problem_mark", None)
     problem = getattr(error, "problem", None)
     if mark is None or problem is None:
-        return checks.shown(" ".join(str(error).split())).strip("'\"")
+        text = checks.shown(" ".join(str(error).split())).strip("'\"")
+        fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
+        return text if fits else f"a value does not fit its tag, {text}"
     return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"

@@ -1,0 +1,105 @@
+"""Forms of stored results: what each key must hold, or one sentence about the first that does not.
+
+pydantic checks types, ranges and sizes; what belongs together is checked by the forms themselves.
+Keys that a form does not declare pass as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from gmwm._core import checks
+from gmwm._core.notices import SEVERITIES
+from gmwm.errors import InputError, printable
+
+_ASYMMETRY = 1e-6  # of correlations: what is left by rounding in a computed covariance
+_NEGATIVE = -1e-4  # eigenvalue of correlations; all but redundant parameters leave rounding errors
+
+
+class Form(BaseModel):
+    """A mapping of declared keys."""
+
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
+
+    @classmethod
+    def checked(cls, content: Mapping[str, Any]) -> dict[str, Any]:
+        """The content, with texts on one line.
+
+        Raises
+        ------
+        InputError
+            With the place of the first thing that cannot be used.
+        """
+        try:
+            return cls.model_validate(dict(content)).model_dump()
+        except ValidationError as error:
+            raise InputError(_sentence(error)) from None
+
+
+def _sentence(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "content"
+    if first["type"] == "missing":
+        return f"there is no {place}"
+    if first["type"] == "value_error":
+        return f"{place}: {first['ctx']['error']}"
+    return f"{place} = {checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
+
+
+Text = Annotated[str, Field(max_length=10_000), AfterValidator(printable)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+Samples = Annotated[int, Field(ge=1, le=checks.MOST_SAMPLES)]
+Rate = Annotated[float, Field(ge=1.0 / checks.LONGEST_INTERVAL, le=1.0 / checks.SHORTEST_INTERVAL)]
+Interval = Annotated[float, Field(ge=checks.SHORTEST_INTERVAL, le=checks.LONGEST_INTERVAL)]
+Keys = Annotated[Sequence[Text], Field(max_length=1000)]
+Model = Annotated[Sequence[dict[str, Any]], Field(min_length=1, max_length=1000)]
+"""Terms as `gmwm.process` writes them, and reads them with checks of its own."""
+
+
+def covariance(matrix: Sequence[Sequence[float]], size: int, name: str = "covariance") -> None:
+    """Check a covariance: square, symmetric, without a negative variance.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if len(matrix) != size or any(len(row) != size for row in matrix):
+        raise ValueError(f"{name} is not {size} x {size}")
+    array = np.array(matrix, dtype=float).reshape(size, size)
+    scale = np.sqrt(np.maximum(np.diag(array), 0.0))
+    bound = np.outer(scale, scale)
+    if np.any(np.diag(array) < 0.0) or np.any((bound == 0.0) & (array != 0.0)):
+        raise ValueError(f"{name} has a variance that is not positive")
+    correlation = array / np.where(bound > 0.0, bound, 1.0)
+    if np.any(np.abs(correlation - correlation.T) > _ASYMMETRY):
+        raise ValueError(f"{name} is not symmetric")
+    if size and np.min(np.linalg.eigvalsh(correlation)) < _NEGATIVE:
+        raise ValueError(f"{name} is not positive semi-definite")
+
+
+def _severity(text: str) -> str:
+    if text not in SEVERITIES:
+        raise ValueError(f"{checks.shown(text)} is no severity")
+    return text
+
+
+class NoticeForm(Form):
+    """Of `Notice`."""
+
+    code: Text
+    severity: Annotated[str, AfterValidator(_severity)]
+    where: Text
+    text: Text
+    values: dict[Text, bool | int | float | Text | None]
+    action: Text
+    source: Text
+
+
+Notices = Annotated[Sequence[NoticeForm], Field(max_length=100_000)]

@@ -1,0 +1,81 @@
+"""How much memory may be used, and a refusal of what needs more before it is begun."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from gmwm.errors import InputError
+
+VARIABLE = "GMWM_MEMORY"
+"""Environment variable: gigabytes that may be used."""
+
+OUT_OF_MEMORY = (
+    "there is not enough memory: read fewer channels, cut the recording into parts, or use a "
+    "machine with more"
+)
+
+_SHARE = 0.5  # of what is available: other programs need some, and estimates are rough
+_WHERE_UNKNOWN = 4 << 30
+_CGROUP = Path("/sys/fs/cgroup")
+
+
+def budget() -> int:
+    """Bytes that may be used: as `VARIABLE` says, or half of what the machine has to give.
+
+    Raises
+    ------
+    InputError
+        If the variable holds something else than a positive number.
+    """
+    given = os.environ.get(VARIABLE)
+    if given is None:
+        return int(_SHARE * _available())
+    with suppress(ValueError):
+        if 0.0 < float(given) < 1e9:
+            return int(float(given) * (1 << 30))
+    raise InputError(f"{VARIABLE} = {given!r}: give a positive number of gigabytes, e.g. 8")
+
+
+def require(needed: float, what: str) -> None:
+    """Refuse what needs more than the budget.
+
+    Parameters
+    ----------
+    needed : float
+        Bytes.
+    what : str
+        For the message: the file.
+
+    Raises
+    ------
+    InputError
+        With the code "memory".
+    """
+    allowed = budget()
+    if needed > allowed:
+        raise InputError(
+            f"{what} needs about {_gigabytes(needed)} of memory, and {_gigabytes(allowed)} may be "
+            f"used: read fewer columns with channels=, cut it into parts, or set {VARIABLE} (GB) "
+            "if there is more",
+            "memory",
+        )
+
+
+def _gigabytes(count: float) -> str:
+    return f"{count / (1 << 30):.3g} GB"
+
+
+def _available() -> int:
+    """Bytes that the system says it can give, of a container no more than its limit."""
+    found = _WHERE_UNKNOWN
+    with suppress(OSError, ValueError, AttributeError):  # AttributeError: not on Windows
+        found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    with suppress(OSError, ValueError, IndexError, StopIteration):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        found = next(int(each.split()[1]) for each in lines if each.startswith("MemAvail")) << 10
+    for limit in ("memory.max", "memory/memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):  # ValueError: "max"
+            found = min(found, int((_CGROUP / limit).read_text()))
+    return found

@@ -1,0 +1,39 @@
+"""Damaged inputs of every kind are used or refused in one sentence; see `fuzz`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fuzz
+
+SOME = {"npy": 150, "odd": 2, "document": 25, "study": 20, "field": 20}
+
+
+@pytest.mark.parametrize("name", sorted(fuzz.KINDS))
+def test_some_inputs(name, tmp_path):
+    outcomes = [fuzz.attempt(name, 0, case, tmp_path) for case in range(SOME.get(name, 40))]
+    assert any(outcome is None for outcome in outcomes)
+
+
+# What the generator found: kind, seed, case.
+FOUND = [
+    ("text", 0, 60),  # every chosen channel was auxiliary
+    ("odd", 0, 2),  # 1e-200
+    ("odd", 0, 4),  # alternating values
+    ("odd", 0, 13),  # a square wave
+    ("odd", 0, 29),  # a spike of 1e100
+    ("odd", 0, 136),  # half of the record without any error of prediction
+]
+
+
+@pytest.mark.parametrize(("name", "seed", "case"), FOUND)
+def test_what_was_found(name, seed, case, tmp_path):
+    fuzz.attempt(name, seed, case, tmp_path)
+
+
+@pytest.mark.slow
+def test_seventy_thousand_inputs():
+    program = Path(fuzz.__file__)
+    subprocess.run([sys.executable, program, "--cases", "70000", "--seed", "1"], check=True)

@@ -1,0 +1,161 @@
+"""Names that come from files and command lines: text everywhere, obeyed nowhere."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+
+import gmwm
+from gmwm.errors import InputError, printable
+from gmwm.export import write_kalibr
+
+X = np.random.default_rng(0).normal(size=(400, 6))
+
+
+def run(folder, *arguments, **variables):
+    done = subprocess.run(
+        [sys.executable, "-m", "gmwm", *arguments],
+        cwd=folder, capture_output=True, env={**os.environ, **variables},
+    )  # fmt: skip
+    assert b"Traceback" not in done.stderr
+    return done
+
+
+def recording(path, names=("wx", "wy", "wz", "ax", "ay", "az"), extra="temp [/degC]"):
+    header = ",".join([*names, extra])
+    rows = [
+        ",".join(f"{v:.6g}" for v in (*row, 20.0)) for row in X + np.array([0.0, 0, 0, 0, 0, 9.8])
+    ]
+    path.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
+    return path
+
+
+OPTIONS = ("--rate", "100", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--leave", "all")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("gyro_x [deg/s] µ", "gyro_x [deg/s] µ"),
+        ("a\nb\tc", "a b c"),
+        ("\x1b[31m\x07", "\\x1b[31m\\x07"),
+        ("\udcff", "\\udcff"),
+        ("\u202eexe", "\\u202eexe"),
+        ("\u2028", "\\u2028"),
+    ],
+)
+def test_one_printable_line(text, line):
+    assert printable(text) == line
+    assert str(InputError(text)) == line
+
+
+def test_a_message_is_not_longer_than_people_read():
+    assert len(str(InputError("x" * 5000))) == 800
+
+
+def test_markup_in_a_header_is_shown_as_it_is(tmp_path):
+    path = recording(tmp_path / "static.csv", extra="x [/degC][bold]:smile:")
+    done = run(tmp_path, "calibrate", path.name, *OPTIONS, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert "x [/degC][bold]:smile:" in " ".join(done.stdout.decode().split())
+
+
+def test_escape_codes_of_a_header_do_not_reach_the_terminal(tmp_path):
+    path = recording(tmp_path / "static.csv", extra="temp\x1b[31mred")
+    for command in (("health", path.name), ("calibrate", path.name, "-o", "out")):
+        done = run(tmp_path, command[0], command[1], *OPTIONS[:6], *command[2:])
+        assert done.returncode == 0, done.stderr
+        assert b"\x1b" not in done.stdout + done.stderr
+    assert b"\x1b" not in (tmp_path / "out" / "report.html").read_bytes()
+
+
+def test_names_inject_nothing_into_yaml(tmp_path):
+    names = {"gyro_x\nupdate_rate: 1": X[:, 0], "accel_x": X[:, 3]}
+    given = gmwm.Recording.from_arrays(
+        names, 100.0, {"gyro": "rad/s", "accel": "m/s^2"}, source="a.csv\nrostopic: /evil"
+    )
+    calibration = gmwm.calibrate(given, gmwm.WhiteNoise() + gmwm.RandomWalk())
+    path = write_kalibr(calibration, tmp_path / "imu.yaml")
+    content = yaml.safe_load(path.read_text())
+    assert content["update_rate"] == 100
+    assert content["rostopic"] == "/imu0"
+    assert len(path.read_text().splitlines()) == len(path.read_bytes().split(b"\n")) - 1
+
+
+def test_a_file_name_that_is_not_utf8(tmp_path):
+    name = os.fsdecode(b"stat\xff\x1b[31mic.csv")
+    recording(tmp_path / name)
+    done = run(tmp_path, "calibrate", name, *OPTIONS, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert b"stat\\udcff" in done.stdout
+    assert b"\x1b" not in done.stdout
+    assert gmwm.load(tmp_path / "out" / "calibration.json").source == "stat\\udcff\\x1b[31mic.csv"
+    done = run(tmp_path, "calibrate", os.fsdecode(b"no\xff.csv"), *OPTIONS)
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"gmwm: no\\udcff.csv does not exist")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_that_lacks_letters(tmp_path, encoding):
+    recording(tmp_path / "Größe²Ω.csv", extra="température Ω")
+    done = run(
+        tmp_path, "calibrate", "Größe²Ω.csv", *OPTIONS, "-o", "out", PYTHONIOENCODING=encoding
+    )
+    assert done.returncode == 0, done.stderr
+    assert "\\u03a9" in done.stdout.decode(encoding)
+
+
+def test_no_memory_is_a_sentence(tmp_path):
+    recording(tmp_path / "static.csv")
+    done = run(tmp_path, "calibrate", "static.csv", *OPTIONS, GMWM_MEMORY="1e-6")
+    assert done.returncode == 2
+    assert b"may be used" in done.stderr
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_a_pipe_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    done = run(tmp_path, "calibrate", "pipe.csv", *OPTIONS)
+    assert done.returncode == 2
+    assert b"pipe.csv is a pipe or a device: write its content to a file first" in done.stderr
+    for name in ("pipe.csv", "/dev/zero"):
+        done = run(tmp_path, "budget", name)
+        assert done.returncode == 2
+        assert b"is a pipe or a device" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["!!float x", "!!bool 2", "!!timestamp x", "!!binary '='", "!!null 3", "!!map [1]", "!!omap 3",
+     "!!set [a]", "1.0e+999", ".nan", "2001-13-45", "9" * 5000],
+)  # fmt: skip
+def test_values_of_a_study_that_are_none(tmp_path, text):
+    (tmp_path / "study.yaml").write_text(
+        f"trajectory: car\nduration: {text}\ntruth: x\nfilters: {{}}\n"
+    )
+    done = run(tmp_path, "navigate", "study.yaml")
+    assert done.returncode == 2, done.stdout
+    assert done.stderr.startswith(b"gmwm: study.yaml: ")
+    assert done.stderr.count(b"\n") == 1
+    assert len(done.stderr) < 400
+
+
+def test_a_document_of_aliases_is_not_written_out(tmp_path):
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 12)]
+    (tmp_path / "study.yaml").write_text("\n".join([*lines, "trajectory: *a11", ""]))
+    done = run(tmp_path, "navigate", "study.yaml")
+    assert done.returncode == 2
+    assert len(done.stderr) < 400
+
+
+def test_json_keeps_text(tmp_path):
+    """What is escaped is what would be obeyed, and nothing else."""
+    given = gmwm.Recording.from_arrays({"gyro_ä²": X[:, 0]}, 100.0, {"gyro": "rad/s"}, source="<b>")
+    path = gmwm.calibrate(given, gmwm.WhiteNoise()).save(tmp_path / "a.json")
+    assert json.loads(path.read_text())["source"] == "<b>"
+    assert list(gmwm.load(path)) == ["gyro_ä²"]

@@ -1,0 +1,112 @@
+"""Files that would need more memory than there is: refused before they are read."""
+
+import gzip
+import io
+import os
+import resource
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from gmwm import InputError, read
+from gmwm._core import memory
+
+UNITS = {"gyro": "rad/s"}
+ROWS = np.random.default_rng(0).normal(size=(100, 3))
+
+
+def npy(array):
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def header(shape):
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode()
+
+
+@pytest.fixture
+def little(monkeypatch):
+    monkeypatch.setenv(memory.VARIABLE, "0.01")  # 10.7 MB
+
+
+def refused(path, **options):
+    with pytest.raises(InputError, match=r"GB of memory, and 0.01 GB may be used") as caught:
+        read(path, rate=100, units=UNITS, **options)
+    assert str(caught.value).startswith(path.name)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_text_by_its_size(tmp_path, little, compressed):
+    path = tmp_path / ("a.csv.gz" if compressed else "a.csv")
+    text = b"1,2,3\n" * 400_000
+    path.write_bytes(gzip.compress(text, 9) if compressed else text)
+    refused(path)
+    assert read(path, rate=100, units=UNITS, channels={"gyro_x": 1}).n == 400_000
+
+
+def test_a_compressed_text_that_does_not_say_its_size(tmp_path, little):
+    path = tmp_path / "a.csv.gz"
+    part = gzip.compress(b"1,2,3\n" * 100_000, 9)  # the last part says its own alone
+    path.write_bytes(part * 8)
+    refused(path)
+
+
+def test_a_bomb_takes_little_memory(tmp_path):
+    path = tmp_path / "a.csv.gz"
+    path.write_bytes(gzip.compress(b"1,2,3\n" * 40_000_000, 1))  # 240 MB, 2.4 GB as numbers
+    code = (
+        "import gmwm\n"
+        f"try: gmwm.read({str(path)!r}, rate=100, units={UNITS!r})\n"
+        "except gmwm.InputError as error: print(error)\n"
+        "print(next(each for each in open('/proc/self/status') if each.startswith('VmHWM')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                          env={**os.environ, memory.VARIABLE: "0.5"})  # fmt: skip
+    message, peak, *_ = done.stdout.splitlines()
+    assert "needs about 2.24 GB of memory, and 0.5 GB may be used" in message
+    assert int(peak.split()[1]) < 400_000  # kB, most of it libraries
+
+
+def test_entries_that_are_not_wanted_are_not_read(tmp_path, little):
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("gyro.npy", npy(ROWS))
+        archive.writestr("temp_log.npy", header((40_000_000,)) + bytes(320_000_000))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found = read(path, rate=100, units=UNITS, channels={"gyro_x": "gyro_x"})
+    np.testing.assert_array_equal(found["gyro_x"].values, ROWS[:, 0])
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 100_000
+    refused(path, channels={"gyro_x": "gyro_x", "gyro_y": "gyro_y", "gyro_z": "temp_log"})
+
+
+def test_an_entry_that_promises_more_than_it_holds(tmp_path):
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("gyro.npy", header((10**13, 3)) + bytes(100))
+    with pytest.raises(InputError, match=r"a.npz is damaged or cut off"):
+        read(path, rate=100, units=UNITS)
+
+
+def test_a_sparse_array(tmp_path, little):
+    path = tmp_path / "a.npy"
+    with path.open("wb") as stream:
+        stream.write(header((10**8, 3)))
+        stream.truncate(stream.tell() + 24 * 10**8)
+    refused(path)
+
+
+def test_no_memory_for_an_entry_is_a_sentence(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    np.savez(path, gyro=ROWS)
+
+    def fail(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(np.lib.format, "read_array", fail)
+    with pytest.raises(InputError, match=r"a.npz: there is not enough memory: read fewer"):
+        read(path, rate=100, units=UNITS)
