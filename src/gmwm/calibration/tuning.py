@@ -4,8 +4,9 @@ SAME_RATE = 1e-3
 """Relative difference of the rates of recordings of one sensor: its averaging times are then the
 same to 0.1 %, less than the width of any level."""
 
-TORN = 32
-"""Times that masks may shorten the longest run: five octaves of averaging times."""
+MOST_LEFT_OUT = 0.1
+"""Fraction of the samples of a channel that outliers may take: up to it gaps move no level by more
+than a fifth of a standard error (docs/health.md)."""
 
 MOST_TERMS = 2
 """Lines and resonances offered to the model of a channel; each doubles the candidate models."""

@@ -12,7 +12,7 @@ from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import contamination, contamination_notice
 from gmwm.diagnosis.drift import drift_notice, variance_notice
-from gmwm.diagnosis.events import event_notice, find_events
+from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
@@ -22,6 +22,7 @@ from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
 from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.tails import heavy_tails, tails_notice
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
 
@@ -175,6 +176,11 @@ def _examined(channel: Channel) -> _Examined:
         )
     events = find_events(errors)
     outliers = contamination(errors, events)
+    tails = heavy_tails(errors) if outliers > 0.0 else None
+    if tails is not None:
+        events, outliers = find_events(errors, tails), 0.0
+    elif outliers > 0.0:
+        events = with_single_outliers(events, errors, values, step)
     usable = errors.known.copy()
     quiet = values.copy()
     for start, stop in events:
@@ -185,6 +191,7 @@ def _examined(channel: Channel) -> _Examined:
         saturation_notice(name, unit, present, step),
         event_notice(name, unit, dt, values, events, errors.level),
         contamination_notice(name, outliers),
+        tails_notice(name, errors, tails),
         rounding_notice(name, unit, step, errors.level),
         variance_notice(name, unit, dt, errors, usable, step),
         drift_notice(name, unit, dt, quiet),
