@@ -48,8 +48,8 @@ class Screened:
 def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Screened:
     """Examine a recording and mask, offer terms or make variances robust as it needs.
 
-    Outliers all over the record are left out like shocks. Where that would take more than a tenth of
-    the samples, or they are not to be left out, the wavelet variances are robust instead.
+    Outliers all over the record are left out like shocks. Where that would take more than a tenth
+    of the samples, or they are not to be left out, the wavelet variances are robust instead.
 
     Parameters
     ----------

@@ -83,8 +83,8 @@ def heavy_tails(errors: Innovations) -> Tails | None:
     Returns
     -------
     Tails or None
-        None if Gaussian noise with outliers is as likely, large errors cluster, the law has no variance or hardly one,
-        or the noise hides in the rounding.
+        None if Gaussian noise with outliers is as likely, large errors cluster, the law has no
+        variance or hardly one, or the noise hides in the rounding.
     """
     counted = errors.known
     if errors.rounding > tuning.ROUNDING_OF_BODY * errors.level or not errors.level > 0.0:

@@ -178,7 +178,7 @@ DAMPING_STARTS = (0.01, 0.05, 0.15)
 # -- the tails of the noise -----------------------------------------------------------------------
 
 BIN_OF_BODY = 0.25
-"""Standard deviations, up to `FAR`: a shape shows in sixteen bins, and rounding to less does not."""
+"""Standard deviations, up to `FAR`: sixteen bins show a shape, and finer rounding does not."""
 
 OCTAVES_OF_TAIL = 8
 """Beyond `FAR`, in quarters of an octave: up to a thousand standard deviations."""

@@ -170,9 +170,9 @@ class WaveletVariance:
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
         """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
 
-        Gaussian but for its white part, whose fourth cumulant c_4 makes the mean square of n samples
-        vary by c_4 / n more, and all levels alike: of averaging times of m samples they hold
-        1/(2 m) of it.
+        Gaussian but for its white part, whose fourth cumulant c_4 makes the mean square of n
+        samples vary by c_4 / n more. Levels of m samples have 1/(2 m) of that mean square, all of
+        them together.
 
         Parameters
         ----------

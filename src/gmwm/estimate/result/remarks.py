@@ -30,6 +30,10 @@ REASONS = {
     "no-region": "regions_found",
     "wrong-slope": "slopes_agree",
     "recordings-differ": "recordings_agree",
+    "step": "stationary",
+    "transient": "stationary",
+    "drift-at-start": "stationary",
+    "slow-period": "stationary",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
