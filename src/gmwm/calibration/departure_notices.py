@@ -12,6 +12,7 @@ from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.departures import Departure, departures
+from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.readers import Channel, Recording
 from gmwm.variance import PooledVariance
@@ -96,6 +97,11 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
     -------
     Recording
 
+    Raises
+    ------
+    InputError
+        If a fit is of a recording of another length.
+
     Examples
     --------
     >>> import gmwm, numpy as np
@@ -109,6 +115,12 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
     >>> again["gyro_x"].valid, list(again["gyro_x"].params)
     (True, ['N'])
     """
+    for name, fit in fits.items():
+        if name in recording and fit.wv.n * fit.wv.dt > recording.duration + recording.dt:
+            raise InputError(
+                f"{recording.source or 'the recording'} is not the one that was calibrated: "
+                f"{recording.duration:g} s, and the fit of {name} has {fit.wv.n * fit.wv.dt:g} s"
+            )
     channels = tuple(
         _without(channel, fits[channel.name].notices) if channel.name in fits else channel
         for channel in recording.channels

@@ -104,11 +104,10 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
         best = max(tests, key=lambda test: test.log_evidence)
         if evidence < tuning.POSSIBLE:
             break
-        curve = best.curve
-        known = np.vstack([known, means.differences(curve[None, :])])
+        known = _basis(np.vstack([known, means.differences(best.neighbours)]))
         # A drift of the whole record has a test of its own (slope_p_value): here it competes only.
         if best.family.kind != "drift":
-            share = _share(curve, means.step, fitted)
+            share = _share(best.curve, means.step, fitted)
             kind, time, size = best.family.kind, best.time, best.size
             found.append(Departure(kind, time, size, evidence, share, best.phase))
             if evidence < tuning.EVIDENT:
@@ -233,7 +232,10 @@ class _Test:
     def of(cls, family: Family, means: _Means, noises: list[_Noise]) -> _Test:
         data = means.differences(means.blocks)
         members, rank, _ = family.curves.shape
-        curves = csr_array(means.differences(family.curves).reshape(members * rank, -1))
+        curves = means.differences(family.curves).reshape(members * rank, -1)
+        few = csr_array(curves)  # of a step, two differences
+        if few.nnz < tuning.FEW * curves.size:
+            curves = few
         alone, scores, products = [], [], []
         for noise in noises:
             solved = noise.inverse @ data
@@ -269,6 +271,13 @@ class _Test:
         return np.asarray((self.weight @ self.sizes) @ shape)
 
     @property
+    def neighbours(self) -> FloatArray:
+        """The members about the most evident one, whose sum is one between them, (k, B)."""
+        best = int(np.argmax(self.evidence))
+        near = self.family.curves[max(best - tuning.NEAR, 0) : best + tuning.NEAR + 1]
+        return near.reshape(-1, near.shape[-1])
+
+    @property
     def size(self) -> tuple[float, float, float]:
         """Size of the most evident member and its 95 % interval; an amplitude if it has phases."""
         each = self.weight @ self.sizes
@@ -298,13 +307,23 @@ class _Test:
         return best, float(edges[low]), float(edges[min(high, order.size - 1) + 1])
 
 
-def _products(curves: csr_array, inverse: FloatArray, members: int, rank: int) -> FloatArray:
+def _basis(rows: FloatArray) -> FloatArray:
+    """Orthonormal rows that span the same."""
+    _, sizes, basis = np.linalg.svd(
+        rows / np.linalg.norm(rows, axis=1)[:, None], full_matrices=False
+    )
+    return np.asarray(basis[sizes > tuning.SPANNED * sizes[0]])
+
+
+def _products(
+    curves: FloatArray | csr_array, inverse: FloatArray, members: int, rank: int
+) -> FloatArray:
     """Of the curves of each member with each other, (G, r, r)."""
     solved = np.asarray(curves @ inverse)
-    if rank == 1:
+    if isinstance(curves, csr_array):
         return np.asarray(curves.multiply(solved).sum(axis=1)).reshape(members, 1, 1)
-    dense = curves.toarray().reshape(members, rank, -1)
-    return np.asarray(dense @ solved.reshape(members, rank, -1).swapaxes(-1, -2))
+    each, other = (rows.reshape(members, rank, -1) for rows in (curves, solved))
+    return np.asarray(each @ other.swapaxes(-1, -2))
 
 
 def _share(curve: FloatArray, step: float, fitted: Fit) -> float:

@@ -74,3 +74,12 @@ SHARE_POINTS = 512
 
 NO_INFORMATION = 1e-9
 """Of the largest information, which a curve has that known ones explain."""
+
+NEAR = 2
+"""Members on either side of one that is found that are known with it: its time is between them."""
+
+SPANNED = 1e-6
+"""Of the largest singular value, below which curves are no others."""
+
+FEW = 0.05
+"""Fraction of differences that are not zero, below which those of a family are kept as sparse."""
