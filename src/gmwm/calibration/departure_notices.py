@@ -32,14 +32,22 @@ def with_departures(fitted: Fit, sources: Sequence[str]) -> Fit:
     wv = fitted.wv
     parts = wv.parts if isinstance(wv, PooledVariance) else (wv,)
     notices = [
-        replace(_notice(found, wv.unit), source=source if len(parts) > 1 else "")
+        replace(departure_notice(found, wv.unit), source=source if len(parts) > 1 else "")
         for part, source in zip(parts, sources, strict=True)
         for found in departures(fitted, part)
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
 
 
-def _notice(found: Departure, unit: str) -> Notice:
+def departure_notice(found: Departure, unit: str) -> Notice:
+    """What it is, and whether a fit beside it is valid.
+
+    Parameters
+    ----------
+    found : Departure
+    unit : str
+        Of the channel, SI.
+    """
     size, low, high = (readable(each, unit, sign=True) for each in found.size)
     size = f"{size} ({low} .. {high})"
     time, first, last = (f"{each:.4g}" for each in found.time)

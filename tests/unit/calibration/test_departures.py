@@ -6,7 +6,8 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
-from gmwm.calibration import departures
+from gmwm.calibration import Departure, departures
+from gmwm.calibration.departure_notices import departure_notice
 from gmwm.calibration.tuning import EVIDENT
 
 DT = 1.0
@@ -163,14 +164,23 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     assert low < 2e-6 < high
 
 
-def test_a_small_one_leaves_the_fit_valid_with_a_warning():
-    # Beside a random walk that makes more of the long averaging times than the step does.
-    model = WHITE + RandomWalk(2e-5)
-    x = noise(11, model) + 0.6 * SAMPLE * STEP
-    fit = gmwm.calibrate(recording(x), WhiteNoise() + RandomWalk())["gyro_x"]
-    (notice,) = [one for one in fit.notices if one.code == "step"]
-    assert notice.severity == "warning"
-    assert fit.valid
+@pytest.mark.parametrize(
+    ("evidence", "share", "severity"),
+    [
+        (101.0, 0.2, "bad"),
+        (101.0, 0.18, "warning"),
+        (99.0, 0.2, "warning"),
+        (99.0, 0.18, "note"),
+    ],
+)
+def test_what_makes_a_fit_invalid(evidence, share, severity):
+    for kind in ("step", "transient", "drift-at-start", "slow-period"):
+        found = Departure(kind, (900.0, 800.0, 1000.0), (0.1, 0.05, 0.15), evidence, share)
+        notice = departure_notice(found, "rad/s")
+        assert (notice.code, notice.severity) == (kind, severity)
+        assert notice.values["share"] == share
+        assert "+5.73 deg/s (+2.86 deg/s .. +8.59 deg/s)" in notice.text
+        assert "900 s (800 .. 1000)" in notice.text
 
 
 @pytest.mark.parametrize(
