@@ -134,6 +134,18 @@ def test_harmonics_belong_to_their_line():
     assert "harmonics at 5.1" in notices[0].text
 
 
+def test_twice_the_frequency_is_a_harmonic_and_the_golden_ratio_is_none():
+    t = DT * np.arange(50_000)
+    x = np.random.default_rng(5).normal(size=t.size)
+    for frequency in (3.1, 6.2, 3.1 * 1.618):
+        x += 0.3 * np.sin(2 * np.pi * frequency * t)
+    notices = line_notices("accel_x", "m/s^2", lines(x))
+    assert {round(f.values["frequency"], 2): f.values["harmonics"] for f in notices} == {
+        3.1: 1,
+        5.02: 0,
+    }
+
+
 def test_many_lines_are_summed_up():
     n = 50_000
     t = DT * np.arange(n)

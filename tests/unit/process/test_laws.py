@@ -58,20 +58,32 @@ def test_closed_form_equals_spectral_integral(process, dt):
 
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
 def test_closed_form_at_averaging_times_that_are_not_powers_of_two(process):
-    tau = np.array([3.0, 7.0, 100.0, 1023.0])
+    lengths, dt = np.array([3, 7, 100, 1023]), 0.25
     if process.lines() or isinstance(process, gmwm.RateRamp):
-        expected = process.haar_variance(2.0 * tau / 2.0, 1.0)
+        expected = [mean_square_difference(process, m, dt) for m in lengths]
     else:
-        expected = haar_variance(process.psd, tau, 1.0)
-    np.testing.assert_allclose(process.haar_variance(tau, 1.0), expected, rtol=1e-8)
+        expected = haar_variance(process.psd, lengths * dt, dt)
+    np.testing.assert_allclose(process.haar_variance(lengths * dt, dt), expected, rtol=1e-8)
+
+
+def mean_square_difference(process, m, dt):
+    """Half the difference of two means over m samples each, squared, over all phases of a line."""
+    t = dt * np.arange(2 * m)
+    if isinstance(process, gmwm.RateRamp):
+        series = process.values["R"] * t[None]
+    else:
+        ((frequency, amplitude),) = process.lines()
+        phases = np.array([0.0, 0.5 * np.pi])
+        series = amplitude * np.cos(2 * np.pi * frequency * t + phases[:, None])
+    return np.mean(((np.mean(series[:, m:], axis=1) - np.mean(series[:, :m], axis=1)) / 2.0) ** 2)
 
 
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
 def test_closed_form_equals_mean_over_simulation(process):
-    n, runs, dt = 2048, 40, 1.0
+    n, runs, dt = 2048, 40, 0.25
     rng = np.random.default_rng(20)
     waves = [wavelet_variance(process.simulate(n, dt, rng), dt).variance for _ in range(runs)]
-    expected = process.haar_variance(2.0 ** np.arange(11), dt)
+    expected = process.haar_variance(2.0 ** np.arange(11) * dt, dt)
     if isinstance(process, gmwm.RateRamp):
         np.testing.assert_allclose(waves[0], expected, rtol=1e-9)
         return

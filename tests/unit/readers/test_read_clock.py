@@ -174,6 +174,22 @@ def test_jitter_is_noted(timed):
     assert "% of a step" in texts(recording)[0]
 
 
+def test_a_jump_is_no_jitter(timed):
+    jitter = np.random.default_rng(1).uniform(-0.0005, 0.0005, 80)
+    stamps = 0.01 * np.arange(80) + jitter
+    steps = np.delete(np.diff(stamps), 49)
+    stamps[50:] += 0.2
+    recording = read(timed(stamps, "time_s"), units=UNITS)
+    assert recording.jitter == pytest.approx(np.std(steps) / 0.01, rel=0.01)
+
+
+def test_a_time_column_that_is_given_as_a_channel_is_no_clock(timed):
+    path = timed(0.5 * np.arange(80), "time_s")
+    found = read(path, units=UNITS, channels={"gyro_x": "time_s"}, rate=100.0)
+    assert found.rate == 100.0
+    assert not [notice for notice in found.notices if notice.code == "time-stamps"]
+
+
 def test_rounded_stamps_are_fine(timed):
     stamps = np.round(np.arange(80) / 400, 3)
     assert read(timed(stamps), units=UNITS).rate == pytest.approx(400, rel=0.01)

@@ -1,6 +1,7 @@
 """Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -290,3 +291,18 @@ def test_misfits_of_two_kinds_do_not_make_each_other_good(tmp_path):
     assert found.verdict.code == "mixed-sizes"
     assert found.verdict.values["position"] > 1.0 > found.verdict.values["velocity"]
     assert "which it is not" in str(found)
+
+
+@pytest.mark.parametrize(("lag", "white"), [(1, False), (2, True)])
+def test_whiteness_is_that_from_one_fix_to_the_next(tmp_path, lag, white):
+    drive(tmp_path)
+    found = Navigated.of(Measured.of(content(), tmp_path))
+    innovations = found.solution.innovations
+    noise = np.random.default_rng(4).standard_normal((innovations.standard.shape[0] + lag, 3))
+    standard = (noise[lag:] + noise[:-lag]) / np.sqrt(2.0)
+    for kind in np.unique(innovations.kind):
+        of_kind = innovations.kind == kind
+        standard[of_kind] = standard[: np.count_nonzero(of_kind)]
+    changed = replace(innovations, value=standard * innovations.sd)
+    solution = replace(found.solution, innovations=changed)
+    assert (replace(found, solution=solution).test("position").whiteness > 0.01) is white

@@ -155,6 +155,30 @@ def test_coning_leaves_what_savage_says(corrected: bool) -> None:
     assert abs(error) == pytest.approx(scale * missing, abs=2.0 * angle**2 * scale * whole)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_rate_and_force_that_change_linearly_leave_no_second_order_error(seed: int) -> None:
+    # Sculling: the exact integral of a force in turning axes, by Gauss-Legendre quadrature.
+    rng = np.random.default_rng(seed)
+    dt, rate, force = 1e-4, 3.0 * rng.normal(size=(2, 3)), 10.0 * rng.normal(size=(2, 3))
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+
+    def integrals(first: float) -> tuple[np.ndarray, np.ndarray]:
+        middle = first + 0.5
+        return dt * (rate[0] + rate[1] * middle), dt * (force[0] + force[1] * middle)
+
+    exact = np.zeros(3)
+    for u, w in zip(0.5 * (nodes + 1.0), 0.5 * weights, strict=True):
+        turned = matrix_from_rotation_vector(dt * (rate[0] * u + 0.5 * rate[1] * u**2))
+        exact += w * dt * turned @ (force[0] + force[1] * u)
+    (angle, push), (angle_before, push_before) = integrals(0.0), integrals(-1.0)
+    found = step(
+        np.eye(3), np.zeros(3), np.array([0.5, 0.1, 0.0]),
+        *angle, *push, *angle_before, *push_before, dt,
+    )  # fmt: skip
+    sculling = (np.cross(angle_before, push) + np.cross(push_before, angle)) / 12.0
+    np.testing.assert_allclose(found, exact, atol=0.02 * np.min(np.abs(sculling)), rtol=0.0)
+
+
 def test_the_step_returns_the_specific_force_of_the_frame() -> None:
     C = matrix_from_rpy(np.array([0.1, 0.2, 0.3]))
     force = np.array([0.02, -0.01, -0.1])

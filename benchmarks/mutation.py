@@ -1,0 +1,186 @@
+"""How many single changes of the source do the unit tests notice?
+
+Run with ``pip install cosmic-ray coverage`` and ``python benchmarks/mutation.py -o FOLDER`` (two
+hours on one core; ``--mutants 24`` for a first look). Cosmic Ray makes the changes in a copy of the
+checkout, drawn at random, as many in each room: arithmetic and comparisons turned, terms and
+conditions negated, constants raised or lowered by one, loops skipped. Of the unit tests, those run
+that pass through the changed line (or, where it is compiled or runs at import, those of its room).
+A change that no test fails on survives; survivors are printed with the changed line.
+
+The folder keeps results; a second call goes on with what is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+from coverage import CoverageData
+
+ROOMS = (
+    "process", "variance", "estimate", "selection", "diagnosis", "readers", "ins",
+    "calibration budget export",
+)  # fmt: skip
+ARITHMETIC = "Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul"
+OPERATORS = re.compile(
+    rf"ReplaceBinaryOperator_({ARITHMETIC})$|ReplaceComparisonOperator_(Lt|Gt|LtE|GtE|Eq|NotEq)_"
+    "(Lt|Gt|LtE|GtE|Eq|NotEq)$|NumberReplacer|ReplaceUnaryOperator_USub_UAdd|AddNot|"
+    "ReplaceTrueWithFalse|ReplaceFalseWithTrue|ReplaceAndWithOr|ReplaceOrWithAnd|ZeroIteration"
+)
+LONGEST = 240.0
+"""s, after which the tests of a change are stopped: it hangs, and is noticed."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: the occurrence of an operator in a file, and the line it is in."""
+
+    path: str
+    operator: str
+    occurrence: int
+    line: int
+    column: int
+
+
+def mutants_of(path: Path, tree: Path) -> Iterator[Mutant]:
+    """All changes of a file."""
+    nodes = list(ast_nodes(get_ast(path.read_text())))
+    for name in operator_names():
+        if not OPERATORS.search(name):
+            continue
+        operator = get_operator(name)()
+        places = (start for node in nodes for start, _ in operator.mutation_positions(node))
+        for occurrence, (line, column) in enumerate(places):
+            yield Mutant(str(path.relative_to(tree)), name, occurrence, line, column)
+
+
+def drawn(tree: Path, count: int, seed: int) -> list[Mutant]:
+    """As many of each room; at most one of each place in the source."""
+    rng = np.random.default_rng(seed)
+    chosen = []
+    for room in ROOMS:
+        files = [f for each in room.split() for f in (tree / "src/gmwm" / each).rglob("*.py")]
+        everything = [mutant for file in sorted(files) for mutant in mutants_of(file, tree)]
+        seen: set[tuple[str, int, int]] = set()
+        for k in rng.permutation(len(everything)):
+            mutant = everything[k]
+            place = (mutant.path, mutant.line, mutant.column)
+            if place not in seen:
+                seen.add(place)
+                chosen.append(mutant)
+            if len(seen) == -(-count // len(ROOMS)):
+                break
+    return chosen
+
+
+def pytest(tree: Path, *arguments: str, **options: float) -> subprocess.CompletedProcess[str]:
+    """Run pytest in the copy, in one process."""
+    environment = {**os.environ, "PYTHONPATH": str(tree / "src"), "PYTHONDONTWRITEBYTECODE": ""}
+    command = [sys.executable, *arguments, "-q", "-p", "no:cacheprovider", "-o",
+               "addopts=-m 'not slow'"]  # fmt: skip
+    return subprocess.run(
+        command, cwd=tree, env=environment, capture_output=True, text=True, check=False, **options
+    )
+
+
+def traced(tree: Path, folder: Path) -> CoverageData:
+    """Which test functions pass through which line."""
+    file = folder / "coverage"
+    if not file.exists():
+        settings = folder / "coverage.ini"
+        settings.write_text(
+            f"[run]\nsource = {tree}/src/gmwm\ndata_file = {file}\n"
+            "dynamic_context = test_function\n"
+        )
+        pytest(tree, "-m", "coverage", "run", f"--rcfile={settings}", "-m", "pytest", "tests/unit")
+    data = CoverageData(str(file))
+    data.read()
+    return data
+
+
+def tests_of(mutant: Mutant, tree: Path, data: CoverageData) -> list[str]:
+    """Test functions through its line, those of its own room first; or its room's files."""
+    contexts = data.contexts_by_lineno(str(tree / mutant.path)).get(mutant.line, [])
+    parts = Path(mutant.path).parts[2:]
+    own = tree / "tests/unit" / parts[0]
+    files = {file.stem: file for file in (tree / "tests/unit").rglob("test_*.py")}
+    found = []
+    for context in contexts:
+        names = context.split(".")
+        module = next((name for name in names if name in files), None)
+        if module is not None:
+            rest = names[names.index(module) + 1 :]
+            found.append(
+                (not files[module].is_relative_to(own), "::".join([str(files[module]), *rest]))
+            )
+    return [name for _, name in sorted(set(found))] or [str(own)]
+
+
+def survives(mutant: Mutant, tree: Path, data: CoverageData) -> bool:
+    """Whether no test fails."""
+    file = tree / mutant.path
+    source, stat = file.read_text(), file.stat()
+    changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
+    try:
+        file.write_text(changed)
+        result = pytest(tree, "-m", "pytest", "-x", *tests_of(mutant, tree, data), timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return False
+    finally:
+        file.write_text(source)
+        # Compiled loops are cached by the time of their file.
+        os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    return result.returncode == 0
+
+
+def main() -> None:
+    """Draw, run, print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--mutants", type=int, default=304)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    options = parser.parse_args()
+    folder = options.output.resolve()
+    tree = folder / "tree"
+    if not tree.exists():
+        ignored = shutil.ignore_patterns(".git", ".venv", "out")
+        shutil.copytree(Path(__file__).resolve().parents[1], tree, ignore=ignored)
+    data = traced(tree, folder)
+    record = folder / "results.json"
+    results = json.loads(record.read_text()) if record.exists() else {}
+    for mutant in drawn(tree, options.mutants, options.seed):
+        key = json.dumps(asdict(mutant))
+        if key not in results:
+            results[key] = survives(mutant, tree, data)
+            record.write_text(json.dumps(results))
+    report({Mutant(**json.loads(key)): alive for key, alive in results.items()}, tree)
+
+
+def report(results: dict[Mutant, bool], tree: Path) -> None:
+    """Caught by room, and the survivors."""
+    print(f"{'room':<28}caught   of")
+    for room in (*ROOMS, " ".join(ROOMS)):
+        alive = [a for m, a in results.items() if Path(m.path).parts[2] in room.split()]
+        name = "all" if room == " ".join(ROOMS) else room
+        print(f"{name:<28}{alive.count(False):>6}{len(alive):>5}")
+    print("\nSurvivors")
+    for mutant in sorted((m for m, a in results.items() if a), key=lambda m: (m.path, m.line)):
+        line = (tree / mutant.path).read_text().splitlines()[mutant.line - 1]
+        print(f"{mutant.path}:{mutant.line}:{mutant.column} {mutant.operator.split('/')[1]}")
+        print(f"    {line.strip()}")
+
+
+if __name__ == "__main__":
+    main()
