@@ -75,8 +75,11 @@ def departure_notice(found: Departure, unit: str) -> Notice:
     severity: Severity
     if found.is_evident:
         severity = "bad" if harmful else "warning"
-        text = f"{what}; it accounts for up to {100.0 * min(found.share, 1.0):.2g} % of the model's"
-        text += " wavelet variance, so that slow terms of the model are too large"
+        part = f"{100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
+        text = (
+            f"{what}; it accounts for up to {part} of the model's wavelet variance, so that slow "
+            "terms of the model are too large"
+        )
         action = f"{remedy}, or take it off (gmwm.without_departures)"
     else:
         severity = "warning" if harmful else "note"
