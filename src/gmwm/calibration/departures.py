@@ -255,9 +255,15 @@ class _Test:
         beside = posterior[:, None] + gain
         evidence = logsumexp(beside, axis=0)
         best = int(np.argmax(evidence))
-        weight = np.exp(beside[:, best] - evidence[best])
+        weight = np.asarray(np.exp(beside[:, best] - evidence[best]), dtype=float)
         variances = np.diagonal(np.linalg.inv(information[:, best]), axis1=-2, axis2=-1)
-        return cls(family, np.asarray(evidence), weight, estimate[:, best], variances)
+        return cls(
+            family,
+            np.asarray(evidence),
+            weight,
+            np.asarray(estimate[:, best], dtype=float),
+            variances,
+        )
 
     @property
     def log_evidence(self) -> float:

@@ -10,7 +10,12 @@ from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.contamination import contamination, contamination_notice
+from gmwm.diagnosis.contamination import (
+    contamination,
+    contamination_notice,
+    heavy_tails,
+    tails_notice,
+)
 from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, innovations
@@ -22,7 +27,6 @@ from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
 from gmwm.diagnosis.spectrum import background, bands, spectrum
-from gmwm.diagnosis.tails import heavy_tails, tails_notice
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
 

@@ -9,8 +9,8 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.contamination import Tails
 from gmwm.diagnosis.innovations import Innovations, innovations, running_scale
-from gmwm.diagnosis.tails import Tails
 
 _LISTED = 3
 

@@ -90,8 +90,8 @@ class Health(Document):
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "clock", "gap", "dead", "infinite", "stuck",
-        "saturation", "repeated-samples", "event", "outliers", "rounding", "line", "resonance",
-        "drift", "variance", "temperature", "crosstalk" and "clean".
+        "saturation", "repeated-samples", "event", "outliers", "heavy-tails", "rounding", "line",
+        "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gmwm
+from gmwm.diagnosis.contamination import Tails, heavy_tails
 from gmwm.diagnosis.events import find_events
 from gmwm.diagnosis.innovations import innovations
-from gmwm.diagnosis.tails import Tails, heavy_tails
 
 N = 36_000
 
