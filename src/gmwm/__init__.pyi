@@ -1,6 +1,11 @@
 from . import ins as ins
 from .budget import ErrorBudget as ErrorBudget, ErrorRow as ErrorRow, error_budget as error_budget
-from .calibration import Calibration as Calibration, calibrate as calibrate, load as load
+from .calibration import (
+    Calibration as Calibration,
+    calibrate as calibrate,
+    load as load,
+    without_departures as without_departures,
+)
 from .diagnosis import Health as Health, health as health
 from .errors import (
     FitWarning as FitWarning,

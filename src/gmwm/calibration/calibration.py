@@ -19,6 +19,7 @@ from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
+from gmwm.calibration.departure_notices import with_departures
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
@@ -195,7 +196,10 @@ def calibrate(
     times is taken at its own rate. Fits of a recording that was not static, or whose rate changed,
     are not valid, nor those of an accelerometer that was tilted. Notices report what was found and
     done. A channel that is constant, or of which more than half of the samples are missing, is
-    skipped; auxiliary channels (temperature, voltage, clock) have no model.
+    skipped; auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps,
+    transients at the start and slow periods are looked for beside its noise
+    (`gmwm.calibration.departures`); a fit of which they make more than a tenth of the deviation at
+    some averaging time is not valid.
 
     Parameters
     ----------
@@ -226,7 +230,7 @@ def calibrate(
     _check_together(given)
     treated = [screened(each, screening) for each in given]
     recordings = [each.recording for each in treated]
-    alive, dead = _usable(treated)
+    alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
         for name in alive:
             _model_of(name, model)
@@ -254,9 +258,9 @@ def calibrate(
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
             if given_model is not None:
-                return estimated(given_model, data), ()
+                return with_departures(estimated(given_model, data), sources[name]), ()
             selection = select(data, extra=offered[name])
-            return selection.fit, _ambiguity(name, selection)
+            return with_departures(selection.fit, sources[name]), _ambiguity(name, selection)
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -315,10 +319,13 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             )
 
 
-def _usable(treated: Sequence[Screened]) -> tuple[dict[str, list[Channel]], dict[str, Notice]]:
-    """Each channel in the recordings where it can be used, and why others are skipped."""
+def _usable(
+    treated: Sequence[Screened],
+) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
+    """Each channel in the recordings where it can be used, why others are skipped, and which."""
     rate = treated[0].recording.rate
     alive: dict[str, list[Channel]] = {}
+    sources: dict[str, list[str]] = {}
     dead: dict[str, Notice] = {}
     for each in treated:
         for channel in each.recording.inertial:
@@ -330,7 +337,8 @@ def _usable(treated: Sequence[Screened]) -> tuple[dict[str, list[Channel]], dict
                 repeated = each.repeated.get(channel.name)
                 own = thinned(channel, repeated) if repeated else channel
                 alive.setdefault(channel.name, []).append(own)
-    return alive, {name: why for name, why in dead.items() if name not in alive}
+                sources.setdefault(channel.name, []).append(each.recording.source)
+    return alive, {name: why for name, why in dead.items() if name not in alive}, sources
 
 
 def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) -> str:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-
-import numpy as np
+from typing import Any
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.diagnosis import Health, Repetition, health
 from gmwm.errors import InputError
 from gmwm.process import Model, Process, Resonance, Sinusoid
-from gmwm.readers import Channel, Recording
+from gmwm.readers import Recording
 
 SCREENING = ("events", "lines", "resonances", "outliers")
 """Samples of shocks and spikes are masked; lines and resonances are terms that a model may have;
-the wavelet variances of channels with outliers all over the record are robust."""
+the wavelet variances of channels with more outliers than can be left out are robust."""
 
 _ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
 
@@ -50,8 +48,8 @@ class Screened:
 def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Screened:
     """Examine a recording and mask, offer terms or make variances robust as it needs.
 
-    Nothing is masked in a channel with so many outliers all over the record that masks would leave
-    no run of 1/32 of it, and with that none of its long averaging times.
+    Outliers all over the record are left out like shocks. Where that would take more than a tenth
+    of the samples, or they are not to be left out, the wavelet variances are robust instead.
 
     Parameters
     ----------
@@ -75,13 +73,13 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     robust = frozenset(
         name for name in names if "outliers" in chosen and found.outliers(name) > 0.0
     )
-    masked, kept = recording, frozenset(names)
+    masked = recording
     if "events" in chosen:
-        masked = found.masked(recording)
-        kept = frozenset(name for name in robust if _is_torn(recording[name], masked[name]))
-        masked = found.masked(recording, but=kept) if kept else masked
+        robust = frozenset(name for name in robust if _is_much(found.events(name), recording.n))
+        masked = found.masked(recording, but=robust)
+    left_out = frozenset(names) - robust if "events" in chosen else frozenset()
     issues = [
-        replace(notice, action=_done(notice, notice.where in robust, notice.where in kept))
+        replace(notice, action=_done(notice, robust, left_out), values=_values(notice, left_out))
         for notice in found.notices
         if notice not in recording.notices
     ]
@@ -94,27 +92,26 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     )
 
 
-def _is_torn(whole: Channel, masked: Channel) -> bool:
-    """Whether masks leave no run that is long beside the longest there was."""
-    return _longest_run(masked.values) * tuning.TORN < _longest_run(whole.values)
+def _is_much(events: Sequence[tuple[int, int]], n: int) -> bool:
+    """Whether events take so many samples that gaps in their place would do harm."""
+    return sum(stop - start for start, stop in events) > tuning.MOST_LEFT_OUT * n
 
 
-def _longest_run(values: FloatArray) -> int:
-    """Number of samples in the longest run without a missing one."""
-    gaps = np.flatnonzero(np.isnan(np.concatenate([[np.nan], values, [np.nan]])))
-    return int(np.max(np.diff(gaps))) - 1
+def _values(notice: Notice, left_out: Collection[str]) -> Mapping[str, Any]:
+    if notice.code not in ("event", "outliers"):
+        return notice.values
+    return {**notice.values, "left_out": notice.where in left_out}
 
 
-def _done(notice: Notice, is_robust: bool, is_kept: bool) -> str:
+def _done(notice: Notice, robust: Collection[str], left_out: Collection[str]) -> str:
     """What is done about an issue here, which is not what is advised elsewhere."""
-    if notice.code == "event":
-        if is_robust and is_kept:
-            return "kept: the robust wavelet variances bound their influence"
-        samples = f"{notice.values['samples']:,.0f} samples"
-        return "kept, as requested" if is_kept else f"left out, {samples}"
-    if notice.code == "outliers":
-        done = "robust wavelet variances bound their influence; standard errors are 1.3 times as"
-        return f"{done} large" if is_robust else "counted in full, as requested"
+    if notice.code in ("event", "outliers"):
+        samples = f", {notice.values['samples']:,.0f} samples" if notice.code == "event" else ""
+        if notice.where in left_out:
+            return f"left out{samples}"
+        if notice.where in robust:
+            return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
+        return "kept, as requested"
     if notice.code in ("dead", "infinite"):
         return "the channel is skipped"
     if notice.code in _ADVICE:

@@ -1,11 +1,14 @@
 """Thresholds of the calibration, each with its source or its reason."""
 
+import numpy as np
+
 SAME_RATE = 1e-3
 """Relative difference of the rates of recordings of one sensor: its averaging times are then the
 same to 0.1 %, less than the width of any level."""
 
-TORN = 32
-"""Times that masks may shorten the longest run: five octaves of averaging times."""
+MOST_LEFT_OUT = 0.1
+"""Fraction of the samples of a channel that outliers may take: up to it gaps move no level by more
+than a fifth of a standard error (docs/health.md)."""
 
 MOST_TERMS = 2
 """Lines and resonances offered to the model of a channel; each doubles the candidate models."""
@@ -26,3 +29,57 @@ LOW_FREQUENCY = 0.01
 
 FLAT = 0.8
 """Of the density there and at half that frequency, above which it is that of white noise."""
+
+# -- departures from stationary noise -------------------------------------------------------------
+
+EVIDENT = 100.0
+"""Evidence that stationary noise has in at most one of 100 records (Markov's inequality)."""
+
+POSSIBLE = 3.0
+"""Evidence from which a departure is mentioned: "positive" after Kass & Raftery (1995)."""
+
+HARMFUL_SHARE = 0.19
+"""Fraction of the wavelet variance that a departure accounts for: without it the deviation is 10 %
+lower, as much as a valid fit may miss."""
+
+MOST_DEPARTURES = 5
+"""Of one channel."""
+
+MOST_MEANS = 256
+"""Block means; dense matrices of them are made."""
+
+FEWEST_DIFFERENCES = 16
+"""Of block means, from which departures are looked for."""
+
+SLOW_PARTS = (1e-3, 0.03, 0.1, 0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
+"""Factors of the spectrum above its floor; finer about one, where the data decide."""
+
+WALKS = (0.0, 1.0, 30.0)
+"""Factors of the variance of a random walk beside it."""
+
+WALK_AT = 0.25
+"""Of the record: the averaging time at which the first of these walks equals the floor."""
+
+PRIOR_SIZES = 4.0 ** np.arange(2.0, 12.0)
+"""g: squares of the size beforehand, over the variance of its estimate."""
+
+RATIO_OF_TIMES = 1.2
+"""Of neighbouring time constants and ends."""
+
+MOST_CYCLES = 24.0
+"""In a record, of slow periods; `gmwm.health` finds lines from 20 on."""
+
+SHARE_POINTS = 512
+"""Places of a coefficient at which the share of a level is computed."""
+
+NO_INFORMATION = 1e-9
+"""Of the largest information, which a curve has that known ones explain."""
+
+NEAR = 2
+"""Members on either side of one that is found that are known with it: its time is between them."""
+
+SPANNED = 1e-6
+"""Of the largest singular value, below which curves are no others."""
+
+FEW = 0.05
+"""Fraction of differences that are not zero, below which those of a family are kept as sparse."""

@@ -10,9 +10,14 @@ from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.contamination import contamination, contamination_notice
+from gmwm.diagnosis.contamination import (
+    contamination,
+    contamination_notice,
+    heavy_tails,
+    tails_notice,
+)
 from gmwm.diagnosis.drift import drift_notice, variance_notice
-from gmwm.diagnosis.events import event_notice, find_events
+from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
@@ -184,6 +189,11 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         )
     events = find_events(errors)
     outliers = contamination(errors, events)
+    tails = heavy_tails(errors) if outliers > 0.0 else None
+    if tails is not None:
+        events, outliers = find_events(errors, tails), 0.0
+    elif outliers > 0.0:
+        events = with_single_outliers(events, errors, values, step)
     events = motion.joined(events, dt)
     usable = errors.known.copy()
     quiet = values.copy()
@@ -195,6 +205,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         saturation_notice(name, unit, present, step),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
+        tails_notice(name, errors, tails),
         rounding_notice(name, unit, step, errors.level),
         variance_notice(name, unit, dt, errors, usable, step),
         drift_notice(name, unit, dt, quiet),

@@ -9,21 +9,26 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.contamination import Tails
+from gmwm.diagnosis.innovations import Innovations, innovations, running_scale
 
 _LISTED = 3
 
 
-def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
+def find_events(errors: Innovations, tails: Tails | None = None) -> tuple[tuple[int, int], ...]:
     """Sample intervals in which prediction errors are too large for noise.
 
-    An error is too large beyond the quantile of the normal distribution that noise passes with
+    An error is too large beyond the quantile of the law of the noise that it passes with
     `tuning.FALSE_ALARM` in the whole channel, plus what rounding can add. Errors beyond four
-    standard deviations next to it belong to the same event.
+    standard deviations next to it belong to the same event. In noise of heavy tails, where such
+    errors are usual, more of them next to each other than independent samples have with the same
+    chance are an event too.
 
     Parameters
     ----------
     errors : Innovations
+    tails : Tails, optional
+        Law of the noise; Gaussian by default.
 
     Returns
     -------
@@ -33,14 +38,18 @@ def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
     n = errors.values.size
     beyond = np.abs(errors.values) - errors.rounding
     known = max(int(np.count_nonzero(errors.known)), 1)
-    limit = float(norm.isf(0.5 * tuning.FALSE_ALARM / known))
-    if not np.any(beyond > limit * errors.scale):
-        return ()
+    chance = tuning.FALSE_ALARM / known
+    limit = float(norm.isf(0.5 * chance)) if tails is None else tails.distance(chance)
+    longest = np.inf if tails is None else _longest_chain(tails, known)
     weak = np.flatnonzero(beyond > tuning.RINGING * errors.scale)
+    if weak.size == 0 or (tails is None and not np.any(beyond > limit * errors.scale)):
+        return ()
     groups = np.split(weak, np.flatnonzero(np.diff(weak) > tuning.JOINED) + 1)
     found: list[tuple[int, int]] = []
     for group in groups:
-        if not np.any(beyond[group] > limit * errors.scale[group]):
+        size = beyond[group] / errors.scale[group]
+        chain = np.count_nonzero(size > np.max(size) / tuning.CHAIN_FLOOR)
+        if not (np.max(size) > limit or chain > longest):
             continue
         # What rings dies away below the noise: as long again is left out.
         after = max(tuning.GUARD, int(group[-1] - group[0]))
@@ -49,6 +58,73 @@ def find_events(errors: Innovations) -> tuple[tuple[int, int], ...]:
             start = found.pop()[0]
         found.append((start, stop))
     return tuple(found)
+
+
+def _longest_chain(tails: Tails, known: int) -> float:
+    """Weak errors, each close to the last, that independent samples have with little chance."""
+    one = float(tails.beyond(np.array([tuning.RINGING]))[0])
+    next_is_close = -np.expm1(tuning.JOINED * np.log1p(-one))
+    return 1.0 + float(np.log(tuning.FALSE_ALARM / (known * one)) / np.log(next_is_close))
+
+
+def with_single_outliers(
+    events: tuple[tuple[int, int], ...], errors: Innovations, values: FloatArray, step: float
+) -> tuple[tuple[int, int], ...]:
+    """Events and, without any guard, outliers all over the record; of many, these alone.
+
+    Predictions from an outlier are in error too. So the first that are left out are those farther
+    from the level than four standard deviations of such distances; where samples are predicted
+    better than by their level, errors of prediction without these show the rest.
+
+    Parameters
+    ----------
+    events : tuple of (int, int)
+    errors : Innovations
+    values : (n,) ndarray
+        Samples, NaN where missing.
+    step : float
+        To which they are rounded, u.
+
+    Returns
+    -------
+    tuple of (int, int)
+        First sample and the one after the last.
+    """
+    place = np.arange(values.size)
+    there = ~np.isnan(values)
+    filled = values if np.all(there) else np.interp(place, place[there], values[there])
+    level, scale = _level(filled)
+    far = np.abs(filled - level) - 0.5 * step > tuning.FAR * scale
+    if errors.level < tuning.PREDICTED * np.median(scale):
+        rest = innovations(np.where(far & there, level, values), step)
+        if rest is not None:
+            far |= np.abs(rest.values) - rest.rounding > tuning.FAR * rest.scale
+    far &= there
+    if sum(stop - start for start, stop in events) < tuning.MUCH_LEFT_OUT * values.size:
+        for start, stop in events:
+            far[start:stop] = True
+    edges = np.flatnonzero(np.diff(far, prepend=False, append=False)).tolist()
+    return tuple(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Medians of blocks, joined by lines, and the robust standard deviation from them.
+
+    Samples that stay are cut off on both sides of the level, which makes them depend on it and so
+    on each other. The blocks are therefore as long as they can be without adding to the distances.
+    """
+    place = np.arange(values.size)
+    found: list[tuple[FloatArray, FloatArray]] = []
+    count = 1
+    while values.size >= tuning.NEIGHBOURS * count:
+        parts = np.array_split(values, count)
+        centres = (np.arange(count) + 0.5) * values.size / count
+        level = np.interp(place, centres, [float(np.median(part)) for part in parts])
+        found.append((level, running_scale(values - level, 0.0)))
+        count *= 8
+    usual = [float(np.median(scale)) for _, scale in found]
+    longest = next(i for i, size in enumerate(usual) if size <= tuning.AS_CLOSE * min(usual))
+    return found[longest]
 
 
 def event_notice(

@@ -86,7 +86,7 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     if np.count_nonzero(present) < tuning.FEWEST_KNOWN:
         return None
     scale = np.ones(n) * floor
-    scale[present] = _running_scale(errors[present], floor)
+    scale[present] = running_scale(errors[present], floor)
     on_samples = np.convolve(coefficients, [1.0, -1.0])
     return Innovations(errors, present, scale, 0.5 * step * float(np.sum(np.abs(on_samples))))
 
@@ -132,7 +132,7 @@ def _complete(known: BoolArray, order: int) -> BoolArray:
     return complete
 
 
-def _running_scale(errors: FloatArray, floor: float) -> FloatArray:
+def running_scale(errors: FloatArray, floor: float) -> FloatArray:
     """Scale in blocks, each replaced by the median of itself and its four neighbours.
 
     A shock may fill a block; it does not fill three of five.

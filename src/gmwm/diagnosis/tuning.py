@@ -224,3 +224,41 @@ MOST_RESONANCES = 4
 
 DAMPING_STARTS = (0.01, 0.05, 0.15)
 """Damping ratios from which the fit starts."""
+
+# -- the tails of the noise -----------------------------------------------------------------------
+
+BIN_OF_BODY = 0.25
+"""Standard deviations, up to `FAR`: sixteen bins show a shape, and finer rounding does not."""
+
+OCTAVES_OF_TAIL = 8
+"""Beyond `FAR`, in quarters of an octave: up to a thousand standard deviations."""
+
+ROUNDING_OF_BODY = 1.0
+"""Standard deviations that rounding may add to a prediction error; the bins are no longer those of
+the noise beyond (a step of an eighth of the noise, with an autoregression of order 16)."""
+
+LEAST_SHAPE = {"student": 2.0, "power": 0.5}
+"""Shapes of the laws above which they are those of noise: Student's t has a variance, and the
+exponential power law an excess kurtosis below 22."""
+
+CHAIN_FLOOR = 8.0
+"""A large sample leaves up to 1/16 of itself in the predictions of those after it: smaller errors
+beside it than this part of it are no evidence of a shock."""
+
+MUCH_LEFT_OUT = 0.05
+"""Fraction of the samples that events may take with their guards, above which outliers are left out
+one by one."""
+
+NEIGHBOURS = 49
+"""Fewest samples of a block whose median is a level: two events of `JOINED` apart."""
+
+AS_CLOSE = 1.02
+"""Ratio of the distances from two levels up to which the one of longer blocks is taken."""
+
+PREDICTED = 0.9
+"""Ratio of prediction errors to distances from the level, below which the noise is not white."""
+
+LARGE, LAGS, CLUSTERED = 2.0, 8, 0.05
+"""Errors beyond so many standard deviations are independent of so many after them: their mean
+correlation is 0.10 where bursts of ten samples are a hundredth of the record, and below 0.03 for
+independent noise of heavy tails of 5,000 samples."""

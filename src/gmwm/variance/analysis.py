@@ -11,6 +11,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
+from gmwm.variance import tuning
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
 from gmwm.variance.gaps import Runs
 from gmwm.variance.levels import Levels
@@ -110,8 +111,22 @@ def wavelet_variance(
         efficiency=efficiency,
         driftless=driftless,
         gaps=levels.effects(),
+        fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
+
+
+def fourth_cumulant(values: FloatArray) -> float:
+    """Of the independent part of a series, from its first differences, u^4; 0 if not above chance.
+
+    Cumulants of independent samples add up, so that the differences have twice that of the samples.
+    """
+    differences = np.diff(values)
+    square = differences[~np.isnan(differences)] ** 2
+    mean = float(np.mean(square))
+    excess = float(np.mean((square / mean) ** 2)) - 3.0 if mean > 0.0 else 0.0
+    chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / square.size)
+    return 0.5 * mean**2 * excess if excess > chance else 0.0
 
 
 def _where(channel: Channel) -> str:

@@ -108,3 +108,11 @@ ROBUST_BLOCKS_PER_AVERAGE = 16
 
 NEGLIGIBLE_POWER = 1e-5
 """Part of the excess below which powers of the correlation are left out."""
+
+# -- heavy tails ----------------------------------------------------------------------------------
+
+KURTOSIS_VARIANCE = 27.0
+"""Of the excess kurtosis of n first differences of Gaussian white noise, times n: 24 sum rho^4."""
+
+LARGEST_KURTOSIS = 5.0
+"""Standard errors of it that Gaussian noise does not have."""

@@ -70,6 +70,10 @@ class WaveletVariance:
         quadratic function of a drift.
     gaps : GapEffects or None
         What missing samples do to the levels; ``None`` if there are none.
+    fourth_cumulant : float
+        Of the independent part of the samples, u^4: what makes the variance of noise with heavy
+        tails less certain than that of Gaussian noise; 0 where they are not heavier, and for robust
+        estimates.
     data_covariance : (J, J) ndarray or None
         Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
         asked for.
@@ -90,6 +94,7 @@ class WaveletVariance:
     efficiency: float = 1.0
     driftless: FloatArray | None = None
     gaps: GapEffects | None = None
+    fourth_cumulant: float = 0.0
     data_covariance: FloatArray | None = None
 
     @property
@@ -163,7 +168,11 @@ class WaveletVariance:
         return self.covariance_under(psd)
 
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
-        """Covariance of ``variance`` for Gaussian noise of a given spectrum, u^4, (J, J).
+        """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
+
+        Gaussian but for its white part, whose fourth cumulant c_4 makes the mean square of n
+        samples vary by c_4 / n more. Levels of m samples have 1/(2 m) of that mean square, all of
+        them together.
 
         Parameters
         ----------
@@ -186,6 +195,9 @@ class WaveletVariance:
             covariance = robust_covariance(
                 psd, self.n, self.dt, self.efficiency, covariance, self.counts
             )
+        if self.fourth_cumulant > 0.0:
+            share = 0.5 / self.averaging
+            covariance = covariance + self.fourth_cumulant / self.counts[0] * np.outer(share, share)
         return covariance
 
     def _of_haar(self, psd: PSD) -> FloatArray:
@@ -296,6 +308,7 @@ class WaveletVariance:
             "efficiency": self.efficiency,
             "driftless": None if self.driftless is None else self.driftless.tolist(),
             "gaps": None if self.gaps is None else self.gaps.to_dict(),
+            "fourth_cumulant": self.fourth_cumulant,
             "data_covariance": (
                 None if self.data_covariance is None else self.data_covariance.tolist()
             ),

@@ -66,7 +66,7 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     index = _existing(wv)
     first = _beside(index)
     difference = wv.blocks[first + 1] - wv.blocks[first]
-    column = _difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
+    column = difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
     one = np.ones(first.size)
     solved = _solve(column, first, np.column_stack([one, difference]))
     information = float(one @ solved[:, 0])
@@ -100,7 +100,7 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     if first.size + 1 < tuning.FEWEST_BLOCKS:
         return 1.0
     noise, walk = (
-        toeplitz(_difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
+        toeplitz(difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
         for each in (psd, RandomWalk(1.0).psd)
     )
     apart, difference = np.full(first.size, block * wv.dt), blocks[first + 1] - blocks[first]
@@ -138,7 +138,7 @@ def _restricted(
     return slope, 1.0 / information, float(likelihood)
 
 
-def _difference_covariance(psd: PSD, dt: float, block: int, count: int) -> FloatArray:
+def difference_covariance(psd: PSD, dt: float, block: int, count: int) -> FloatArray:
     """Autocovariance of differences of neighbouring block means, (count - 1,), u^2."""
     size = fft.next_fast_len(4 * count, real=True)
     size += size % 2

@@ -34,6 +34,10 @@ REASONS = {
     "not-static": "recording_static",
     "tilt": "attitude_kept",
     "rate-changes": "rate_constant",
+    "step": "stationary",
+    "transient": "stationary",
+    "drift-at-start": "stationary",
+    "slow-period": "stationary",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 

@@ -1,0 +1,119 @@
+"""Steps, transients and slow periods: false alarms, and the sizes that are found.
+
+Records of two hours at 1 Hz with the white noise of a gyro of 1e-4 rad/s/sqrt(Hz). Sizes are in
+standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
+
+    python benchmarks/departures.py false [--runs 60] [--models N+K ...]
+    python benchmarks/departures.py power [--runs 20]
+
+"false" selects the model of noise without departures and counts what is found. "power" fits the
+true kinds of noise and a random walk to noise with one departure, which the walk follows, and
+prints the fraction found by size, and in brackets the fraction of fits that would be valid without
+looking for departures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+
+import numpy as np
+
+import gmwm
+from gmwm import BiasInstability, FitWarning, GaussMarkov, RandomWalk, WhiteNoise
+from gmwm.calibration import departures
+
+N, SAMPLE = 1e-4, 1e-3
+LENGTH, DT = 7200, 1.0
+WHITE = WhiteNoise(N)
+NOISES = {
+    "N": WHITE,
+    "N+K": WHITE + RandomWalk(2e-6),
+    "N+3K": WHITE + RandomWalk(6e-6),
+    "N+GM 60 s": WHITE + GaussMarkov(1.2e-5, 60.0),
+    "N+GM 1000 s": WHITE + GaussMarkov(3e-5, 1000.0),
+    "N+B": WHITE + BiasInstability(1.5e-5),
+    "N+2GM": WHITE + GaussMarkov(3e-5, 5.0) + GaussMarkov(2e-5, 300.0),
+    "N+2GM slow": WHITE + GaussMarkov(3e-5, 20.0) + GaussMarkov(4e-5, 1500.0),
+}
+TIME = DT * np.arange(LENGTH)
+KINDS = {
+    "step at 0.6": TIME > 0.6 * LENGTH * DT,
+    "exp(-t/600 s)": np.exp(-TIME / 600.0),
+    "drift to 900 s": np.maximum(1.0 - TIME / 900.0, 0.0),
+    "period 1500 s": np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0),
+}
+SIZES = np.array([0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0])
+
+
+def false_alarms(runs: int, models: list[str]) -> None:
+    """Departures found in noise that has none."""
+    for name in models or NOISES:
+        evident = possible = harmful = 0
+        for seed in range(runs):
+            x = gmwm.simulate(NOISES[name], LENGTH, DT, 10_000 + seed)
+            found = departures(gmwm.select(x, DT).fit)
+            evident += any(one.is_evident for one in found)
+            harmful += any(one.share > 0.19 and not one.is_evident for one in found)
+            possible += bool(found)
+        print(
+            f"{name:<12} found in {evident} of {runs}, mentioned in {possible} "
+            f"({harmful} as warnings)",
+            flush=True,
+        )
+
+
+def power(runs: int, models: list[str]) -> None:
+    """Sizes found in half and in 95 % of the records."""
+    for name in models or ("N", "N+K", "N+3K", "N+GM 60 s", "N+2GM"):
+        fitted = gmwm.process.as_model(NOISES[name]).opened()
+        fitted = fitted if "K" in fitted.params else fitted + RandomWalk()
+        for kind, curve in KINDS.items():
+            shares, valid = [], []
+            for size in SIZES:
+                found = right = 0
+                for seed in range(runs):
+                    x = gmwm.simulate(NOISES[name], LENGTH, DT, 20_000 + seed)
+                    fit = gmwm.fit(fitted, x + size * SAMPLE * curve, DT)
+                    found += any(one.is_evident for one in departures(fit))
+                    right += fit.valid
+                shares.append(found / runs)
+                valid.append(right / runs)
+                if len(shares) > 1 and min(shares[-2:]) == 1.0:
+                    break
+            sizes = SIZES[: len(shares)]
+            half, most = (_reached(sizes, np.array(shares), part) for part in (0.5, 0.95))
+            rows = "  ".join(
+                f"{size:g}: {100 * a:.0f} % ({100 * b:.0f} %)"
+                for size, a, b in zip(sizes, shares, valid, strict=True)
+            )
+            print(f"{name:<10} {kind:<15} 50 % {half:.2g}  95 % {most:.2g}   {rows}", flush=True)
+
+
+def _reached(sizes: np.ndarray, shares: np.ndarray, part: float) -> float:
+    """Size at which a fraction is reached, between sizes along straight lines in the logarithm."""
+    above = np.flatnonzero(shares >= part)
+    if above.size == 0:
+        return float("inf")
+    i = int(above[0])
+    if i == 0:
+        return float(sizes[0])
+    weight = (part - shares[i - 1]) / (shares[i] - shares[i - 1])
+    return float(sizes[i - 1] * (sizes[i] / sizes[i - 1]) ** weight)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("study", choices=["false", "power"])
+    parser.add_argument("--runs", type=int, default=0)
+    parser.add_argument("--models", nargs="*", default=[])
+    given = parser.parse_args()
+    warnings.simplefilter("ignore", FitWarning)
+    if given.study == "false":
+        false_alarms(given.runs or 60, given.models)
+    else:
+        power(given.runs or 20, given.models)
+
+
+if __name__ == "__main__":
+    main()

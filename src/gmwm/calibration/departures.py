@@ -1,0 +1,347 @@
+"""Departures from stationary noise: steps, transients after switching on, slow periods.
+
+No sum of noises has them, but a random walk or a slow Gauss-Markov process follows them, so that
+the chi-square test of a fit passes. They are looked for in means of blocks of samples, whose
+differences are stationary whatever the noise, with covariance known from the spectrum. The noise
+that was fitted has followed what is looked for. So it is not taken as it is: the part of its
+spectrum above the flat floor is scaled, and a random walk is added, by all factors that matter,
+both without the departure and beside it. The evidence for a departure is the ratio of the two
+probabilities of the block means, one averaged over sizes, places and noises, the other over noises
+(a Bayes factor; Zellner's g prior for the size, averaged over g). Where a random walk does as well
+it is about one. By Markov's inequality stationary noise has an evidence of 100 in at most one of
+100 records, whatever the number of places that are looked at.
+
+Kass & Raftery (1995), *JASA* 90, 773-795; Liang et al. (2008), *JASA* 103, 410-423.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, toeplitz
+from scipy.sparse import csr_array
+from scipy.special import logsumexp
+from scipy.stats import norm
+
+from gmwm._core.typing import FloatArray, IntArray
+from gmwm.calibration import tuning
+from gmwm.calibration.shapes import Family, families
+from gmwm.estimate import Fit
+from gmwm.estimate.problem import Scales, difference_covariance
+from gmwm.process import PSD, Model, RandomWalk
+from gmwm.variance import WaveletVariance
+
+_WIDE = float(norm.isf(0.025))
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Something that stationary noise does not have.
+
+    Attributes
+    ----------
+    kind : str
+        Code of its notice: "step", "transient", "drift-at-start" or "slow-period".
+    time : tuple of (float, float, float)
+        When the step is, the time constant, the end of the drift or the period, and the ends of its
+        95 % interval, s.
+    size : tuple of (float, float, float)
+        Height of the step; of the transient or the drift at the start of the record; amplitude of
+        the period; and the ends of its 95 % interval, u.
+    evidence : float
+        Ratio of the probability of the data with it to that without.
+    share : float
+        Largest fraction of the wavelet variance of the model that it accounts for.
+    phase : float
+        Of a period, ``size cos(2 pi t / time - phase)``, rad.
+    """
+
+    kind: str
+    time: tuple[float, float, float]
+    size: tuple[float, float, float]
+    evidence: float
+    share: float
+    phase: float = 0.0
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether noise has such an evidence in one of a hundred records at most."""
+        return self.evidence >= tuning.EVIDENT
+
+
+def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departure, ...]:
+    """What a recording has that stationary noise does not have.
+
+    Parameters
+    ----------
+    fitted : Fit
+    wv : WaveletVariance, optional
+        The recording, where the fit is one of several.
+
+    Returns
+    -------
+    tuple of Departure
+        Most evident first, each beside those before it; the last one may be one that noise explains
+        about as well (`Departure.is_evident`).
+    """
+    noise = tuple(term for term in fitted.model.terms if not term.is_drift)
+    means = _Means.of(wv or fitted.wv)
+    if not noise or means.first.size < tuning.FEWEST_DIFFERENCES:
+        return ()
+    noises = _noises(Scales.of(fitted.wv).spectrum(Model(noise)), means)
+    kinds = families(means.blocks.size, means.step)
+    known = np.empty((0, means.first.size))
+    if len(noise) < len(fitted.model.terms):
+        known = np.full((1, means.first.size), means.step)
+    found: list[Departure] = []
+    for _ in range(tuning.MOST_DEPARTURES):
+        beside = [noise.beside(known) for noise in noises]
+        tests = [_Test.of(family, means, beside) for family in kinds]
+        # Each kind is as likely beforehand.
+        evidence = float(np.exp(logsumexp([test.log_evidence for test in tests]))) / len(tests)
+        best = max(tests, key=lambda test: test.log_evidence)
+        if evidence < tuning.POSSIBLE:
+            break
+        known = _basis(np.vstack([known, means.differences(best.neighbours)]))
+        # A drift of the whole record has a test of its own (slope_p_value): here it competes only.
+        if best.family.kind != "drift":
+            share = _share(best.curve, means.step, fitted)
+            kind, time, size = best.family.kind, best.time, best.size
+            found.append(Departure(kind, time, size, evidence, share, best.phase))
+            if evidence < tuning.EVIDENT:
+                break
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """Means of blocks.
+
+    Attributes
+    ----------
+    blocks : (B,) ndarray
+        NaN where samples are missing, u.
+    samples : int
+        In a block.
+    dt : float
+        s.
+    """
+
+    blocks: FloatArray
+    samples: int
+    dt: float
+
+    @classmethod
+    def of(cls, wv: WaveletVariance) -> _Means:
+        merged = -(-wv.blocks.size // tuning.MOST_MEANS)
+        whole = wv.blocks.size // merged * merged
+        means = wv.blocks[:whole].reshape(-1, merged).mean(axis=1)
+        return cls(means, wv.block * merged, wv.dt)
+
+    @property
+    def step(self) -> float:
+        """Length of a block, s."""
+        return self.samples * self.dt
+
+    @cached_property
+    def first(self) -> IntArray:
+        """Blocks that exist beside one that exists."""
+        there = ~np.isnan(self.blocks)
+        return np.flatnonzero(there[:-1] & there[1:])
+
+    def differences(self, curves: FloatArray) -> FloatArray:
+        """Of neighbouring blocks, (..., B) to (..., D)."""
+        return np.asarray(curves[..., self.first + 1] - curves[..., self.first])
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """One of the noises.
+
+    Attributes
+    ----------
+    log_weight : float
+        Logarithm of its probability beforehand over the root of the determinant of its covariance.
+    inverse : (D, D) ndarray
+        Of the covariance of the differences; without what known curves explain.
+    """
+
+    log_weight: float
+    inverse: FloatArray
+
+    def beside(self, known: FloatArray) -> _Noise:
+        """The same for what is orthogonal to known curves, (k, D)."""
+        if not known.size:
+            return self
+        solved = self.inverse @ known.T
+        information = known @ solved
+        return _Noise(
+            self.log_weight - 0.5 * float(np.linalg.slogdet(information)[1]),
+            self.inverse - solved @ np.linalg.solve(information, solved.T),
+        )
+
+
+def _noises(psd: PSD, means: _Means) -> list[_Noise]:
+    """The fitted noise with its part above the floor scaled, and a random walk beside it."""
+    length = means.blocks.size * means.step
+    frequency = np.geomspace(1.0 / length, 0.5 / means.step, 64)
+    floor = float(np.min(psd(frequency, means.dt)))
+    walk = 3.0 * floor / (tuning.WALK_AT * length) ** 2  # K^2 that equals the floor at that time
+
+    def covariance(spectrum: PSD) -> FloatArray:
+        column = difference_covariance(spectrum, means.dt, means.samples, means.blocks.size)
+        return np.asarray(toeplitz(column)[np.ix_(means.first, means.first)])
+
+    flat = floor * covariance(lambda f, _: np.ones_like(f))
+    slow = covariance(psd) - flat
+    unit = walk * covariance(RandomWalk(1.0).psd)
+    found = []
+    for part, weight in zip(tuning.SLOW_PARTS, np.gradient(np.log(tuning.SLOW_PARTS)), strict=True):
+        for more in tuning.WALKS:
+            factor = cho_factor(flat + part * slow + more * unit, lower=True)
+            inverse = cho_solve(factor, np.eye(means.first.size))
+            half_log_determinant = float(np.sum(np.log(np.diag(factor[0]))))
+            found.append(_Noise(float(np.log(weight)) - half_log_determinant, inverse))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """A family of departures beside those that are known.
+
+    Attributes
+    ----------
+    family : Family
+    evidence : (G,) ndarray
+        Logarithm of the evidence of each member.
+    weight : (C,) ndarray
+        Probability of each noise beside the most evident member.
+    sizes, variances : (C, r) ndarray
+        Of the curves of that member under each noise.
+    """
+
+    family: Family
+    evidence: FloatArray
+    weight: FloatArray
+    sizes: FloatArray
+    variances: FloatArray
+
+    @classmethod
+    def of(cls, family: Family, means: _Means, noises: list[_Noise]) -> _Test:
+        data = means.differences(means.blocks)
+        members, rank, _ = family.curves.shape
+        curves = means.differences(family.curves).reshape(members * rank, -1)
+        few = csr_array(curves)  # of a step, two differences
+        if few.nnz < tuning.FEW * curves.size:
+            curves = few
+        alone, scores, products = [], [], []
+        for noise in noises:
+            solved = noise.inverse @ data
+            alone.append(noise.log_weight - 0.5 * float(data @ solved))
+            scores.append((curves @ solved).reshape(members, rank))
+            products.append(_products(curves, noise.inverse, members, rank))
+        score, information = np.array(scores), np.array(products)
+        # A curve that known ones explain has none.
+        information += tuning.NO_INFORMATION * np.max(information) * np.eye(rank)
+        estimate = np.linalg.solve(information, score[..., None])[..., 0]
+        square = np.sum(score * estimate, axis=-1)  # (C, G), chi-square of r degrees of freedom
+        g = tuning.PRIOR_SIZES[:, None, None]
+        gain = logsumexp(-0.5 * rank * np.log1p(g) + 0.5 * square * g / (1.0 + g), axis=0) - np.log(
+            g.size
+        )
+        posterior = np.array(alone) - logsumexp(alone)
+        beside = posterior[:, None] + gain
+        evidence = logsumexp(beside, axis=0)
+        best = int(np.argmax(evidence))
+        weight = np.asarray(np.exp(beside[:, best] - evidence[best]), dtype=float)
+        variances = np.diagonal(np.linalg.inv(information[:, best]), axis1=-2, axis2=-1)
+        return cls(
+            family,
+            np.asarray(evidence),
+            weight,
+            np.asarray(estimate[:, best], dtype=float),
+            variances,
+        )
+
+    @property
+    def log_evidence(self) -> float:
+        """Averaged over the members."""
+        return float(logsumexp(self.evidence) - np.log(self.evidence.size))
+
+    @property
+    def curve(self) -> FloatArray:
+        """The most evident member with its size, u, (B,)."""
+        shape = self.family.curves[int(np.argmax(self.evidence))]
+        return np.asarray((self.weight @ self.sizes) @ shape)
+
+    @property
+    def neighbours(self) -> FloatArray:
+        """The members about the most evident one, whose sum is one between them, (k, B)."""
+        best = int(np.argmax(self.evidence))
+        near = self.family.curves[max(best - tuning.NEAR, 0) : best + tuning.NEAR + 1]
+        return near.reshape(-1, near.shape[-1])
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Size of the most evident member and its 95 % interval; an amplitude if it has phases."""
+        each = self.weight @ self.sizes
+        variance = self.weight @ (self.variances + (self.sizes - each) ** 2)
+        if each.size == 1:
+            value, error = float(each[0]), float(np.sqrt(variance[0]))
+            return value, value - _WIDE * error, value + _WIDE * error
+        value = float(np.hypot(*each))
+        error = float(np.sqrt(each**2 @ variance)) / value
+        return value, max(value - _WIDE * error, 0.0), value + _WIDE * error
+
+    @property
+    def phase(self) -> float:
+        """Of the most evident member, rad; 0 if it has none."""
+        each = self.weight @ self.sizes
+        return float(np.arctan2(each[1], each[0])) if each.size > 1 else 0.0
+
+    @property
+    def time(self) -> tuple[float, float, float]:
+        """Of the most evident member, and the interval that holds 95 % of the evidence, s."""
+        order = np.argsort(self.family.times)
+        times = self.family.times[order]
+        edges = np.concatenate([times[:1], 0.5 * (times[1:] + times[:-1]), times[-1:]])
+        sums = np.cumsum(np.exp(self.evidence - logsumexp(self.evidence))[order])
+        low, high = np.searchsorted(sums, [0.025, 0.975])
+        best = float(self.family.times[int(np.argmax(self.evidence))])
+        return best, float(edges[low]), float(edges[min(high, order.size - 1) + 1])
+
+
+def _basis(rows: FloatArray) -> FloatArray:
+    """Orthonormal rows that span the same."""
+    _, sizes, basis = np.linalg.svd(
+        rows / np.linalg.norm(rows, axis=1)[:, None], full_matrices=False
+    )
+    return np.asarray(basis[sizes > tuning.SPANNED * sizes[0]])
+
+
+def _products(
+    curves: FloatArray | csr_array, inverse: FloatArray, members: int, rank: int
+) -> FloatArray:
+    """Of the curves of each member with each other, (G, r, r)."""
+    solved = np.asarray(curves @ inverse)
+    if isinstance(curves, csr_array):
+        return np.asarray(curves.multiply(solved).sum(axis=1)).reshape(members, 1, 1)
+    each, other = (rows.reshape(members, rank, -1) for rows in (curves, solved))
+    return np.asarray(each @ other.swapaxes(-1, -2))
+
+
+def _share(curve: FloatArray, step: float, fitted: Fit) -> float:
+    """Largest fraction of the model's wavelet variance that a curve of block means has."""
+    tau = fitted.wv.tau
+    edges = step * np.arange(curve.size + 1)
+    integral = np.concatenate([[0.0], np.cumsum(curve)]) * step
+    shares = [0.0]
+    for each, implied in zip(tau, fitted.implied, strict=True):
+        if step <= each <= 0.5 * edges[-1] and implied > 0.0:
+            begin = np.linspace(0.0, edges[-1] - 2.0 * each, tuning.SHARE_POINTS)
+            parts = [np.interp(begin + k * each, edges, integral) for k in range(3)]
+            coefficient = (parts[2] - 2.0 * parts[1] + parts[0]) / (2.0 * each)
+            shares.append(float(np.mean(coefficient**2) / implied))
+    return max(shares)

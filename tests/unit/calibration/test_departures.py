@@ -1,0 +1,217 @@
+"""Steps, transients and slow periods: found, with their sizes, and not in noise."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import gmwm
+from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
+from gmwm.calibration import Departure, departures
+from gmwm.calibration.departure_notices import departure_notice
+from gmwm.calibration.tuning import EVIDENT
+
+DT = 1.0
+N = 7200
+TIME = DT * np.arange(N)
+SAMPLE = 1e-3  # standard deviation of a sample of the white noise at 100 Hz
+WHITE = WhiteNoise(1e-4)
+WALK = WHITE + RandomWalk(2e-6)
+STEP = np.asarray(TIME >= 4300.0, dtype=float)
+
+
+def fitted(x, model=None):
+    return gmwm.fit(model or WhiteNoise() + RandomWalk(), x, DT)
+
+
+def noise(seed, model=WALK):
+    return gmwm.simulate(model, N, DT, seed)
+
+
+def recording(x, rate=1.0 / DT):
+    return Recording.from_arrays({"gyro_x": x}, rate, {"gyro": "rad/s"}, source="bench.csv")
+
+
+@pytest.mark.parametrize(("size", "seed"), [(0.5, 1), (-1.0, 2), (-1.0, 1), (3.0, 3)])
+def test_a_step_is_found_with_its_size(size, seed):
+    # It passes for a random walk: no test of the wavelet variances fails.
+    fit = fitted(noise(seed) + size * SAMPLE * STEP)
+    (found,) = departures(fit)
+    assert found.kind == "step"
+    assert found.is_evident
+    assert found.time[1] <= 4300.0 <= found.time[2]
+    assert found.time[2] - found.time[1] < 200.0
+    # 95 % intervals, widened to one in a thousand: 1.7 half widths.
+    value, low, high = found.size
+    assert abs(value - size * SAMPLE) < 1.7 * 0.5 * (high - low)
+    assert high - low < 0.6 * SAMPLE
+
+
+@pytest.mark.parametrize(
+    ("kind", "curve", "time"),
+    [
+        ("transient", np.exp(-TIME / 600.0), 600.0),
+        ("drift-at-start", np.maximum(1.0 - TIME / 900.0, 0.0), 900.0),
+        ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0), 1500.0),
+    ],
+)
+def test_other_departures_are_found(kind, curve, time):
+    fit = fitted(noise(1) + SAMPLE * curve)
+    found = departures(fit)[0]
+    assert found.kind == kind
+    assert found.is_evident
+    assert found.time[1] < time < found.time[2] or abs(found.time[0] / time - 1.0) < 0.15
+    assert found.size[0] == pytest.approx(SAMPLE, rel=0.2)
+    assert found.share > 0.5
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        WALK,
+        WHITE,
+        WHITE + RandomWalk(2e-5),
+        WHITE + GaussMarkov(3e-5, 1000.0),
+        WHITE + GaussMarkov(3e-5, 20.0) + GaussMarkov(4e-5, 1500.0),
+    ],
+    ids=["N+K", "N", "N+10K", "N+GM", "N+2GM"],
+)
+def test_noise_has_none(model):
+    runs = 5
+    free = gmwm.process.as_model(model).opened()
+    count = 0
+    for seed in range(runs):
+        count += any(one.is_evident for one in departures(fitted(noise(100 + seed, model), free)))
+    assert count <= binom.isf(1e-4, runs, 1.0 / EVIDENT)
+
+
+def test_a_walk_that_is_seen_once_is_no_departure():
+    # Beside so little white noise the walk makes all levels, and any of its moves looks like much.
+    walks = [departures(fitted(noise(seed, RandomWalk(1e-4)), RandomWalk())) for seed in range(4)]
+    assert not any(one.is_evident for found in walks for one in found)
+
+
+def test_size_and_sign_follow_the_data_and_time_is_reversed_with_it():
+    x = noise(4) + SAMPLE * STEP
+    (found,) = departures(fitted(x))
+    (scaled,) = departures(fitted(-3e4 * x + 7.0))
+    assert scaled.size[0] == pytest.approx(-3e4 * found.size[0], rel=1e-3)
+    assert np.log(scaled.evidence) == pytest.approx(np.log(found.evidence), rel=1e-2)
+    (reversed_,) = departures(fitted(x[::-1]))
+    assert reversed_.size[0] == pytest.approx(-found.size[0], rel=0.05)
+    assert reversed_.time[0] == pytest.approx(N * DT - found.time[0], abs=60.0)
+
+
+def test_several_are_found_beside_each_other():
+    x = noise(5) + SAMPLE * STEP - 1.5 * SAMPLE * (TIME > 1500.0)
+    found = departures(fitted(x))
+    assert [one.kind for one in found] == ["step", "step"]
+    assert sorted(one.time[0] for one in found) == pytest.approx([1500.0, 4300.0], abs=60.0)
+
+
+def test_a_step_beside_a_ramp_of_the_model():
+    x = noise(6) + 2e-6 * TIME
+    model = WhiteNoise() + RandomWalk() + RateRamp()
+    assert departures(fitted(x, model)) == ()
+    (found,) = departures(fitted(x + 2.0 * SAMPLE * STEP, model))
+    assert found.kind == "step"
+    assert found.size[0] == pytest.approx(2.0 * SAMPLE, rel=0.2)
+
+
+def test_a_drift_of_the_whole_record_is_no_transient():
+    # It has a test of its own when a model is selected.
+    found = departures(fitted(noise(7) + 2e-6 * TIME))
+    assert not any(one.is_evident for one in found)
+
+
+def test_gaps_do_not_hide_a_step():
+    x = noise(8) + 2.0 * SAMPLE * STEP
+    x[2000:2400] = np.nan
+    x[np.random.default_rng(1).random(N) < 0.005] = np.nan
+    (found,) = departures(fitted(x))
+    assert found.kind == "step"
+    assert found.time[1] - 60.0 <= 4300.0 <= found.time[2] + 60.0
+
+
+def test_too_short_a_record_has_none():
+    x = noise(9)[:12]
+    assert departures(fitted(x, WhiteNoise())) == ()
+
+
+# -- in a calibration -----------------------------------------------------------------------------
+
+
+def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_path):
+    rec = recording(noise(10) + SAMPLE * STEP)
+    found = gmwm.calibrate(rec)
+    fit = found["gyro_x"]
+    assert not fit.valid
+    assert not found.valid
+    assert not fit.reasons["stationary"]
+    (notice,) = [one for one in fit.notices if one.code == "step"]
+    assert notice.severity == "bad"
+    assert notice.values["lower"] < SAMPLE < notice.values["upper"]
+    assert notice.values["time"] == pytest.approx(4300.0, abs=30.0)
+    assert notice.values["evidence"] > EVIDENT
+    assert "without_departures" in notice.action
+    again = gmwm.load(found.save(tmp_path / "cal.json"))
+    assert again["gyro_x"].notices == fit.notices
+    clean = gmwm.without_departures(rec, again)
+    assert 0 < clean["gyro_x"].missing < 0.05 * N
+    better = gmwm.calibrate(clean)["gyro_x"]
+    assert better.valid
+    assert better.reasons["stationary"]
+    low, high = better.interval(0.99)["K"]
+    assert low < 2e-6 < high
+
+
+@pytest.mark.parametrize(
+    ("evidence", "share", "severity"),
+    [
+        (101.0, 0.2, "bad"),
+        (101.0, 0.18, "warning"),
+        (99.0, 0.2, "warning"),
+        (99.0, 0.18, "note"),
+    ],
+)
+def test_what_makes_a_fit_invalid(evidence, share, severity):
+    for kind in ("step", "transient", "drift-at-start", "slow-period"):
+        found = Departure(kind, (900.0, 800.0, 1000.0), (0.1, 0.05, 0.15), evidence, share)
+        notice = departure_notice(found, "rad/s")
+        assert (notice.code, notice.severity) == (kind, severity)
+        assert notice.values["share"] == share
+        assert "+5.73 deg/s (+2.86 deg/s .. +8.59 deg/s)" in notice.text
+        assert "900 s (800 .. 1000)" in notice.text
+
+
+@pytest.mark.parametrize(
+    "curve",
+    [
+        np.exp(-TIME / 600.0),
+        np.maximum(1.0 - TIME / 900.0, 0.0),
+        np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0),
+    ],
+    ids=["transient", "drift-at-start", "slow-period"],
+)
+def test_what_is_taken_off_is_what_was_found(curve):
+    rec = recording(noise(12) + 2.0 * SAMPLE * curve)
+    fits = gmwm.calibrate(rec, WhiteNoise() + RandomWalk())
+    left = gmwm.without_departures(rec, fits)["gyro_x"].values - noise(12)
+    assert np.std(left) < 0.25 * np.std(2.0 * SAMPLE * curve)
+
+
+def test_of_several_recordings_it_is_named_which():
+    first, second = recording(noise(13)), recording(noise(14) + SAMPLE * STEP)
+    both = [
+        Recording(first.channels, "a.csv"),
+        Recording(second.channels, "b.csv"),
+    ]
+    fit = gmwm.calibrate(both, WhiteNoise() + RandomWalk())["gyro_x"]
+    (notice,) = [one for one in fit.notices if one.code == "step"]
+    assert notice.source == "b.csv"
+
+
+def test_a_recording_of_another_kind_is_refused():
+    rec = recording(noise(15) + SAMPLE * STEP)
+    fits = gmwm.calibrate(rec, WhiteNoise() + RandomWalk())
+    with pytest.raises(InputError, match="is not the one that was calibrated"):
+        gmwm.without_departures(recording(np.zeros(100) + np.arange(100.0)), fits)
