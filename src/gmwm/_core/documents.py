@@ -28,7 +28,7 @@ _DEEPEST = 32
 class Document:
     """A result that can be saved, and comes back from its file by `load_document`.
 
-    A subclass names its ``SCHEMA`` and gives ``content``, ``form`` and ``from_content``.
+    A subclass names its ``SCHEMA`` and gives ``content``, ``document_form`` and ``from_content``.
     """
 
     SCHEMA: ClassVar[str] = ""
@@ -48,10 +48,10 @@ class Document:
     @classmethod
     @abstractmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`, checked by `form`; other errors are those of Python."""
+        """Inverse of `content`, checked by `document_form`; other errors are those of Python."""
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         """What each key of the content must hold."""
         from gmwm._core.forms import Form
 
@@ -87,7 +87,7 @@ class Document:
                 f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
             )
         try:
-            return cls.from_content(cls.form().checked(content))
+            return cls.from_content(cls.document_form().checked(content))
         except InputError as error:
             raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
         except (

@@ -144,7 +144,7 @@ class Calibration(Mapping[str, Fit], Document):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.calibration.form import CalibrationForm
 
         return CalibrationForm

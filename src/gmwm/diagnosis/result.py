@@ -241,7 +241,7 @@ class Health(Document):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         return HealthForm
 
     @classmethod

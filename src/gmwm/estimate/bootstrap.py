@@ -59,7 +59,7 @@ class Bootstrap(Document):
         return {"keys": list(self.keys), "draws": draws}
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.estimate.form import BootstrapForm
 
         return BootstrapForm

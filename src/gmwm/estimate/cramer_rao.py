@@ -103,7 +103,7 @@ class CramerRao(Document):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.estimate.form import CramerRaoForm
 
         return CramerRaoForm

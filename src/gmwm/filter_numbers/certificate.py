@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from pydantic import Field
 
 from gmwm._core.documents import Document
+from gmwm._core.forms import Form, Notices, NotNegative, Text
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
@@ -23,6 +26,40 @@ CONSUMERS = {
     "keyframes": "Relative pose between keyframes",
 }
 """Who uses the numbers."""
+
+
+class CheckForm(Form):
+    """Of `Check`."""
+
+    consumer: Text
+    where: Text
+    quantity: Text
+    unit: Text
+    time: NotNegative
+    true: NotNegative | None
+    believed: NotNegative | None
+    nees: NotNegative | None
+
+
+class CauseForm(Form):
+    """Of `Cause`."""
+
+    quantity: Text
+    name: Text
+    N: NotNegative | None
+    K: NotNegative | None
+    N_factor: NotNegative | None
+    K_factor: NotNegative | None
+
+
+class CertificateForm(Form):
+    """Of `Certificate`; its numbers have forms of their own."""
+
+    numbers: dict[str, Any]
+    recommended: dict[str, Any]
+    checks: Annotated[Sequence[CheckForm], Field(min_length=1, max_length=10_000)]
+    causes: Annotated[Sequence[CauseForm], Field(max_length=1000)]
+    notices: Notices
 
 
 @dataclass(frozen=True)
@@ -167,6 +204,10 @@ class Certificate(Document):
             "causes": [_json(asdict(cause)) for cause in self.causes],
             "notices": [notice.to_dict() for notice in self.notices],
         }
+
+    @classmethod
+    def document_form(cls) -> type[Form]:
+        return CertificateForm
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:

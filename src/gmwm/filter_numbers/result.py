@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
+from gmwm._core.forms import Form, Model as ModelForm, Notices, NotNegative, Positive, Rate, Text
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
@@ -28,6 +31,37 @@ METHODS = ("bound", "reduce", "given")
 """Where numbers come from: `bound`, `reduce`, or somebody who gave them."""
 
 _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
+
+
+class PredictedForm(Form):
+    """Of `Predicted`."""
+
+    time: Positive
+    nees: NotNegative | None
+    tightness: NotNegative | None
+
+
+class FilterNumbersForm(Form):
+    """Of `FilterNumbers`."""
+
+    form: Text
+    model: ModelForm
+    horizon_s: Positive
+    initial_sd: NotNegative
+    method: Text
+    predicted: Annotated[Sequence[PredictedForm], Field(max_length=100)]
+    notices: Notices
+    quantity: Text
+
+
+class SensorNumbersForm(Form):
+    """Of `SensorNumbers`; each axis has a form of its own."""
+
+    source: Text
+    rate_hz: Rate | None
+    duration_s: Positive | None
+    shared: bool
+    channels: Annotated[dict[Text, dict[str, Any]], Field(min_length=1, max_length=10_000)]
 
 
 @dataclass(frozen=True)
@@ -185,6 +219,10 @@ class FilterNumbers(Document):
         }
 
     @classmethod
+    def document_form(cls) -> type[Form]:
+        return FilterNumbersForm
+
+    @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         nan = float("nan")
         return cls(
@@ -318,6 +356,10 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
             "shared": self.shared,
             "channels": {name: each.to_dict() for name, each in self.items()},
         }
+
+    @classmethod
+    def document_form(cls) -> type[Form]:
+        return SensorNumbersForm
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:

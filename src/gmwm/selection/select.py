@@ -131,7 +131,7 @@ class Selection(Document):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.selection.form import SelectionForm
 
         return SelectionForm

@@ -418,7 +418,7 @@ class Fit(Document):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.estimate.result.form import FitForm
 
         return FitForm

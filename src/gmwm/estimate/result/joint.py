@@ -99,7 +99,7 @@ class JointFit(Fit):
         }
 
     @classmethod
-    def form(cls) -> type[Form]:
+    def document_form(cls) -> type[Form]:
         from gmwm.estimate.result.form import JointFitForm
 
         return JointFitForm
