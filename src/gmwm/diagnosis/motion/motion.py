@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.signal import detrend
 from scipy.stats import norm
 
 from gmwm._core.typing import BoolArray, FloatArray
@@ -248,7 +249,9 @@ def _tilts_slowly(force: FloatArray) -> bool:
 
 def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
     """Whether gravity turns all the time, as the gyros say, or rates are not those of a bias."""
-    spread = np.ptp(np.quantile(rate, [tuning.QUIET, 1.0 - tuning.QUIET], axis=0), axis=0)
+    # A straight drift is none of them, however steep.
+    rest = detrend(rate, axis=0) if rate.size else rate
+    spread = np.ptp(np.quantile(rest, [tuning.QUIET, 1.0 - tuning.QUIET], axis=0), axis=0)
     noise = [_white(channel.values, size) for channel in _channels(recording, "gyro")]
     if np.any((spread > tuning.WILD) & (spread > tuning.BEYOND_WHITE * np.array(noise))):
         return True
