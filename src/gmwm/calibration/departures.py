@@ -90,7 +90,13 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     means = _Means.of(wv or fitted.wv)
     if not noise or means.first.size < tuning.FEWEST_DIFFERENCES:
         return ()
-    noises = _noises(Scales.of(fitted.wv).spectrum(Model(noise)), means)
+    psd = Scales.of(fitted.wv).spectrum(Model(noise))
+    frequency = np.geomspace(1.0 / means.length, 0.5 / means.step, tuning.FREQUENCIES)
+    density = psd(frequency, means.dt)
+    if not np.max(density) > 0.0:
+        return ()  # periodic lines alone have no noise
+    floor = max(float(np.min(density)), tuning.NO_INFORMATION * float(np.max(density)))
+    noises = _noises(psd, floor, means)
     kinds = families(means.blocks.size, means.step)
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
@@ -100,7 +106,8 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
         beside = [noise.beside(known) for noise in noises]
         tests = [_Test.of(family, means, beside) for family in kinds]
         # Each kind is as likely beforehand.
-        evidence = float(np.exp(logsumexp([test.log_evidence for test in tests]))) / len(tests)
+        log_evidence = float(logsumexp([test.log_evidence for test in tests])) - np.log(len(tests))
+        evidence = float(np.exp(min(log_evidence, tuning.LARGEST_LOG_EVIDENCE)))
         best = max(tests, key=lambda test: test.log_evidence)
         if evidence < tuning.POSSIBLE:
             break
@@ -145,6 +152,11 @@ class _Means:
         """Length of a block, s."""
         return self.samples * self.dt
 
+    @property
+    def length(self) -> float:
+        """Of all blocks, s."""
+        return self.blocks.size * self.step
+
     @cached_property
     def first(self) -> IntArray:
         """Blocks that exist beside one that exists."""
@@ -183,12 +195,10 @@ class _Noise:
         )
 
 
-def _noises(psd: PSD, means: _Means) -> list[_Noise]:
+def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
     """The fitted noise with its part above the floor scaled, and a random walk beside it."""
-    length = means.blocks.size * means.step
-    frequency = np.geomspace(1.0 / length, 0.5 / means.step, 64)
-    floor = float(np.min(psd(frequency, means.dt)))
-    walk = 3.0 * floor / (tuning.WALK_AT * length) ** 2  # K^2 that equals the floor at that time
+    # K^2 that equals the floor at that averaging time.
+    walk = 3.0 * floor / (tuning.WALK_AT * means.length) ** 2
 
     def covariance(spectrum: PSD) -> FloatArray:
         column = difference_covariance(spectrum, means.dt, means.samples, means.blocks.size)
@@ -200,7 +210,9 @@ def _noises(psd: PSD, means: _Means) -> list[_Noise]:
     found = []
     for part, weight in zip(tuning.SLOW_PARTS, np.gradient(np.log(tuning.SLOW_PARTS)), strict=True):
         for more in tuning.WALKS:
-            factor = cho_factor(flat + part * slow + more * unit, lower=True)
+            total = flat + part * slow + more * unit
+            total += tuning.NO_INFORMATION * np.mean(np.diag(total)) * np.eye(len(total))
+            factor = cho_factor(total, lower=True)
             inverse = cho_solve(factor, np.eye(means.first.size))
             half_log_determinant = float(np.sum(np.log(np.diag(factor[0]))))
             found.append(_Noise(float(np.log(weight)) - half_log_determinant, inverse))

@@ -73,7 +73,8 @@ SHARE_POINTS = 512
 """Places of a coefficient at which the share of a level is computed."""
 
 NO_INFORMATION = 1e-9
-"""Of the largest information, which a curve has that known ones explain."""
+"""Of the largest information, which a curve has that known ones explain; and of the variance of the
+block means, which rounding errors stay below."""
 
 NEAR = 2
 """Members on either side of one that is found that are known with it: its time is between them."""
@@ -83,3 +84,9 @@ SPANNED = 1e-6
 
 FEW = 0.05
 """Fraction of differences that are not zero, below which those of a family are kept as sparse."""
+
+LARGEST_LOG_EVIDENCE = 700.0
+"""Whose exponential is a number."""
+
+FREQUENCIES = 64
+"""At which the floor of the spectrum is looked for, from one period of the record to two blocks."""
