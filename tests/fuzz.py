@@ -35,7 +35,7 @@ import gmwm
 from gmwm._core.runs import do_runs
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
-from gmwm.export import write_kalibr
+from gmwm.export import export
 from gmwm.ins.field import Measured
 from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log
@@ -363,7 +363,7 @@ def load_and_show(rng: random.Random, path: Path) -> Any:
     json.dumps(found.to_dict())
     if isinstance(found, gmwm.Calibration) and rng.random() < 0.2:
         write_report(found, path.with_suffix(".html"))
-        write_kalibr(found, path.with_suffix(".yaml"))
+        export(found, "kalibr", path=path.with_suffix(".yaml"))
     return found
 
 

@@ -11,7 +11,7 @@ import yaml
 
 import gmwm
 from gmwm.errors import InputError, printable
-from gmwm.export import write_kalibr
+from gmwm.export import export
 
 X = np.random.default_rng(0).normal(size=(400, 6))
 
@@ -79,7 +79,8 @@ def test_names_inject_nothing_into_yaml(tmp_path):
         names, 100.0, {"gyro": "rad/s", "accel": "m/s^2"}, source="a.csv\nrostopic: /evil"
     )
     calibration = gmwm.calibrate(given, gmwm.WhiteNoise() + gmwm.RandomWalk())
-    path = write_kalibr(calibration, tmp_path / "imu.yaml")
+    path = tmp_path / "imu.yaml"
+    export(calibration, "kalibr", path=path)
     content = yaml.safe_load(path.read_text())
     assert content["update_rate"] == 100
     assert content["rostopic"] == "/imu0"

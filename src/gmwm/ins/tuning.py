@@ -113,3 +113,8 @@ SLOPE = 3e-3
 
 INERTIA = 1e-3
 """Of the score, for a factor's squared distance from 1: what does not matter stays there."""
+
+# -- studies --------------------------------------------------------------------------------------
+
+LEAST_NUMBER, LARGEST_NUMBER = 1e-60, 1e60
+"""SI, of a study, beyond which powers of it overflow or vanish; nothing physical comes near."""

@@ -259,7 +259,8 @@ def gnss(
     InputError
         If the interval is not a multiple of the trajectory's, or a standard deviation not positive.
     """
-    stride = checks.positive("interval", interval) / trajectory.dt
+    # Beyond the end there are no fixes, however far.
+    stride = min(checks.positive("interval", interval) / trajectory.dt, trajectory.n + 1.0)
     if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:
         raise InputError(
             f"interval = {interval:g} s: give a multiple of the trajectory's {trajectory.dt:g} s"

@@ -25,6 +25,7 @@ from pydantic import (
 from gmwm._core import checks
 from gmwm._core.units import factor
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 
 FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>", "<reduced>")
 """Forms that one key may have; pydantic puts them into the place of an error."""
@@ -103,7 +104,7 @@ def value(given: Any, si_unit: str) -> float:
         If it is not a finite number, or its unit is of another dimension.
     """
     if checks.is_number(given):
-        return float(given)
+        return _plausible(float(given), given)
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     if match is None:
         raise InputError(
@@ -112,8 +113,12 @@ def value(given: Any, si_unit: str) -> float:
         )
     number, unit = match.groups()
     found = float(number) * (factor(unit, si_unit) if unit else 1.0)
-    if not checks.is_number(found):
-        raise InputError(f"{checks.shown(given)} is too large: check it")
+    return _plausible(found, given)
+
+
+def _plausible(found: float, given: Any) -> float:
+    if found != 0.0 and not tuning.LEAST_NUMBER < abs(found) < tuning.LARGEST_NUMBER:
+        raise InputError(f"{checks.shown(given)} is beyond what sensors and drives have: check it")
     return found
 
 

@@ -11,11 +11,17 @@ ACCEL = {"N": 1e-2}
 
 
 @settings(deadline=None)  # pint is imported in the first example
-@given(st.floats(min_value=-1e12, max_value=1e12))
+@given(st.floats(min_value=-1e12, max_value=1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-60))
 def test_a_number_is_itself_as_a_number_and_as_text(number: float) -> None:
     assert value(number, "s") == number
     assert value(repr(number), "s") == number
     assert value(f" {number!r} s", "s") == number
+
+
+@pytest.mark.parametrize("number", [1e61, -1e300, 1e-61, "1e308 s", "-5e-324", "1e999", "1e150 h"])
+def test_numbers_that_nothing_has_are_refused(number: float | str) -> None:
+    with pytest.raises(InputError, match="beyond what sensors and drives have"):
+        value(number, "s")
 
 
 @pytest.mark.parametrize(
