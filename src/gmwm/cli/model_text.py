@@ -81,7 +81,7 @@ def _model(text: str) -> Model:
     kinds: dict[str, type[Process]] = {"GM": GaussMarkov}
     for kind in CATALOGUE:
         kinds[kind.__name__] = kind
-        if len(kind.parameters[0].name) == 1:
+        if len(kind.parameters[0].name) == 1 and not kind.prefix:
             kinds[kind.parameters[0].name] = kind
     terms: list[Process] = []
     for part in text.split("+"):

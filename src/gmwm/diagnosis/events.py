@@ -47,7 +47,8 @@ def find_events(errors: Innovations, tails: Tails | None = None) -> tuple[tuple[
     groups = np.split(weak, np.flatnonzero(np.diff(weak) > tuning.JOINED) + 1)
     found: list[tuple[int, int]] = []
     for group in groups:
-        size = beyond[group] / errors.scale[group]
+        with np.errstate(divide="ignore"):  # beside a constant stretch anything is infinitely large
+            size = beyond[group] / errors.scale[group]
         chain = np.count_nonzero(size > np.max(size) / tuning.CHAIN_FLOOR)
         if not (np.max(size) > limit or chain > longest):
             continue
