@@ -8,7 +8,7 @@ import pytest
 
 import fuzz
 
-SOME = {"npy": 150, "odd": 2, "document": 25, "study": 20, "field": 20}
+SOME = {"npy": 150, "odd": 2, "document": 8, "study": 12, "field": 12}
 
 
 @pytest.mark.parametrize("name", sorted(fuzz.KINDS))

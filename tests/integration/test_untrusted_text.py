@@ -34,7 +34,8 @@ def recording(path, names=("wx", "wy", "wz", "ax", "ay", "az"), extra="temp [/de
     return path
 
 
-OPTIONS = ("--rate", "100", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--leave", "all")
+OPTIONS = ("--rate", "100", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--leave", "all",
+           "--model", "N")  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,10 @@ MODEL = WhiteNoise() + RandomWalk()
 WV = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(20_000, 1.0, 1), 1.0)
 
 
-@pytest.mark.parametrize("walk", [5e-4, 1e-3, 1.7e-3])
+@pytest.mark.parametrize(
+    "walk",
+    [1e-3, *(pytest.param(walk, marks=pytest.mark.slow) for walk in (5e-4, 1.7e-3))],
+)
 def test_bounds_of_a_walk_near_the_threshold_lie_above_it(walk):
     # Under the noise without the walk 30, 26 and 16 of 100 bounds lay below.
     runs, below = 60, 0
