@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
@@ -179,6 +179,16 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
         )
 
 
+def _repeated(columns: Sequence[FloatArray]) -> BoolArray:
+    """Which rows have the values of the row before in every column."""
+    same = np.ones(columns[0].size, dtype=bool)
+    same[0] = False
+    for values in columns:
+        both = np.isnan(values[1:]) & np.isnan(values[:-1])
+        same[1:] &= (values[1:] == values[:-1]) | both
+    return same
+
+
 def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
@@ -193,6 +203,7 @@ def _timing(
         seconds=meaning(name).seconds,
         own_unit=meaning(name).stated,
         where=table.where,
+        same=lambda: _repeated([arrays[i] for i in arrays if i != time]),
     )
     timing = clock.timing(stated)
     if stated is None:

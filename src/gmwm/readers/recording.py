@@ -18,6 +18,7 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
+    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set"}
     | {"missing-samples", "part"}
 )
 """Codes of the notices about how a file was read."""
