@@ -623,8 +623,26 @@ def turned_file(tmp_path_factory):
     return write_csv(tmp_path_factory.mktemp("data") / "turned.csv", columns)
 
 
-def test_exit_status_where_no_axis_is_valid(run, turned_file):
+def test_stretches_at_rest_of_a_log_that_moves(run, turned_file):
     code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, "--model", "N")
+    assert (code, told) == (0, "")
+    shown = " ".join(printed.split())
+    assert "at rest from 0 to 29.75, 60.25 to 120 s |###" in shown
+    assert "no averaging time is longer than the longest of them" in shown
+    assert "8,950 samples a channel" in shown
+    rows = np.loadtxt(turned_file, delimiter=",", skiprows=1)
+    rows += 30.0 * np.sin(np.arange(len(rows)) / 70.0)[:, None] * [1, 1, 1, 0, 0, 0]
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    write_csv("moving.csv", dict(zip(names, rows.T, strict=True)))
+    code, _, told = run("calibrate", "moving.csv", *RATE, *FIELD, "--model", "N")
+    assert code == 2
+    assert told.startswith("gmwm: moving.csv is not static, and its longest stretch at rest has ")
+    assert told.endswith("where 10 s are needed: give e.g. --all to take everything as static\n")
+
+
+def test_exit_status_where_no_axis_is_valid(run, turned_file):
+    chosen = ("--model", "N", "--all", "--channels", "gyro_z")
+    code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, *chosen)
     assert code == 1
     assert told == "gmwm: no channel has a valid model, for the reasons in the report\n"
     shown = " ".join(printed.split())

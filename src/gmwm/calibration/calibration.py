@@ -20,6 +20,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
+from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
@@ -185,6 +186,7 @@ def calibrate(
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     screening: Collection[str] = SCREENING,
+    still: bool = True,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -204,13 +206,17 @@ def calibrate(
     Parameters
     ----------
     recording : Recording or sequence of Recording
-        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`.
+        At rest, or with stretches at rest. Several of one sensor have one model, fitted jointly;
+        see `gmwm.JointFit`.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
     screening : collection of str, optional
         Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
         unexamined.
+    still : bool, optional
+        Whether only the stretches at rest of a log that is not static are used, as several
+        recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter do in turns; -1 is one per core.
@@ -224,10 +230,13 @@ def calibrate(
     Raises
     ------
     InputError
-        If no channel can be calibrated, or a mapping has no model for one.
+        If no channel can be calibrated, a mapping has no model for one, or a log that is not static
+        has no stretch of ten seconds at rest.
     """
     given = [recording] if isinstance(recording, Recording) else list(recording)
     _check_together(given)
+    if still and screening:
+        given = [part for each in given for part in stretches_at_rest(each)]
     treated = [screened(each, screening) for each in given]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
@@ -278,6 +287,8 @@ def calibrate(
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
     issues = [issue for each in treated for issue in each.notices]
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
+    if not still:
+        spoiling.pop("not-static", None)  # as the caller says
     fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")

@@ -59,6 +59,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="Leave events, lines, resonances, outliers or all as they are: samples of "
                    "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
+@click.option("--all", "everything", is_flag=True,
+              help="Take everything as static; by default only the stretches at rest of a log "
+                   "that moves are used.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @printing_options
 def calibrate(
@@ -66,18 +69,19 @@ def calibrate(
     output: Path,
     models: tuple[str, ...],
     left: tuple[str, ...],
+    everything: bool,
     jobs: int,
     as_json: bool,
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Calibrate every channel of a static recording, or of several of one sensor.
+    """Calibrate every channel of a recording at rest, or of several of one sensor.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
     Empty fields, NaN and rows that the time column jumps over are missing samples.
     For each channel an error model is selected and estimated; the table shows it in the units of
     the field, the files hold everything in SI units. Several recordings of one sensor have one
-    model, with a test whether they agree.
+    model, with a test whether they agree; so have the stretches at rest of a log that moves.
 
     Exit status: 0 if a channel has a valid model, 1 if none has (the files are written all the
     same), 2 if the input cannot be used.
@@ -99,7 +103,9 @@ def calibrate(
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
+            result = run(
+                recordings, model, screening=chosen, still=not everything, jobs=jobs, progress=bar
+            )
         # The files first: who pipes the table into head must not lose them.
         written = write_files(result, folder)
     if as_json:

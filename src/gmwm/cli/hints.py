@@ -20,6 +20,7 @@ HINTS = {
     "heading-unknown": "--heading DEG, or heading: in the file",
     "memory": "--channel gyro_x=COLUMN for each of some channels",
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
+    "no-rest": "--all to take everything as static",
     "other-runs": "-o FOLDER",
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",

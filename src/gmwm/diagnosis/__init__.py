@@ -3,5 +3,15 @@
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.repeated import thinned
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
+from gmwm.diagnosis.still import Still, find_still, rest_of
 
-__all__ = ["ChannelHealth", "Health", "Repetition", "health", "thinned"]
+__all__ = [
+    "ChannelHealth",
+    "Health",
+    "Repetition",
+    "Still",
+    "find_still",
+    "health",
+    "rest_of",
+    "thinned",
+]

@@ -169,7 +169,7 @@ def test_coarse_stamps_with_a_loss_are_refused_as_without(recorded):
 def test_stamps_in_no_order_are_refused(recorded, seed):
     clock = Simulated(seed, 200.0)
     clock.rng.shuffle(clock.stamps)
-    with pytest.raises(InputError, match="goes back, and .* no even clock fits") as caught:
+    with pytest.raises(InputError, match=r"goes back, and .* no even clock fits") as caught:
         recorded(clock)
     assert caught.value.code == "clock"
     assert "sort the rows" in caught.value.mend

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
@@ -11,10 +13,10 @@ from gmwm.readers import tuning
 def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> float:
     """Sampling interval: slope of the line through the stamps over their sample numbers.
 
-    From the median slope of rows half of the record apart, least squares with the residuals bounded at three robust standard deviations: a stamp that
-    comes late has no more weight than one of the usual jitter. From independent errors of the
-    stamps of s intervals the slope has a relative error of ``s sqrt(12 / n^3)``, that from the
-    first to the last stamp ``s sqrt(2) / n``.
+    From the median slope of rows half of the record apart, least squares with the residuals bounded
+    at three robust standard deviations: a stamp that comes late has no more weight than one of the
+    usual jitter. From independent errors of the stamps of s intervals the slope has a relative
+    error of ``s sqrt(12 / n^3)``, that from the first to the last stamp ``s sqrt(2) / n``.
 
     Parameters
     ----------
@@ -29,13 +31,13 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
         In the unit of the stamps.
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
     rows = np.asarray(number - number[0], dtype=float)
     half = max(max(part.stop - part.start for part in parts) // 2, 1)
     ends = [(part.start, part.stop - half) for part in parts]
     first = np.concatenate([np.arange(a, b) for a, b in ends if b > a])
-    with_time = stamps[first + half] - stamps[first]
-    slope = float(np.median(with_time / (rows[first + half] - rows[first])))
+    between = stamps[first + half] - stamps[first]
+    slope = float(np.median(between / (rows[first + half] - rows[first])))
     lever = rows.copy()
     for part in parts:
         lever[part] -= np.mean(lever[part])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -173,7 +174,7 @@ def _smooth(late: FloatArray, is_set: BoolArray) -> FloatArray:
     """Slow part of what stamps are late, between the times at which the clock was set."""
     smooth = np.empty(late.size)
     edges = [0, *np.flatnonzero(is_set), late.size]
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         part = late[start:stop]
         # The median drops what a stall delays, the mean the noise of the median.
         calm = median_filter(part, min(tuning.ROWS_OF_TREND, part.size) | 1, mode="nearest")
