@@ -22,6 +22,9 @@ _OPTIONS = (
                       "accel_z=5; repeat. By default roles are guessed from the column names."),
     click.option("--time", "time_column", metavar="COLUMN",
                  help="Time column by name or number; 'none' to ignore it."),
+    click.option("--layout", metavar="LAYOUT",
+                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT, "
+                      "NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]."),
 )  # fmt: skip
 
 
@@ -66,6 +69,7 @@ def read_recording(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    layout: str | None = None,
     only: str | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -86,6 +90,7 @@ def read_recording(
         units=units,
         channels=_chosen(roles(channels), only),
         time=time_reference(time_column),
+        layout=layout,
     )
     return recording.part(0.0 if start is None else start, stop)
 

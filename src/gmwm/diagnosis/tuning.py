@@ -290,5 +290,5 @@ POINTS_OF_BAND, PEAK_OF_BAND, SHARE_OF_BAND = 512, 20.0, 0.3
 it, of a stretch that vibrates: a sensor at rest has lines, but most of its noise is none."""
 
 SWAYING_RATE = 3.5e-3
-"""rad/s (0.2 deg/s) by which the mean rate of a sensor at rest does not change from second to second,
-half of the time; for gravity that is `SWAYS`."""
+"""rad/s (0.2 deg/s) by which the mean rate of a sensor at rest does not change from second to
+second, half of the time; for gravity that is `SWAYS`."""

@@ -18,6 +18,7 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.at_rest import rest_notices
+from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.csv_table import CsvTable
@@ -33,6 +34,7 @@ def read(
     units: Mapping[str, str] | None = None,
     channels: Mapping[str, Reference] | Collection[str] | None = None,
     time: Reference | Literal[False] | None = None,
+    layout: str | None = None,
 ) -> Recording:
     """Read a static recording of an inertial sensor.
 
@@ -57,6 +59,12 @@ def read(
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
         header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
         as seconds, and for others ``rate`` is needed.
+    layout : str, optional
+        Of a binary file without a header: ``"IMAR"``, ``"LN200"``, ``"LN200IG"``, ``"IXSEA"``,
+        ``"NAVCHIP_INT"``, ``"NAVCHIP_FLT"``, ``"KF-GINS"``, or
+        ``"TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"``: each record is a time (float64, s)
+        and six numbers of a type, gyro and accelerometer x, y, z, in units of the scales (rad and
+        m/s; of rates rad/s and m/s^2).
 
     Returns
     -------
@@ -77,7 +85,7 @@ def read(
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
     units = units or {}
-    table = _open(Path(path))
+    table = _open(Path(path), layout)
     stated = _stated_rate(table, rate)
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
@@ -116,7 +124,9 @@ def read(
     )
 
 
-def _open(path: Path) -> Table:
+def _open(path: Path, layout: str | None) -> Table:
+    if layout is not None:
+        return BinaryTable.open(existing_file(path), layout_of(layout))
     kind = ArrayTable if path.suffix.lower() in (".npy", ".npz") else CsvTable
     return kind.open(existing_file(path))
 

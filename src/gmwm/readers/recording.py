@@ -19,6 +19,7 @@ READING = frozenset(
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
     | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set"}
+    | {"partial-record"}
     | {"missing-samples", "part", "still-stretches"}
 )
 """Codes of the notices about how a file was read."""

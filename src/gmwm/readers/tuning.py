@@ -132,3 +132,11 @@ ASTRAY = 2.0
 
 MOST_OF_ONE_STAMP = 1024
 """Rows with one stamp that a full buffer holds, or a host that stalls writes."""
+
+# -- binary files ---------------------------------------------------------------------------------
+
+LARGEST_OF_BINARY = 60.0
+"""s: larger first steps of a binary file are numbers of another layout."""
+
+RECORDS_AT_ONCE = 1 << 16
+"""Records of a binary file that are read at a time."""

@@ -204,7 +204,7 @@ def find_jumps(stamps: FloatArray) -> Jumps:
 def jumps_of(found: Followed) -> Jumps:
     """The jumps of a clock that was followed row by row."""
     rows = np.flatnonzero(found.advance > 1)
-    missing = found.advance[rows] - 1.0
+    missing = np.asarray(found.advance[rows] - 1, dtype=np.float64)
     reach = np.arange(tuning.NEIGHBOURS)
     last = found.late.size - 1
     later = np.median(found.late[np.minimum(rows[:, None] + reach, last)], axis=1)

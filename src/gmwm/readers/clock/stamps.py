@@ -303,19 +303,20 @@ class Clock:
                 f"clock, at most by {by:.3g} s ({self.where(int(worst))}): the samples were taken "
                 "as evenly spaced"
             )
-            values = {"count": int(astray.size), "largest": by}
-            notices.append(Notice("stamps-astray", "note", "", text, values))
+            notices.append(
+                Notice("stamps-astray", "note", "", text, {"count": astray.size, "largest": by})
+            )
         if count := jumps.set_at.size:
-            by = [float(self.stamps[row] - self.stamps[row - 1]) * seconds for row in jumps.set_at]
-            first, largest = int(jumps.set_at[0]), max(by, key=abs)
+            far = (self.stamps[jumps.set_at] - self.stamps[jumps.set_at - 1]) * seconds
+            first, largest = int(jumps.set_at[0]), float(far[np.argmax(np.abs(far))])
             times = "once" if count == 1 else f"{count:,} times"
             text = (
                 f"the clock was set {times}, farthest by {largest:+.6g} s, first at "
                 f"{self.where(first)}: the samples were taken as evenly spaced there"
             )
-            values = {"count": int(count), "largest": largest}
+            numbers = {"count": float(count), "largest": largest}
             action = "if samples are missing there, use the part before or after"
-            notices.append(Notice("clock-set", "warning", "", text, values, action))
+            notices.append(Notice("clock-set", "warning", "", text, numbers, action))
         return notices
 
     def _unit(self, step: float, expected: float | None) -> tuple[float, bool]:
