@@ -76,7 +76,7 @@ def main():
             right += same
             if same:
                 off.append(np.max(np.abs(np.array(found.stretches) - np.array(rest))))
-            calibration = gmwm.calibrate(recording, "N")
+            calibration = gmwm.calibrate(recording, gmwm.WhiteNoise())
             for name, fit in calibration.items():
                 low, high = fit.interval(0.95)["N"]
                 inside += low <= (GYRO if name.startswith("gyro") else ACCEL) <= high

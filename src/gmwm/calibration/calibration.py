@@ -340,7 +340,9 @@ def _usable(
     dead: dict[str, Notice] = {}
     for each in treated:
         for channel in each.recording.inertial:
-            why = _reason_to_skip(channel)
+            straight = (n for n in each.notices if n.code == "interpolated")
+            why = next((n for n in straight if n.where == channel.name), None)
+            why = why or _reason_to_skip(channel)
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:

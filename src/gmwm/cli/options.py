@@ -23,8 +23,9 @@ _OPTIONS = (
     click.option("--time", "time_column", metavar="COLUMN",
                  help="Time column by name or number; 'none' to ignore it."),
     click.option("--layout", metavar="LAYOUT",
-                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT, "
-                      "NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]."),
+                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
+                      "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
+                      "[,rates][,little|big]."),
 )  # fmt: skip
 
 

@@ -292,3 +292,13 @@ it, of a stretch that vibrates: a sensor at rest has lines, but most of its nois
 SWAYING_RATE = 3.5e-3
 """rad/s (0.2 deg/s) by which the mean rate of a sensor at rest does not change from second to
 second, half of the time; for gravity that is `SWAYS`."""
+
+# -- interpolated samples -------------------------------------------------------------------------
+
+BENT, STRAIGHT, STRAIGHT_AT_MOST = 0.9, 1e-3, 0.02
+"""Quantile of the second differences that gives their size, and the share of it that counts as
+none; where rounding leaves more than the last, nothing is seen."""
+
+LEAST_STRAIGHT = 0.15
+"""Share of second differences that vanish: of noise there are ten times the threshold over its size,
+at most; of an interpolation to 2.4 times the rate and more there are as many."""

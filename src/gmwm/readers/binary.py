@@ -143,8 +143,8 @@ class BinaryTable:
             median = float(np.median(steps)) if even else 0.0
         if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
             raise InputError(
-                f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}, are no seconds of "
-                "a clock: give the layout of this file",
+                f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}, are no seconds "
+                "of a clock: give the layout of this file",
                 "layout",
             )
         return table
@@ -179,7 +179,7 @@ class BinaryTable:
             for column, values in found.items():
                 part = block["time"] if column == 0 else block["values"][:, column - 1]
                 values[start : start + part.size] = part
-        for column, values in found.items():
+        for values in found.values():
             if not usable(values):
                 row = int(np.flatnonzero(~(np.abs(values) < np.inf))[0])
                 raise InputError(

@@ -18,7 +18,7 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
-    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set"}
+    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
     | {"partial-record"}
     | {"missing-samples", "part", "still-stretches"}
 )

@@ -140,3 +140,6 @@ LARGEST_OF_BINARY = 60.0
 
 RECORDS_AT_ONCE = 1 << 16
 """Records of a binary file that are read at a time."""
+
+LONGEST_OF_WRAP = 100.0
+"""Steps within which a counter that ran over goes on."""

@@ -1,9 +1,9 @@
 """Stretches at rest: generalized likelihood ratio on gyros and accelerometers.
 
 The hypothesis of rest is that samples scatter about a constant mean as the sensor's own noise
-does; against any other mean and scatter its log likelihood ratio is, but for constants, the sum over the
-axes of the squared deviations from the mean of a window over the variance of the noise (Skog et
-al., 2010, *IEEE Trans. Biomed. Eng.* 57, 2657-2666, where the gyros have no bias and the
+does; against any other mean and scatter its log likelihood ratio is, but for constants, the sum
+over the axes of the squared deviations from the mean of a window over the variance of the noise
+(Skog et al., 2010, *IEEE Trans. Biomed. Eng.* 57, 2657-2666, where the gyros have no bias and the
 accelerometers read gravity; here neither is assumed, as biases are unknown). The variance of the
 noise is that of the quietest seconds of the log itself.
 """

@@ -116,6 +116,12 @@ class Clock:
         Else every row is given its sample number: see `gmwm.readers.clock.uneven`.
         """
         self._check_complete()
+        unwrapped = _unwrapped(self.stamps)
+        if unwrapped is not None:
+            text = "the counter of the time stamps ran over: they were continued"
+            timing = replace(self, stamps=unwrapped).timing(expected)
+            wrapped = Notice("clock-wraps", "note", "", text)
+            return replace(timing, notices=(*timing.notices, wrapped))
         uneven: Followed | None = None
         with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
             steps = np.diff(self.stamps)
@@ -336,3 +342,20 @@ class Clock:
                 "time-unit",
             )
         return 1.0, True
+
+
+def _unwrapped(stamps: FloatArray) -> FloatArray | None:
+    """Stamps of a counter of 16 or 32 bit that ran over, continued; None if it did not."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(stamps)
+        back = np.flatnonzero(steps < 0.0)
+        if not back.size:
+            return None
+        usual = float(np.median(steps))
+        for bits in (16, 32):
+            forward = steps[back] + 2.0**bits
+            if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):
+                wraps = np.zeros(stamps.size)
+                wraps[back + 1] = 2.0**bits
+                return np.asarray(stamps + np.cumsum(wraps))
+    return None
