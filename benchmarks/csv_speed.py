@@ -44,7 +44,8 @@ def main():
             arrays = sum(channel.values.nbytes for channel in found.values()) / 2**20
             print(
                 f"{minutes} min, {size:.0f} MB: {size / spent:.0f} MB/s of processor time, "
-                f"{spent / arrow:.2f} times pyarrow; peak {peak:.0f} MiB more, arrays {arrays:.0f} MiB"
+                f"{spent / arrow:.2f} times pyarrow; peak {peak:.0f} MiB more, "
+                f"arrays {arrays:.0f} MiB"
             )
 
 
