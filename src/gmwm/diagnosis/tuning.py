@@ -297,8 +297,9 @@ second, half of the time; for gravity that is `SWAYS`."""
 
 BENT, STRAIGHT, STRAIGHT_AT_MOST = 0.9, 3e-5, 0.02
 """Quantile of the second differences that gives their size, and the share of it that counts as
-none (single precision leaves 1e-5 beside gravity); where rounding leaves more than the last, nothing is seen."""
+none (single precision leaves 1e-5 beside gravity); where rounding leaves more than the last,
+nothing is seen."""
 
 LEAST_STRAIGHT = 0.15
-"""Share of second differences that vanish: of noise there are ten times the threshold over its size,
-at most; of an interpolation to 2.4 times the rate and more there are as many."""
+"""Share of second differences that vanish: of noise there are ten times the threshold over its
+size, at most; of an interpolation to 2.4 times the rate and more there are as many."""

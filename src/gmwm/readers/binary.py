@@ -183,8 +183,8 @@ class BinaryTable:
             if not usable(values):
                 row = int(np.flatnonzero(~(np.abs(values) < np.inf))[0])
                 raise InputError(
-                    f"{self.source}, {self.where(row)}: {values[row]} is not a usable number: check "
-                    "the layout"
+                    f"{self.source}, {self.where(row)}: {values[row]} is not a usable number: "
+                    "check the layout"
                 )
         scale = 1.0
         if self.layout.increments:
