@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import linprog, minimize_scalar
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -180,13 +180,27 @@ def _solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> F
     walk = max(target.walk for target in problem.dominated)
     if walk > 0.0 and is_walking:
         least[1] = problem.cost(RandomWalk(1.0)) * walk
-    shares = least_sum(columns.reshape(-1, *columns.shape[-2:]), least)
-    if np.any(np.isnan(shares)):
+    sets = columns.reshape(-1, *columns.shape[-2:])
+    shares = least_sum(sets, least)
+    for i in np.flatnonzero(np.any(np.isnan(shares), axis=1)):
+        shares[i] = _with_care(sets[i], least)
+    return shares
+
+
+def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:
+    """The same of one set whose numbers lie too far apart for bases of a few of them."""
+    largest = np.max(columns, axis=1)
+    found = linprog(
+        np.ones(columns.shape[1]), A_ub=-columns / largest[:, None], b_ub=-1.0 / largest,
+        bounds=[(value, None) for value in least], method="highs",
+    )  # fmt: skip
+    if found.x is None:
         raise InputError(
             "no numbers of this form dominate the model to the precision of the computer: its "
             "parameters are too far apart"
         )
-    return shares
+    # Limits may lie below the tolerance of the program.
+    return np.maximum(found.x, least)
 
 
 def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) -> Model:
