@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MARGIN = 30.0  # s shown before and after an outage
-_GROUPS = ("position", "velocity", "attitude", "sensors")
+_GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensors")
+_COVERED = ("horizontal", "vertical")
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,25 +196,30 @@ class Validation:
         ]
 
     def _nees_rows(self, width: int) -> list[str]:
-        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{g:>12}" for g in _GROUPS)]
+        rows = [f"{'filter':{width}} {'':9}" + "".join(f"{g:>11}" for g in _GROUPS)]
         for name in self.names:
             for label, consistency in self._judgements(name):
                 cells = [_starred(consistency, group) for group in _GROUPS]
-                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
+                rows.append(f"{name:{width}} {label:9}" + "".join(f"{c:>11}" for c in cells))
         return rows
 
     def _coverage_rows(self, width: int) -> list[str]:
-        heads = [f"{100.0 * level:g} %" for level in LEVELS]
-        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{head + ' ':>12}" for head in heads)]
+        heads = [f"{100.0 * level:g} % " for level in LEVELS] * len(_COVERED)
+        parts = "".join(f"{part:>{8 * len(LEVELS)}}" for part in _COVERED)
+        rows = [
+            f"{'':{width}} {'':9}{parts}",
+            f"{'filter':{width}} {'':9}" + "".join(f"{head:>8}" for head in heads),
+        ]
         for name in self.names:
             for label, found in self._judgements(name):
                 cells = [
                     "- "
                     if np.isnan(c.fraction)
                     else f"{100.0 * c.fraction:.1f}" + " *"[not c.within]
-                    for c in found.coverage["position"]
+                    for part in _COVERED
+                    for c in found.coverage[part]
                 ]
-                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
+                rows.append(f"{name:{width}} {label:9}" + "".join(f"{c:>8}" for c in cells))
         return rows
 
     def _innovation_rows(self, width: int) -> list[str]:
