@@ -11,6 +11,8 @@ from gmwm.plotting.deviation import COMPONENT_COLOURS, DATA_COLOUR
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_WIDE = 8.0  # last over first value of an axis with few marks
+
 
 def intervals(
     panels: Mapping[
@@ -25,6 +27,7 @@ def intervals(
         Title -> row -> single values, and the one over all of them with its interval.
     """
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     most = max(len(rows) for rows in panels.values())
     figure, axes = plt.subplots(
@@ -40,6 +43,11 @@ def intervals(
         ax.set_yticks(range(len(rows)), list(rows))
         ax.invert_yaxis()
         ax.set_xscale("log")
+        first, last = ax.get_xlim()
+        marked = (1.0, 3.0) if last > _WIDE * first else (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0, 9.0)
+        ax.xaxis.set_major_locator(LogLocator(subs=marked))
+        ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_title(title, fontsize="medium")
         ax.grid(True, axis="x", which="both", color="#dddddd", linewidth=0.6)
         ax.set_axisbelow(True)

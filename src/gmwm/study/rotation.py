@@ -163,37 +163,45 @@ class Rotation:
     # -- words ------------------------------------------------------------------------------------
 
     def __str__(self) -> str:
-        names, n = self.names, len(self.sources)
-        width = max(map(len, names))
-        head = ["horizontal RMS", "vertical RMS", "NEES horizontal", "NEES vertical"]
-        blocks = [self._head()]
-        blocks.append([
-            "All turns together, at the ends of outages, before the first fix: errors over those "
-            f"of {_FIRST};", "NEES per degree of freedom",
-            f"{'':{width}}" + "".join(f"{each:>19}" for each in head),
-            *(f"{name:{width}}" + "".join(f"{each!s:>19}" for each in self._row(name))
-              for name in names),
-        ])  # fmt: skip
-        blocks.append([
-            "Within the predicted intervals of 95 %, %; NEES of the position, which also judges "
-            "how", "horizontal and vertical go together",
-            f"{'':{width}}" + "".join(f"{each:>19}" for each in ("horizontal", "vertical",
-                                                                 "NEES position")),
-            *(f"{name:{width}}" + "".join(f"{each!s:>19}" for each in self._covered(name))
-              for name in names),
-        ])  # fmt: skip
-        columns = "".join(f"{f'{i + 1} calibrated':>18}" for i in range(n))
-        blocks.append([
-            f"Horizontal RMS over that of {_FIRST}, turn by turn", f"{'':{width}}{columns}",
-            *(f"{name:{width}}" + "".join(f"{self.ratio(name, 'horizontal', i)!s:>18}"
-                                          for i in range(n)) for name in names[1:]),
-        ])  # fmt: skip
-        blocks.append([
-            "NEES of the position, turn by turn", f"{'':{width}}{columns}",
-            *(f"{name:{width}}" + "".join(f"{self.nees(name, 'position', i)!s:>18}"
-                                          for i in range(n)) for name in names),
-        ])  # fmt: skip
-        return "\n\n".join("\n".join(block) for block in blocks)
+        turns = range(len(self.sources))
+        by_turn = [f"{i + 1} calibrated" for i in turns]
+        return "\n\n".join(
+            "\n".join(block)
+            for block in (
+                self._head(),
+                self._table_of(
+                    f"All turns together, at the ends of outages, before the first fix: errors "
+                    f"over those of {_FIRST}; NEES per degree of freedom",
+                    ["horizontal RMS", "vertical RMS", "NEES horizontal", "NEES vertical"],
+                    self._row,
+                ),
+                self._table_of(
+                    "Within the predicted intervals of 95 %, %; NEES of the position, which also "
+                    "judges how horizontal and vertical go together",
+                    ["horizontal", "vertical", "NEES position"],
+                    self._covered,
+                ),
+                self._table_of(
+                    f"Horizontal RMS over that of {_FIRST}, turn by turn",
+                    by_turn,
+                    lambda name: [self.ratio(name, "horizontal", i) for i in turns],
+                ),
+                self._table_of(
+                    "NEES of the position, turn by turn",
+                    by_turn,
+                    lambda name: [self.nees(name, "position", i) for i in turns],
+                ),
+            )
+        )
+
+    def _table_of(
+        self, title: str, head: Sequence[str], row: Callable[[str], list[Interval]]
+    ) -> list[str]:
+        width = max(map(len, self.names))
+        lines = [*wrapped(title), " " * width + "".join(f"{each:>17}" for each in head)]
+        for name in self.names:
+            lines.append(f"{name:{width}}" + "".join(f"{each!s:>17}" for each in row(name)))
+        return lines
 
     def _head(self) -> list[str]:
         turn = self.turns[0]

@@ -8,7 +8,7 @@ from gmwm.calibration.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate.entrance import fit
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.process import BiasInstability
+from gmwm.process import BiasInstability, Model
 from gmwm.readers.recording import Recording
 from gmwm.study import navigation
 from gmwm.study.navigation import Calibrated, aligned, experiment, reproduce_figure
@@ -56,7 +56,7 @@ def test_lines_give_white_noise_and_a_walk_where_there_are_both():
 
 
 def test_an_axis_without_floor_or_walk_has_a_slow_state_all_the_same():
-    found = calibrated(WhiteNoise(1e-3))
+    found = calibrated(Model((WhiteNoise(1e-3),)))
     assert found.lineless()
     for axis in found.lineless():
         wv = found.lines[axis].wv
@@ -103,7 +103,8 @@ def test_an_experiment_has_a_filter_for_each_calibration():
     ten, one = (real.filters[name].models["gyro_x"].params for name in ("AV x 10", "AV"))
     assert ten == {name: pytest.approx(10.0 * each) for name, each in one.items()}
     assert real.filters["AV"].bias_sd["gyro_x"] > 0.0
-    assert real.filters["GMWM"].bias_sd["gyro_x"] == 0.0
+    # Fitted with white noise alone: what wanders is a constant that the filter does not know.
+    assert real.filters["GMWM"].bias_sd["gyro_x"] > 0.0
 
 
 @pytest.mark.parametrize("figure", ["fig5", "fig6"])

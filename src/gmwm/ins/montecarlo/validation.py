@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensors")
+_SHORT = {"horizontal": "hor.", "vertical": "vert."}
 _COVERED = ("horizontal", "vertical")
 
 
@@ -148,7 +149,7 @@ class Validation:
         blocks.append(["NEES per degree of freedom: 1 if the filter is consistent, * out of "
                        "band", *self._nees_rows(width)])  # fmt: skip
         if self.study.outages:
-            blocks.append(["Position errors within predicted intervals, %",
+            blocks.append(["Position errors within predicted intervals, %, horizontal and vertical",
                            *self._coverage_rows(width)])  # fmt: skip
         blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
                        *self._innovation_rows(width)])  # fmt: skip
@@ -196,19 +197,20 @@ class Validation:
         ]
 
     def _nees_rows(self, width: int) -> list[str]:
-        rows = [f"{'filter':{width}} {'':9}" + "".join(f"{g:>11}" for g in _GROUPS)]
+        heads = [_SHORT.get(group, group) for group in _GROUPS]
+        rows = [f"{'filter':{width}} {'':10}" + "".join(f"{head:>9}" for head in heads)]
         for name in self.names:
             for label, consistency in self._judgements(name):
                 cells = [_starred(consistency, group) for group in _GROUPS]
-                rows.append(f"{name:{width}} {label:9}" + "".join(f"{c:>11}" for c in cells))
+                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>9}" for c in cells))
         return rows
 
     def _coverage_rows(self, width: int) -> list[str]:
         heads = [f"{100.0 * level:g} % " for level in LEVELS] * len(_COVERED)
-        parts = "".join(f"{part:>{8 * len(LEVELS)}}" for part in _COVERED)
+        parts = "".join(f"{part:>{7 * len(LEVELS)}}" for part in _COVERED)
         rows = [
-            f"{'':{width}} {'':9}{parts}",
-            f"{'filter':{width}} {'':9}" + "".join(f"{head:>8}" for head in heads),
+            f"{'':{width}} {'':10}{parts}",
+            f"{'filter':{width}} {'':10}" + "".join(f"{head:>7}" for head in heads),
         ]
         for name in self.names:
             for label, found in self._judgements(name):
@@ -219,7 +221,7 @@ class Validation:
                     for part in _COVERED
                     for c in found.coverage[part]
                 ]
-                rows.append(f"{name:{width}} {label:9}" + "".join(f"{c:>8}" for c in cells))
+                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>7}" for c in cells))
         return rows
 
     def _innovation_rows(self, width: int) -> list[str]:
