@@ -25,7 +25,7 @@ TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 NAMES = ("sigma2_WN", "sigma2_RW")
 _TRUE = np.array([0.04, 4e-4])
-_SCALES = 2.0 ** np.arange(8)
+_SCALES = np.array([2.0**j for j in range(8)])
 _FIRST = 4
 """Scales that white noise is read from; the others are the random walk's."""
 

@@ -149,7 +149,8 @@ class Rotation:
         above, below = (np.nan_to_num(each) for each in tables)
         whole = np.ones((n, n)) if calibrated is None else np.outer(calibrated, np.ones(n))
         with np.errstate(invalid="ignore", divide="ignore"):
-            value = root(np.sum(whole[..., None] * above) / np.sum(whole[..., None] * below))
+            sums = [np.sum(whole[..., None] * each) for each in (above, below)]
+            value = root(np.array(sums[0] / sums[1]))
             drawn = root(
                 np.einsum("dcts,cts->d", weights, above) / np.einsum("dcts,cts->d", weights, below)
             )

@@ -162,7 +162,7 @@ def test_the_motion_that_it_is_judged_on_is_reported_or_given(monkeypatch):
     full = covariance_analysis(own, WALK, WALK)
     at = full.index(own.outages[0].end)
     assert given.errors[0].full == pytest.approx(np.hypot(*full.sd[at, :2]))
-    with pytest.raises(InputError, match="it has 130 s, and outages .* need 260 s"):
+    with pytest.raises(InputError, match=r"it has 130 s, and outages .* need 260 s"):
         reduce(WALK, "N+K", (5.0, 15.0), trajectory=drive)
 
 
