@@ -281,8 +281,10 @@ def crossed_weights(
 
     Recordings that are calibrated, recordings that are navigated with and the stretches of these
     are drawn with replacement, each of them once a draw for all runs that they are in: the crossed
-    ("pigeonhole") bootstrap, which is conservative (Owen 2007, *Annals of Applied Statistics* 1,
-    386-411).
+    ("pigeonhole") bootstrap, which is conservative for many recordings (Owen 2007, *Annals of
+    Applied Statistics* 1, 386-411). Of four, with eight stretches each, intervals of 95 % hold the
+    truth in 99 % of simulated studies where recordings do not differ, in 90 % where they differ as
+    much as stretches, and in 84 % where they differ twice as much.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ def test_intervals_allow_for_few_recordings():
     inside = np.mean((lower < 1.0) & (upper > 1.0))
     naive = np.std(values, axis=(1, 2, 3)) / np.sqrt(n * (n - 1) * size)
     centre = np.sum(values * off, axis=(1, 2, 3)) / (n * (n - 1) * size)
-    assert inside > 0.8  # of 0.95: four recordings are few
+    assert inside > 0.83  # 0.90 in a thousand studies: four recordings are few
     assert np.mean(np.abs(centre - 1.0) < 1.96 * naive) < 0.4
 
 
