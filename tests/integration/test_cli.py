@@ -947,6 +947,25 @@ def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
 
 
 @pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("table2", "--rotate"), "--rotate"),
+        (("fig7", "--rotate"), "--rotate"),
+        (("fig9", "--resume"), "--resume"),
+        (("fig9", "--rotate", "--method", "AV"), "--method"),
+    ],
+)
+def test_recordings_are_rotated_for_two_figures_only(run, tmp_path, arguments, option):
+    code, _, told = run("reproduce", *arguments, "-o", "s")
+    assert code == 2
+    assert f"{arguments[0]} has no option {option}: leave it out" in told
+    code, _, told = run("reproduce", "fig9", "--rotate", "-o", "s")
+    assert code == 2
+    assert "give two recordings or more" in told
+    assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize(
     "arguments",
     [
         ("reproduce", "table2", "--method", "AV2", "--runs", 2),

@@ -14,6 +14,7 @@ from gmwm.plotting.deviation import (
     straight_lines,
     trace,
 )
+from gmwm.plotting.intervals import intervals
 from gmwm.plotting.navigation import errors, growth, innovations, literal, measured_track, track
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "errors",
     "growth",
     "innovations",
+    "intervals",
     "literal",
     "measured_track",
     "residuals",
