@@ -1,0 +1,111 @@
+"""What kind of file this is, by its first bytes and its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from gmwm._core.files import existing_file
+from gmwm.errors import InputError
+from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.formats.numpy_file import open_numpy
+from gmwm.readers.formats.rosbag import open_bag
+from gmwm.readers.table import Table
+
+CLOCKS = ("header", "log")
+"""Stamps of messages: those of their headers, or the times at which they were recorded."""
+
+_HEAD = 16  # bytes
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes
+    ----------
+    name : str
+    suffixes : tuple of str
+    magic : tuple of bytes
+        What its files begin with, if they begin alike.
+    open : callable
+        Path, topics, clock -> tables.
+    has_topics : bool
+        Whether there may be several series of messages to choose from.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    magic: tuple[bytes, ...]
+    open: Callable[[Path, Sequence[str], str], tuple[Table, ...]]
+    has_topics: bool = False
+
+
+def _alone(open_table: Callable[[Path], Table]) -> Callable[..., tuple[Table, ...]]:
+    return lambda path, topics, clock: (open_table(path),)
+
+
+_TEXT = Kind("text", (), (), _alone(CsvTable.open))
+
+KINDS = (
+    # Their names are judged, and what is inside is checked, as they always were.
+    Kind("numpy", (".npy", ".npz"), (), _alone(open_numpy)),
+    Kind("rosbag", (".bag",), (b"#ROSBAG",), open_bag, True),
+    Kind("rosbag2", (".mcap", ".db3"), (b"\x89MCAP", b"SQLite format 3"), open_bag, True),
+)
+"""All but text, which begins with anything."""
+
+
+def open_tables(path: Path, topics: Sequence[str] = (), clock: str = "header") -> tuple[Table, ...]:
+    """Open a file, whatever it is.
+
+    Parameters
+    ----------
+    path : path
+    topics : sequence of str, optional
+        Those to read, of a log that has several.
+    clock : {"header", "log"}, optional
+        Which stamps of messages count.
+
+    Returns
+    -------
+    tuple of Table
+        Several if its sensors have rates of their own.
+
+    Raises
+    ------
+    InputError
+        If it cannot be used.
+    """
+    if clock not in CLOCKS:
+        raise InputError(f"clock = {clock!r}: give one of {', '.join(CLOCKS)}")
+    kind = _kind(path)
+    for name, given in (("topic", bool(topics)), ("clock", clock != CLOCKS[0])):
+        if given and not kind.has_topics:
+            raise InputError(
+                f"{path.name} has no topics: {name} is for bags and flight logs, leave it out"
+            )
+    return kind.open(path, topics, clock)
+
+
+def _kind(path: Path) -> Kind:
+    if _is_bag_folder(path):
+        return next(kind for kind in KINDS if kind.name == "rosbag2")
+    suffix, head = existing_file(path).suffix.lower(), b""
+    with suppress(OSError), path.open("rb") as stream:
+        head = stream.read(_HEAD)
+    by_content = [kind for kind in KINDS if head.startswith(kind.magic)]
+    by_name = [kind for kind in KINDS if suffix in kind.suffixes]
+    return next(iter(by_content + by_name), _TEXT)
+
+
+def _is_bag_folder(path: Path) -> bool:
+    """Whether it is a folder that holds what ros2 bag writes, perhaps not all of it."""
+    with suppress(OSError, ValueError):  # ValueError: a null character in the name
+        return path.is_dir() and any(
+            each.name == "metadata.yaml" or not {".db3", ".mcap"}.isdisjoint(each.suffixes)
+            for each in path.iterdir()
+        )
+    return False
