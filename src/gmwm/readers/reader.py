@@ -6,8 +6,7 @@ import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from gmwm.readers.table import Table, label
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Any,
     rate: float | None = None,
     units: Mapping[str, str] | None = None,
     channels: Mapping[str, Reference] | Collection[str] | None = None,
@@ -46,9 +45,11 @@ def read(
 
     Parameters
     ----------
-    path : str or path
+    path : str, path, DataFrame or Arrow table
         Delimited text (comma, semicolon, tab or blanks; with or without a header; plain or gzip;
-        decimal commas where they do not part the columns), NPY or NPZ.
+        decimal commas where they do not part the columns), NPY or NPZ, a bag of ROS 1 or 2, a log
+        of PX4 (ULog) or ArduPilot (binary), MAT, HDF5, Parquet or Feather; or a table in memory of
+        pandas, polars or Arrow. What a file is shows in its first bytes.
     rate : float, optional
         Sampling rate, Hz. Not needed if the file has time stamps.
     units : mapping of str to str, optional
@@ -65,11 +66,17 @@ def read(
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
         header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
         as seconds, and for others ``rate`` is needed.
+    topic : str or sequence of str, optional
+        Of a bag or a flight log, the topic to read, or one of gyros and one of accelerometers;
+        needed where there are several.
+    clock : {"header", "log"}, optional
+        Stamps of messages: those of their headers, or the times at which they were recorded.
 
     Returns
     -------
     Recording
-        In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
+        In rad/s and m/s^2. Topics of different rates give channels of their own rates, cut to the
+        time that they share. Samples are NaN where a field is empty (or NaN, NA, null), and where
         the time stamps jump forward, as many as fit on the grid of the sampling interval. Columns
         of temperatures, voltages and further clocks are its auxiliary channels. Its
         ``notices`` report what was assumed, which columns were not used and what is missing.
@@ -85,7 +92,7 @@ def read(
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
     topics = (topic,) if isinstance(topic, str) else tuple(topic)
-    tables = open_tables(Path(path), topics, clock)
+    tables = open_tables(path, topics, clock)
     return _read(tables, rate, units or {}, channels, time)
 
 

@@ -107,12 +107,12 @@ def joined(parts: Sequence[Part]) -> Recording:
             for notice in part.recording.notices
             if notice.code != "missing-samples" and notice not in notices
         ]
+    different = len({channel.dt for channel in channels if not channel.is_auxiliary})
     lost = max(part.recording.duration for part in parts) - (stop - start)
     rates = ", ".join(f"{part.recording.rate:.6g} Hz" for part in parts)
     text = f"{len(parts)} topics at {rates}: the {stop - start:.6g} s that they share are used"
-    notices.append(
-        Notice("topics-joined", "note", "", text, {"duration": stop - start, "lost": lost})
-    )
+    values = {"duration": stop - start, "lost": lost, "rates": different}
+    notices.append(Notice("topics-joined", "note", "", text, values))
     jitter = [part.recording.jitter for part in parts if part.recording.jitter is not None]
     return replace(
         first,

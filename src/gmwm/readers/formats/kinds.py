@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gmwm._core.files import existing_file
 from gmwm.errors import InputError
 from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.formats.frame import is_frame, open_feather, open_frame, open_parquet
 from gmwm.readers.formats.numpy_file import open_numpy
 from gmwm.readers.formats.rosbag import open_bag
 from gmwm.readers.table import Table
@@ -52,18 +54,22 @@ _TEXT = Kind("text", (), (), _alone(CsvTable.open))
 KINDS = (
     # Their names are judged, and what is inside is checked, as they always were.
     Kind("numpy", (".npy", ".npz"), (), _alone(open_numpy)),
+    Kind("parquet", (".parquet",), (b"PAR1",), _alone(open_parquet)),
+    Kind("feather", (".feather", ".arrow"), (b"ARROW1", b"FEA1"), _alone(open_feather)),
     Kind("rosbag", (".bag",), (b"#ROSBAG",), open_bag, True),
     Kind("rosbag2", (".mcap", ".db3"), (b"\x89MCAP", b"SQLite format 3"), open_bag, True),
 )
 """All but text, which begins with anything."""
 
 
-def open_tables(path: Path, topics: Sequence[str] = (), clock: str = "header") -> tuple[Table, ...]:
-    """Open a file, whatever it is.
+def open_tables(
+    data: Any, topics: Sequence[str] = (), clock: str = "header"
+) -> tuple[Table, ...]:
+    """Open a file or a table in memory, whatever it is.
 
     Parameters
     ----------
-    path : path
+    data : path or table
     topics : sequence of str, optional
         Those to read, of a log that has several.
     clock : {"header", "log"}, optional
@@ -81,13 +87,22 @@ def open_tables(path: Path, topics: Sequence[str] = (), clock: str = "header") -
     """
     if clock not in CLOCKS:
         raise InputError(f"clock = {clock!r}: give one of {', '.join(CLOCKS)}")
-    kind = _kind(path)
+    path = None if is_frame(data) else Path(data)
+    kind = _TEXT if path is None else _kind(path)
     for name, given in (("topic", bool(topics)), ("clock", clock != CLOCKS[0])):
         if given and not kind.has_topics:
             raise InputError(
-                f"{path.name} has no topics: {name} is for bags and flight logs, leave it out"
+                f"{path.name if path else 'a table'} has no topics: {name} is for bags and flight "
+                "logs, leave it out"
             )
+    if path is None:
+        return (open_frame(data),)
     return kind.open(path, topics, clock)
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file is read as delimited text."""
+    return _kind(path) is _TEXT
 
 
 def _kind(path: Path) -> Kind:
