@@ -8,6 +8,7 @@ rate.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,13 +23,14 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.names import AXES, CANONICAL, meaning
+from gmwm.readers.names import AXES, CANONICAL, bare, meaning
 from gmwm.readers.table import LARGEST, label, usable
 
 AnyArray = npt.NDArray[Any]
 
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
+_LAST_PART = re.compile(r"[./]")
 
 _KINDS = {
     "O": "Python objects",
@@ -58,6 +60,10 @@ class Array:
 
     def __getitem__(self, part: Any) -> Array:
         return Array(self.like[part], lambda: self.read()[part])
+
+    def map(self, view: Callable[[AnyArray], AnyArray]) -> Array:
+        """The array in another shape."""
+        return Array(view(self.like), lambda: view(self.read()))
 
 
 _Column = tuple[str, Array]
@@ -223,16 +229,20 @@ def array_of(array: AnyArray) -> Array:
 
 
 def _stated_rate(source: str, entries: Mapping[str, Array]) -> float | None:
+    """The rate that a single number states; that of a group or a structure too."""
+    rates: dict[str, float] = {}
     for name, array in entries.items():
-        key, like = name.lower(), array.like
+        key, like = _LAST_PART.split(bare(name).lower())[-1], array.like
         if key not in (*_RATES, *_INTERVALS) or like.size != 1 or like.dtype.kind not in "iuf":
             continue
         with damage_named(source):
             value = float(array.read().reshape(-1)[0])
         if not 0.0 < value < LARGEST:
             raise InputError(f"{source}: {name} = {value} is not positive: correct it")
-        return value if key in _RATES else 1.0 / value
-    return None
+        rates[name] = value if key in _RATES else 1.0 / value
+    if len({round(rate, 9) for rate in rates.values()}) > 1:
+        raise InputError(f"{source} states several rates, {', '.join(rates)}: keep one of them")
+    return next(iter(rates.values()), None)
 
 
 def _columns_of_array(source: str, array: Array) -> list[_Column]:
@@ -279,14 +289,23 @@ def _unnamed(source: str, array: Array) -> list[_Column]:
     return [("", array[:, i]) for i in range(width)]
 
 
+def is_sensor(name: str) -> bool:
+    """Whether the name of an array is that of a gyro or an accelerometer without its axis."""
+    return meaning(_of_axis(name, AXES[0])).role in CANONICAL
+
+
+def _of_axis(name: str, axis: str) -> str:
+    """The name with an axis before its unit."""
+    unit = name[len(bare(name)) :].strip()
+    return f"{bare(name)}_{axis} {unit}".rstrip()
+
+
 def _is_triad(name: str, array: Array) -> bool:
     """Whether an array holds the three axes of a sensor, by its name."""
-    return (
-        array.like.ndim == 2 and array.like.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
-    )
+    return array.like.ndim == 2 and array.like.shape[1] == 3 and is_sensor(name)
 
 
 def _axes_or_itself(name: str, array: Array) -> list[_Column]:
     if _is_triad(name, array):
-        return [(f"{name}_{axis}", array[:, i]) for i, axis in enumerate(AXES)]
+        return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]

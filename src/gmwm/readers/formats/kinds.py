@@ -12,6 +12,7 @@ from gmwm._core.files import existing_file
 from gmwm.errors import InputError
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats.frame import is_frame, open_feather, open_frame, open_parquet
+from gmwm.readers.formats.hdf5 import open_hdf5, open_mat
 from gmwm.readers.formats.numpy_file import open_numpy
 from gmwm.readers.formats.rosbag import open_bag
 from gmwm.readers.table import Table
@@ -54,6 +55,9 @@ _TEXT = Kind("text", (), (), _alone(CsvTable.open))
 KINDS = (
     # Their names are judged, and what is inside is checked, as they always were.
     Kind("numpy", (".npy", ".npz"), (), _alone(open_numpy)),
+    # By content before by name: a MAT file of version 7.3 is one of HDF5 behind 512 bytes.
+    Kind("hdf5", (".h5", ".hdf5", ".hdf"), (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), _alone(open_hdf5)),
+    Kind("mat", (".mat",), (b"MATLAB 5.0",), _alone(open_mat)),
     Kind("parquet", (".parquet",), (b"PAR1",), _alone(open_parquet)),
     Kind("feather", (".feather", ".arrow"), (b"ARROW1", b"FEA1"), _alone(open_feather)),
     Kind("rosbag", (".bag",), (b"#ROSBAG",), open_bag, True),
@@ -111,7 +115,7 @@ def _kind(path: Path) -> Kind:
     suffix, head = existing_file(path).suffix.lower(), b""
     with suppress(OSError), path.open("rb") as stream:
         head = stream.read(_HEAD)
-    by_content = [kind for kind in KINDS if head.startswith(kind.magic)]
+    by_content = [kind for kind in KINDS if kind.magic and head.startswith(kind.magic)]
     by_name = [kind for kind in KINDS if suffix in kind.suffixes]
     return next(iter(by_content + by_name), _TEXT)
 
