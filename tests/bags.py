@@ -24,7 +24,7 @@ START = 1_700_000_000_123_456_789
 def at_rest(n=200, seed=3):
     """Rates and specific forces of an IMU, (n, 6), rad/s and m/s^2."""
     noise = np.random.default_rng(seed).normal(size=(n, 6)) * 1e-3
-    return noise + [0.0, 0.0, 0.0, 0.1, -0.2, 9.8]
+    return noise + np.array([0.0, 0.0, 0.0, 0.1, -0.2, 9.8])
 
 
 def imu(store, stamp, six, frame="imu_link", covariance=0.0):

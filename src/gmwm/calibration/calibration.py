@@ -103,8 +103,7 @@ class Calibration(Mapping[str, Fit], Document):
     def has_one_rate(self) -> bool:
         """Whether all channels have the sampling rate `rate`."""
         return not any(
-            notice.code == "topics-joined" and notice.values["rates"] > 1
-            for notice in self.notices
+            notice.code == "topics-joined" and notice.values["rates"] > 1 for notice in self.notices
         )
 
     @property

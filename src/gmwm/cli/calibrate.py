@@ -68,8 +68,12 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="Leave events, lines, resonances, outliers or all as they are: samples of "
                    "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
-@click.option("--export", "target", metavar="NAME",
-              help="Also write the file of this program into the folder; see gmwm export --list.")
+@click.option(
+    "--export",
+    "target",
+    metavar="NAME",
+    help="Also write the file of this program into the folder; see gmwm export --list.",
+)
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @printing_options
 def calibrate(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gmwm.readers import Recording
 
 CLOCKS = ("header", "log")
-"""Those of `gmwm.readers.CLOCKS`, which would take long to import for a line of help."""
+"""As in `gmwm.read`, which would take long to import for a line of help."""
 
 _OPTIONS = (
     click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
@@ -30,8 +30,8 @@ _OPTIONS = (
 
 _PART = (
     click.option("--topic", "topics", multiple=True, metavar="NAME",
-                 help="Topic of a bag or a flight log; needed where several have an IMU. Repeat for "
-                      "gyros and accelerometers in topics of their own."),
+                 help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
+                      "for gyros and accelerometers in topics of their own."),
     click.option("--clock", type=click.Choice(CLOCKS), default=CLOCKS[0], show_default=True,
                  help="Stamps of messages: of their headers, or when they were recorded."),
     click.option("--channels", "only", metavar="NAME,...",

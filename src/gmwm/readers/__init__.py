@@ -8,7 +8,7 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 from gmwm._core.units import AUXILIARY
 from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.formats import CLOCKS, is_frame, is_text
+from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
@@ -17,7 +17,6 @@ from gmwm.readers.table import label
 __all__ = [
     "AUXILIARY",
     "AXES",
-    "CLOCKS",
     "READING",
     "TIME",
     "Channel",

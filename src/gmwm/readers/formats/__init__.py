@@ -2,10 +2,9 @@
 
 from gmwm.readers.formats.frame import is_frame
 from gmwm.readers.formats.joining import Part, has_sensors, joined, shares, with_temperature
-from gmwm.readers.formats.kinds import CLOCKS, is_text, open_tables
+from gmwm.readers.formats.kinds import is_text, open_tables
 
 __all__ = [
-    "CLOCKS",
     "Part",
     "has_sensors",
     "is_frame",

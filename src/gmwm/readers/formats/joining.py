@@ -43,9 +43,7 @@ def has_sensors(table: Table) -> bool:
     return not roles.isdisjoint(CANONICAL) or "temperature" not in roles
 
 
-def shares(
-    tables: Sequence[Table], channels: object
-) -> list[tuple[Table, Collection[str] | None]]:
+def shares(tables: Sequence[Table], channels: object) -> list[tuple[Table, Collection[str] | None]]:
     """Which of the channels that the caller names are in which table; those without any go.
 
     Raises
@@ -62,14 +60,14 @@ def shares(
             'the channels alone, e.g. channels=["gyro"], or choose one topic'
         )
     wanted = [channels] if isinstance(channels, str) else list(channels)  # type: ignore[call-overload]
-    found = []
+    found: list[tuple[Table, Collection[str] | None]] = []
     for table in tables:
         roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
         sensors = {str(role).partition("_")[0] for role in roles}
         own = [name for name in wanted if name in roles | sensors]
         if own:
             found.append((table, own))
-    known = {name for _, own in found for name in own}
+    known = {name for _, own in found for name in own or ()}
     for name in wanted:
         if name not in known:
             raise InputError(f"{source} has no channel {name!r} in what is read", "channel-unknown")
@@ -90,7 +88,7 @@ def joined(parts: Sequence[Part]) -> Recording:
     start, stop = max(part.start for part in parts), min(part.stop for part in parts)
     if not stop > start:
         raise InputError(
-            f"{first.source}: its topics have no time in common: choose one, or clock=\"log\"",
+            f'{first.source}: its topics have no time in common: choose one, or clock="log"',
             "topics-apart",
         )
     channels: list[Channel] = []

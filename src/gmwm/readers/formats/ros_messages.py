@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -158,13 +159,13 @@ def decode(
     return stamps, numbers
 
 
-def _field(block: _Bytes, offset: int, dtype: str) -> npt.NDArray[np.generic]:
+def _field(block: _Bytes, offset: int, dtype: str) -> npt.NDArray[Any]:
     """A number of each row, wherever it stands in it."""
     rows, size = block.shape
     return np.ndarray((rows,), dtype, block, offset, (size,))
 
 
-def _unsigned(four: _Bytes, dtype: str) -> npt.NDArray[np.generic]:
+def _unsigned(four: _Bytes, dtype: str) -> npt.NDArray[Any]:
     return np.ascontiguousarray(four).view(dtype)[:, 0]
 
 

@@ -207,9 +207,7 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
     return tuple(tables)
 
 
-def _table(
-    bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]
-) -> BagTable:
+def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]) -> BagTable:
     sensors = topic.sensors or frozenset(SI_UNIT)
     names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
     notices = []

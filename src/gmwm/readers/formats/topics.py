@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 
@@ -32,7 +33,7 @@ class Topic:
 
 
 def choose(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
-    """The topics to read: those wanted; else the only one, or one of gyros and one of accelerometers.
+    """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
     Parameters
     ----------
@@ -79,3 +80,28 @@ def _are_parts(topics: Sequence[Topic]) -> bool:
     return len(topics) == 2 and {frozenset(("gyro",)), frozenset(("accel",))} == {
         topic.sensors for topic in topics
     }
+
+
+def choose_first(
+    source: str, ranks: Sequence[Sequence[Topic]], wanted: Sequence[str]
+) -> tuple[Topic, ...]:
+    """As `choose`, of the first rank that has any topic unless others are wanted.
+
+    Raises
+    ------
+    InputError
+        As `choose` does.
+    """
+    if wanted:
+        return choose(source, [topic for rank in ranks for topic in rank], wanted)
+    return choose(source, next(rank for rank in ranks if rank), ())
+
+
+def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:
+    """Which topics are read, where there are others."""
+    others = [topic for rank in ranks for topic in rank if topic not in chosen]
+    if not others:
+        return ()
+    names = " and ".join(topic.name for topic in chosen)
+    text = f"read from {names}; there are also {', '.join(map(str, others))}"
+    return (Notice("topic", "note", "", text, {"topic": names, "others": len(others)}),)
