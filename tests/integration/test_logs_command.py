@@ -64,7 +64,7 @@ def test_unit_gate(run, tmp_path):
 
 
 def test_choice_of_topic_and_clock(run, tmp_path):
-    topics = {"/imu0": imu_topic(ROS1, X), "/imu1": imu_topic(ROS1, np.roll(X, 1))}
+    topics = {"/imu0": imu_topic(ROS1, X), "/imu1": imu_topic(ROS1, np.roll(X, 1, axis=0))}
     write1(tmp_path / "a.bag", topics)
     code, _, told = run("health", "a.bag")
     assert code == 2

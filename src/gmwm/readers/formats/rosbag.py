@@ -5,10 +5,11 @@ Read in blocks of messages, so that memory holds no more than the columns that a
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -61,10 +62,17 @@ class _Bag:
     @contextmanager
     def opened(self) -> Iterator[Any]:
         """The reader of `rosbags`; what it raises is one sentence."""
+        with damage_named(self.path.name, self._damage):
+            yield self._reader
+
+    @cached_property
+    def _reader(self) -> Any:
+        """Open until the bag is dropped: its index may take as long to read as its messages."""
         kind = "rosbag1" if self.is_ros1 else "rosbag2"
-        reader = library(f"rosbags.{kind}", "ros", self.path.name).Reader
-        with damage_named(self.path.name, self._damage), reader(self.path) as bag:
-            yield bag
+        reader = library(f"rosbags.{kind}", "ros", self.path.name).Reader(self.path)
+        reader.open()
+        weakref.finalize(self, reader.close)
+        return reader
 
     def _damage(self, error: Exception) -> str:
         text = str(error).replace(str(self.path), self.path.name).rstrip(".")
@@ -267,22 +275,24 @@ def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Re
 
 def _sensors(reader: Any, topic: str, bag: _Bag) -> frozenset[str]:
     """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
-    middle = (reader.start_time + reader.end_time) // 2
-    raw = [
-        message
-        for start in (None, middle)
-        for _, _, message in islice(_messages(reader, topic, start), _SEEN)
-    ]
     first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
-    found = set()
-    for sensor, index in first.items():
-        wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
-        _, (*axes, covariance) = decode(
-            raw, IMU, wanted, bag.serialization, lambda i: f"{bag.path.name}, a message of {topic}"
-        )
-        if np.any(np.array(axes)) and not np.all(covariance == -1.0):
-            found.add(sensor)
+    found: set[str] = set()
+    middle = (reader.start_time + reader.end_time) // 2
+    for start in (None, middle):
+        raw = [message for _, _, message in islice(_messages(reader, topic, start), _SEEN)]
+        for sensor, index in first.items() if raw else ():
+            wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
+            where = partial(_somewhere, bag, topic)
+            _, (*axes, covariance) = decode(raw, IMU, wanted, bag.serialization, where)
+            if np.any(np.array(axes)) and not np.all(covariance == -1.0):
+                found.add(sensor)
+        if len(found) == len(first):
+            break
     return frozenset(found)
+
+
+def _somewhere(bag: _Bag, topic: str, row: int) -> str:
+    return f"{bag.path.name}, a message of {topic}"
 
 
 def _first_stamp(reader: Any, topic: str, bag: _Bag, is_log: bool) -> int:
