@@ -16,7 +16,7 @@ from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
-from gmwm.readers import Recording, bare, read
+from gmwm.readers import Recording, bare, is_text, read
 
 _CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 
@@ -81,7 +81,7 @@ def read_imu_log(
     time: str | int | Literal[False] | None = None,
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
-    recording = read(path, rate, units, channels, time)
+    recording = read(path, rate, units, channels, time).of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
@@ -116,7 +116,7 @@ def _clock(
     """Time of the first epoch, s, and its notices."""
     text = "the IMU has no time stamps: fixes are timed from its first sample"
     none = 0.0, (Notice("no-time-stamps", "note", "", text),)
-    if time is False or path.suffix.lower() in (".npy", ".npz"):
+    if time is False or not is_text(path):
         return none
     table = open_log(path)
     found = [i for i, name in enumerate(table.names) if is_time(name)]
