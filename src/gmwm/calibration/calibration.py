@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from gmwm._core import checks
@@ -24,7 +25,7 @@ from gmwm.calibration.screening import SCREENING, Screened, screened, with_outco
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
-from gmwm.process import Model, Process
+from gmwm.process import Model, Process, model_from_list
 from gmwm.readers import Channel, Recording
 from gmwm.selection import Selection, select, wider_ranges
 from gmwm.variance import MIN_SAMPLES, wavelet_variance
@@ -65,6 +66,11 @@ class Calibration(Mapping[str, Fit], Document):
         Those of the reader; what was found in the recording, worst first in each channel, with
         what was done about it, if it was examined; with the code "ambiguity", which models
         describe a channel equally well.
+    rivals : dict
+        Channel name -> the models, with their values, that describe it as well as the chosen one.
+    left_out : dict
+        Channel name -> samples of shocks and spikes that were left out, as pairs of the first and
+        the one after the last; of a single recording.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.calibration"
@@ -76,9 +82,11 @@ class Calibration(Mapping[str, Fit], Document):
     rate: float
     n: int
     notices: tuple[Notice, ...] = ()
+    rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
+    left_out: Mapping[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        freeze(self, "fits", "skipped")
+        freeze(self, "fits", "skipped", "rivals", "left_out")
 
     def __getitem__(self, name: str) -> Fit:
         if name in self.fits:
@@ -141,6 +149,11 @@ class Calibration(Mapping[str, Fit], Document):
             "notices": [notice.to_dict() for notice in self.notices],
             "skipped": {name: notice.to_dict() for name, notice in self.skipped.items()},
             "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
+            "rivals": {
+                name: [[term.to_dict() for term in model.terms] for model in models]
+                for name, models in self.rivals.items()
+            },
+            "left_out": {name: list(map(list, spans)) for name, spans in self.left_out.items()},
         }
 
     @classmethod
@@ -158,12 +171,29 @@ class Calibration(Mapping[str, Fit], Document):
             rate=content["rate_hz"],
             n=content["n"],
             notices=tuple(map(Notice.from_dict, content["notices"])),
+            rivals={
+                name: tuple(map(model_from_list, models))
+                for name, models in content.get("rivals", {}).items()
+            },
+            left_out={
+                name: tuple((int(start), int(stop)) for start, stop in spans)
+                for name, spans in content.get("left_out", {}).items()
+            },
         )
 
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the self-contained HTML report; see `gmwm.report`."""
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        recording: Recording | None = None,
+        *,
+        datasheet: str | os.PathLike[str] | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Write the self-contained HTML report; see `gmwm.report.write_report`."""
         # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_report(self, path)
+        written: Path = import_module("gmwm.report").write_report(
+            self, path, recording, datasheet=datasheet, provenance=provenance
+        )
         return written
 
 
@@ -251,16 +281,16 @@ def calibrate(
         if progress is not None:
             progress(len(finished), len(alive), name)
 
-    def one(name: str) -> tuple[Fit, tuple[Notice, ...]] | InputError:
+    def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
         try:
             parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
             if given_model is not None:
-                return with_departures(estimated(given_model, data), sources[name]), ()
+                return with_departures(estimated(given_model, data), sources[name]), None
             selection = select(data, extra=offered[name])
-            return with_departures(selection.fit, sources[name]), _ambiguity(name, selection)
+            return with_departures(selection.fit, sources[name]), selection
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -282,6 +312,7 @@ def calibrate(
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
     several = len(recordings) > 1
+    tied = {name: each for name, (_, each) in done.items() if each is not None and each.rivals}
     notices = with_outcomes(
         [
             replace(notice, source=each.recording.source) if several else notice
@@ -297,8 +328,21 @@ def calibrate(
         source=source,
         rate=recordings[0].rate,
         n=sum(each.n for each in recordings),
-        notices=(*notices, *(notice for _, ties in done.values() for notice in ties)),
+        notices=(*notices, *(_ambiguity(name, each) for name, each in tied.items())),
+        rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
+        left_out={} if several else _left_out(given[0], recordings[0]),
     )
+
+
+def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tuple[int, int], ...]]:
+    """The samples that screening took from a recording, by channel."""
+    spans = {}
+    for before, after in zip(given.channels, screened_one.channels, strict=True):
+        gone = np.isnan(after.values) & ~np.isnan(before.values)
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False)).tolist()
+        if edges:
+            spans[before.name] = tuple(zip(edges[::2], edges[1::2], strict=True))
+    return spans
 
 
 def _check_together(recordings: Sequence[Recording]) -> None:
@@ -387,14 +431,12 @@ def _model_of(
     return model[name]
 
 
-def _ambiguity(name: str, selection: Selection) -> tuple[Notice, ...]:
+def _ambiguity(name: str, selection: Selection) -> Notice:
     """Which models tie, and the parameters of which that leaves less known."""
-    if not selection.rivals:
-        return ()
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
         text += f". If none of them is ruled out: {', '.join(wider)}"
     values = {"models": len(models)}
-    return (Notice(AMBIGUITY, "note", name, text, values, "the first is used"),)
+    return Notice(AMBIGUITY, "note", name, text, values, "the first is used")
