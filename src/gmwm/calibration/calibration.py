@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -18,10 +18,12 @@ from gmwm._core.documents import Document, load_document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
@@ -123,12 +125,25 @@ class Calibration(Mapping[str, Fit], Document):
         return f"<Calibration of {self.source or 'a recording'}: {', '.join(channels)}>"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+        html: str = import_module("gmwm.report").fragment(self)
+        return html
 
     def __str__(self) -> str:
-        blocks = [str(fit) for fit in self.fits.values()]
-        blocks += [f"{name}: skipped, {notice.text}" for name, notice in self.skipped.items()]
-        return "\n\n".join(blocks)
+        """One line a channel; ``print(cal["gyro_x"])`` shows its parameters."""
+        width = max(map(len, (*self.fits, *self.skipped)), default=0)
+        size = f"{self.duration:.6g} s at {self.rate:g} Hz, {self.n:,} samples a channel"
+        lines = wrapped(f"{self.source or 'a recording'}: {size}", indent=2)
+        for name, fit in self.items():
+            verdict = "valid" if fit.valid else "NOT VALID"
+            text = f"{fit.model.title()}. {sentence(fit)}"
+            lines += wrapped(text, first=f"{name:<{width}}  {verdict:<9}  ", indent=2)
+        for name, notice in self.skipped.items():
+            lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
+        counts = Counter(notice.severity for notice in self.notices)
+        found = [f"{counts[key]} {key}" for key in ("bad", "warning") if counts[key]]
+        if found:
+            lines.append(f"notices: {', '.join(found)}")
+        return "\n".join(lines)
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the parameters of all channels, one a row, in SI units; needs pandas."""
