@@ -93,7 +93,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     worst = fit.goodness.worst
     fits = f"fits within {100.0 * abs(worst[0]):.2g} %" if worst else "fits the data"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
-    return True, f"{fits}, {tied.values['models']:g} models tie" if tied else fits
+    return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
 
 
 def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:

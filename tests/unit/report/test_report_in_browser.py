@@ -1,4 +1,4 @@
-"""The report in a browser: nothing is fetched, nothing is cut off, and its controls do what they say.
+"""The report in a browser: nothing is fetched or cut off, and its controls do what they say.
 
 One start of the browser and one page for all of them.
 """
@@ -22,18 +22,14 @@ pytestmark = needs_chromium
 def shown(calibration, recording):
     """With a tie, and samples left out."""
     rival = WhiteNoise(4e-4) + GaussMarkov(3e-4, 30.0)
-    return replace(
-        calibration, rivals={"gyro_x": (rival,)}, left_out={"gyro_x": ((3000, 3100),)}
-    )
+    return replace(calibration, rivals={"gyro_x": (rival,)}, left_out={"gyro_x": ((3000, 3100),)})
 
 
 @pytest.fixture(scope="module")
 def path(shown, recording, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "sheet.yaml").write_text("gyro: {N: 1.2 deg/sqrt(h), B: 40 deg/h}\n")
-    return write_report(
-        shown, folder / "report.html", recording, datasheet=folder / "sheet.yaml"
-    )
+    return write_report(shown, folder / "report.html", recording, datasheet=folder / "sheet.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -130,8 +126,8 @@ def test_sliders_move_the_curve_of_the_filter(tab, calibration):
 
     numbers = gmwm.bound(calibration["gyro_x"], horizon=60.0)
     before = np.array(trace(tab, "filter: N and K"))
-    tau = np.array(tab.run("Array.from(document.getElementById('plot-1')._fullData.find("
-                           "function (t) { return t.name === 'filter: N and K'; }).x)"))  # fmt: skip
+    drawn = "document.getElementById('plot-1')._fullData.find"
+    tau = np.array(tab.run(drawn + "(function (t) { return t.name === 'filter: N and K'; }).x"))
     per_si = np.degrees(1.0) * 3600.0
 
     def believed(N, K):
@@ -221,7 +217,8 @@ CONTRAST = """
   document.querySelectorAll("body *").forEach(function (node) {
     var own = Array.from(node.childNodes).some(function (n) {
       return n.nodeType === 3 && n.textContent.trim(); });
-    if (!own || !node.getClientRects().length || /SCRIPT|STYLE|OPTION/i.test(node.tagName)) { return; }
+    if (!own || !node.getClientRects().length) { return; }
+    if (/SCRIPT|STYLE|OPTION/i.test(node.tagName)) { return; }
     var style = getComputedStyle(node);
     var a = light(node instanceof SVGElement ? style.fill : style.color), b = light(behind(node));
     var ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
