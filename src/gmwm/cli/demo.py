@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def demo(output: Path, hours: float, seed: int) -> None:
     """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
 
-    The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
+    Gyros have white noise and a Gauss-Markov process, accelerometers white noise and a random walk.
 
     \b
     Example:

@@ -364,7 +364,7 @@ class Fit(Document):
         axes = self.wv.plot(ax, units=units)
         tau, curves = dense_curves(self)
         components = {label: factor * curve for label, curve in curves.items() if np.any(curve)}
-        total = np.sqrt(np.sum([curve**2 for curve in components.values()], axis=0))
+        total = np.sqrt(factor**2 * np.sum([c**2 for c in curves.values()], axis=0))
         shown = {} if self.regions else components
         plotting.curves(axes, tau, total, shown, factor * self.wv.allan_deviation)
         if self.regions:
