@@ -8,7 +8,8 @@ import numpy as np
 
 from gmwm._core.units import SI_UNIT, field_units
 from gmwm.estimate.result import Fit
-from gmwm.ins.spec import SensorModels, sensor_models
+from gmwm.ins import SensorModels
+from gmwm.ins.spec import sensor_models
 from gmwm.process import Model
 from gmwm.readers import Channel, Recording
 

@@ -594,10 +594,10 @@ def test_units_are_text_not_markup(calibration):
 # -- files ----------------------------------------------------------------------------------------
 
 
-def test_the_file(calibration, html, tmp_path):
+def test_the_file(calibration, tmp_path):
     path = tmp_path / "report.html"
     assert write_report(calibration, path) == path
-    assert path.read_text(encoding="utf-8") == html
+    assert path.read_text(encoding="utf-8") == page(calibration)
     assert calibration.report(tmp_path / "again.html").read_bytes() == path.read_bytes()
 
 
