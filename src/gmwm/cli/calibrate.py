@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable
+import shlex
+import sys
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
 
     from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration
+    from gmwm.readers import Recording
 
 _NONE_VALID = 1
 """Exit status."""
@@ -74,6 +78,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
     metavar="NAME",
     help="Also write the file of this program into the folder; see gmwm export --list.",
 )
+@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
+              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
+                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @printing_options
 def calibrate(
@@ -82,6 +89,7 @@ def calibrate(
     models: tuple[str, ...],
     left: tuple[str, ...],
     target: str | None,
+    datasheet: Path | None,
     jobs: int,
     as_json: bool,
     quiet: bool,
@@ -108,6 +116,7 @@ def calibrate(
     """
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, calibrate as run
+    from gmwm.report import read_datasheet
 
     given = written_models(models)
     if target is not None:
@@ -119,13 +128,18 @@ def calibrate(
         recordings = [read_recording(file, **reading) for file in files]
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
+        if datasheet is not None:  # what is wrong with it is known before the work
+            quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
+            read_datasheet(datasheet, quantities)
         with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
         # The files first: who pipes the table into head must not lose them.
-        written = write_files(result, folder)
+        origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
+        own = recordings[0] if len(recordings) == 1 else None
+        written = write_files(result, folder, own, datasheet, origin)
     if target is not None:
         written = f"{written}\n{export_into(folder, result, target)}"
     if as_json:
@@ -197,7 +211,23 @@ def _table(result: Calibration) -> Table:
     return table
 
 
-def write_files(result: Calibration, folder: Path) -> str:
+def _command() -> str:
+    """The command line, as one would write it again."""
+    return shlex.join(["gmwm", *sys.argv[1:]])
+
+
+def _hash(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def write_files(
+    result: Calibration,
+    folder: Path,
+    recording: Recording | None = None,
+    datasheet: Path | None = None,
+    origin: Mapping[str, str] | None = None,
+) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
     from gmwm.export import export
@@ -209,7 +239,7 @@ def write_files(result: Calibration, folder: Path) -> str:
     lines = []
     with moved_together(folder) as new:
         result.save(new / names[0])
-        result.report(new / names[1])
+        result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
         if {"gyro", "accel"} <= quantities:
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
