@@ -89,8 +89,9 @@ class Navigated:
             If the initial state cannot be known, or no fix follows it.
         """
         alignment = align(
-            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd
-        )
+            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
+            measured.attitude, measured.attitude_sd,
+        )  # fmt: skip
         imu, aiding = started(measured.imu, measured.aiding, alignment)
         times = next(each.time for each in aiding.fixes if each.kind == "position")
         if not times.size:
@@ -118,7 +119,7 @@ class Navigated:
         kind : {"position", "velocity"}, optional
             By default both together.
         """
-        found = [KINDS[kind]] if kind else list(np.unique(self.solution.innovations.kind))
+        found = [KINDS[each] for each in ((kind,) if kind else self.kinds)]
         innovations = self.solution.innovations
         parts = [innovations.standard[innovations.kind == each] for each in found]
         seen = np.concatenate([part[np.isfinite(part)] for part in parts])
@@ -134,7 +135,7 @@ class Navigated:
         return tuple(
             each.kind
             for each in self.measured.aiding.fixes
-            if each.kind in KINDS and each.time.size
+            if each.kind != "standstill" and each.time.size
         )
 
     @property
@@ -142,6 +143,27 @@ class Navigated:
         """NIS per degree of freedom by the median, which a few far ones do not move."""
         squares = self.solution.innovations.standard**2
         return float(np.nanmedian(squares) / chi2.median(1))
+
+    @property
+    def rejections(self) -> tuple[Notice, ...]:
+        """Fixes that were beyond their gate and not used, kind by kind."""
+        innovations = self.solution.innovations
+        notices = []
+        for kind, code in KINDS.items():
+            rejected = np.flatnonzero((innovations.kind == code) & ~innovations.used)
+            if not rejected.size:
+                continue
+            size = np.sqrt(innovations.nis[rejected])
+            far = int(np.argmax(size))
+            at = float(self.clock(innovations.time[rejected[far : far + 1]])[0])
+            of = int(np.count_nonzero(innovations.kind == code))
+            text = (
+                f"{rejected.size} of {of} are rejected; the farthest is {size[far]:.3g} sigma off "
+                f"at {at:.10g} s"
+            )
+            values = {"count": rejected.size, "of": of, "size": float(size[far]), "time": at}
+            notices.append(Notice("fixes-rejected", "warning", kind, text, values))
+        return tuple(notices)
 
     @property
     def farthest(self) -> tuple[float, float]:
@@ -247,7 +269,7 @@ class Navigated:
         solution, imu = self.solution, self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        for notice in (*self.measured.notices, *self.alignment.notices):
+        for notice in (*self.measured.notices, *self.alignment.notices, *self.rejections):
             lines += wrapped(str(notice), "- ", 2)
         if solution.diverged_at is not None:
             at = float(self.clock(np.array([solution.diverged_at]))[0])
@@ -339,7 +361,7 @@ class Navigated:
         panels = {}
         for kind in self.kinds:
             of_kind = innovations.kind == KINDS[kind]
-            unit = "m" if kind == "position" else "m/s"
+            unit = "m/s" if kind == "velocity" else "m"
             panels[f"{kind} [{unit}]"] = (
                 self.clock(innovations.time[of_kind]),
                 innovations.value[of_kind],
