@@ -111,6 +111,9 @@ LOST = 5.0
 MOSTLY_FINE = 1.5
 """NIS by the median, below which a few outliers make the mean large."""
 
+OUTAGES_SHOWN = 6
+"""Times without fixes that a report draws, the longest ones: more make it long."""
+
 # -- validations ----------------------------------------------------------------------------------
 
 SETTLED = 0.25

@@ -10,6 +10,7 @@ from gmwm.errors import InputError
 from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
+from gmwm.ins.field.outage_pictures import outage_pictures
 from gmwm.ins.geometry.earth import ned_difference
 from gmwm.ins.spec.sensor_terms import sensor_models
 
@@ -353,3 +354,23 @@ def test_a_flight_is_still_levelled_in_steady_motion(tmp_path):
     log.fixes(tmp_path)
     found = navigated(tmp_path)
     assert found.alignment.notices[0].code == "levelled"
+
+
+def test_each_outage_is_drawn_with_its_band_and_what_the_next_fix_showed(tmp_path):
+    import matplotlib.pyplot as plt
+
+    outages = [Outage(40.0, 12.0), Outage(70.0, 25.0)]
+    log = Log(car_drive(duration=110.0, dt=1.0 / RATE), 6, outages=outages)
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    pictures = outage_pictures(navigated(tmp_path))
+    assert [title.split(" s ")[0] for title, _ in pictures] == ["25", "12"]
+    for (_, figure), length in zip(pictures, (25.0, 12.0), strict=True):
+        track, north, *_ = figure.axes
+        assert track.get_legend() is not None
+        (band,) = north.collections
+        width = np.ptp(band.get_paths()[0].vertices[:, 1])
+        assert 1.0 < width < 200.0
+        time = north.lines[0].get_xdata()
+        assert length in np.round(time, 6) and not np.any((time > 0.1) & (time < length - 0.1))
+        plt.close(figure)
