@@ -88,7 +88,7 @@ def length() -> None:
             nees = " ".join(f"{value:6.3f}" for value in errors.nees())
             cells = (
                 f"{random_walk(fit).value:.2e}", f"{safe.K:.2e}", f"{safe.K / right:.3f}",
-                f"{_least_error(truth, hours):.3f}", f"{safe.stderr['K'] / safe.K:.3f}",
+                f"{_least_error(truth, hours):.3f}", f"{safe.stderr.get('K', np.nan) / safe.K:.3f}",
                 f"{small.K:.2e}", f"{small.K / small_right:.3f}",
             )  # fmt: skip
             print(f"{name:<12}{hours:>6}" + "".join(f"{cell:>12}" for cell in cells)

@@ -82,7 +82,7 @@ def bound(
     Returns
     -------
     FilterNumbers or SensorNumbers
-        Of one axis, or by channel; N and K of fits with the standard errors that these leave.
+        Of one axis, or by channel; N and K of valid fits with the standard errors that these leave.
 
     Raises
     ------
@@ -132,7 +132,8 @@ def bound_of(
             region += region_targets(target, _fit(axis), level)
     problem = Problem(targets, horizon, tuple(region))
     model = dominating(problem, form)
-    fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None]
+    # Errors of a fit that is not valid are not those of its parameters either.
+    fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
     sd = max(_start(group, each, model) for each in (*targets, *region))

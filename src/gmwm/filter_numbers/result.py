@@ -110,8 +110,8 @@ class FilterNumbers(Document):
     quantity : {"gyro", "accel", ""}
         What the axis measures; empty if it is not known.
     stderr : dict
-        Standard errors of the N and K that bound a fit, from those of the fit; empty for other
-        forms, for models, and where a level covers them.
+        Standard errors of the N and K that bound a valid fit, from those of the fit; empty for
+        other forms, for models, and where a level covers them.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
