@@ -15,7 +15,15 @@ from gmwm.plotting.deviation import (
     trace,
 )
 from gmwm.plotting.intervals import intervals
-from gmwm.plotting.navigation import errors, growth, innovations, literal, measured_track, track
+from gmwm.plotting.navigation import (
+    errors,
+    growth,
+    innovations,
+    literal,
+    measured_outage,
+    measured_track,
+    track,
+)
 
 __all__ = [
     "COMPONENT_COLOURS",
@@ -32,6 +40,7 @@ __all__ = [
     "innovations",
     "intervals",
     "literal",
+    "measured_outage",
     "measured_track",
     "residuals",
     "straight_lines",
