@@ -22,7 +22,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.filter_numbers.chain import Chain
-from gmwm.filter_numbers.region import ParameterRegion
+from gmwm.filter_numbers.spectra import ParameterRegion, Target
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
 
 ONE = TRUTHS["one"]
@@ -119,6 +119,25 @@ def test_a_model_that_has_the_form_comes_back(form):
     assert found.tightness[30.0] == pytest.approx(1.0, abs=1e-3)
     gauss = gmwm.bound(ONE, "N+GM", 30.0)
     assert (gauss.N, gauss.sigma[0], gauss.tau[0]) == pytest.approx((8e-5, 4e-5, 60.0), rel=1e-4)
+
+
+def test_few_evaluations_are_enough_where_the_ratio_is_level(monkeypatch):
+    """Hundreds of frequencies are then as near to the largest ratio: they are checked at once."""
+    calls = []
+    density = Target.psd
+    monkeypatch.setattr(Target, "psd", lambda self, f: (calls.append(f.size), density(self, f))[1])
+    gmwm.bound(WhiteNoise(1e-3) + RandomWalk(1e-5), "N+K", 60.0)
+    assert len(calls) < 10
+    assert sum(calls) > 10_000
+
+
+def test_a_term_that_hardly_matters_is_dominated_all_the_same():
+    """Within the tolerance of a general solver, 1e-7, its walk was left out."""
+    truth = TRUTHS["far"]
+    numbers = gmwm.bound(truth, "N+K+GM", 60.0)
+    assert numbers.K > 0.0
+    ratio = numbers.model.psd(FREQUENCIES, DT) / truth.psd(FREQUENCIES, DT)
+    assert np.min(ratio) > 1.0 - 1e-9
 
 
 def test_white_noise_alone_needs_no_walk():
@@ -228,6 +247,36 @@ def test_models_of_the_region_are_dominated(fitted, form):
         outside += np.any(plain.model.psd(f, 1.0) < model.psd(f, 1.0))
     assert outside > 50
     assert 1.0 < numbers.tightness[60.0] / plain.tightness[60.0] < 2.0
+
+
+def test_standard_errors_are_those_of_the_fit_by_the_chain_rule(fitted):
+    """Against bounds of models that differ by a step along each independent error."""
+    found = gmwm.bound(fitted, "N+K", 60.0)
+    values, vectors = np.linalg.eigh(fitted.covariance)
+    total = {"N": 0.0, "K": 0.0}
+    for column in (vectors * np.sqrt(values)).T:
+        ends = []
+        for side in (-0.01, 0.01):
+            steps = zip(fitted.keys, side * column, strict=True)
+            model = fitted.model.with_params({k: fitted.params[k] + step for k, step in steps})
+            ends.append(gmwm.bound(model, "N+K", 60.0, dt=1.0).model.params)
+        for key in total:
+            total[key] += ((ends[1][key] - ends[0][key]) / 0.02) ** 2
+    assert set(found.stderr) == set(total)
+    for key, square in total.items():
+        assert found.stderr[key] == pytest.approx(np.sqrt(square), rel=0.03), key
+
+
+def test_standard_errors_of_shared_axes_and_of_none(fitted):
+    one = gmwm.bound(fitted)
+    both = gmwm.bound({"gyro_x": fitted, "gyro_y": fitted}, shared=True)["gyro_x"]
+    assert both.K == one.K
+    assert both.stderr["K"] == pytest.approx(one.stderr["K"], rel=1e-6)
+    assert not gmwm.bound(ONE).stderr
+    assert not gmwm.bound(fitted, level=0.95).stderr
+    assert not gmwm.bound(fitted, "N+GM").stderr
+    assert FilterNumbers.from_dict(one.to_dict()) == one
+    assert f"+- {one.stderr['K']:.2g}" in str(one)
 
 
 def test_the_region_reaches_to_the_joint_interval(fitted):
