@@ -288,10 +288,9 @@ def calibrate(
     """
     given = _recordings(recording)
     _check_together(given)
-    parts = [part for each in given for part in each.by_rate()]
     if still and screening:
-        parts = [piece for part in parts for piece in stretches_at_rest(part)]
-    treated = [screened(part, screening) for part in parts]
+        given = [part for each in given for part in stretches_at_rest(each)]
+    treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):

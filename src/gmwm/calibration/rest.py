@@ -22,6 +22,9 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
     """
     if any(notice.code == "rate-changes" for notice in recording.notices):
         return (recording,)  # times of its parts are not known
+    if len(alike := recording.by_rate()) > 1:
+        parts = [part for each in alike for part in stretches_at_rest(each)]
+        return (recording,) if len(parts) == len(alike) else tuple(parts)
     found = rest_of(recording)
     if found is None:
         return (recording,)
