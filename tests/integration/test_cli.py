@@ -123,8 +123,8 @@ def test_example_of_calibrate_works(run, tmp_path):
         write_csv(tmp_path / f"{name}.csv", columns)
     shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
     lines = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
-    assert len(lines) == 2
-    for line in lines:
+    assert len(lines) == 3
+    for line in (line for line in lines if ".csv" in line):
         code, printed, told = run(*line.split())
         assert code == 0, told
         assert ("2 recordings" in printed) == ("b.csv" in line)
@@ -943,6 +943,25 @@ def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
     code, _, told = run("reproduce", "appendix-a", *option, "-o", "s")
     assert code == 2
     assert f"appendix-a has no option {option[0]}: leave it out" in told
+    assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("table2", "--rotate"), "--rotate"),
+        (("fig7", "--rotate"), "--rotate"),
+        (("fig9", "--resume"), "--resume"),
+        (("fig9", "--rotate", "--method", "AV"), "--method"),
+    ],
+)
+def test_recordings_are_rotated_for_two_figures_only(run, tmp_path, arguments, option):
+    code, _, told = run("reproduce", *arguments, "-o", "s")
+    assert code == 2
+    assert f"{arguments[0]} has no option {option}: leave it out" in told
+    code, _, told = run("reproduce", "fig9", "--rotate", "-o", "s")
+    assert code == 2
+    assert "give two recordings or more" in told
     assert not (tmp_path / "s").exists()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -28,7 +28,7 @@ from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process, model_from_list
-from gmwm.readers import Channel, Recording
+from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.selection import Selection, select, wider_ranges
 from gmwm.variance import MIN_SAMPLES, wavelet_variance
 
@@ -61,9 +61,9 @@ class Calibration(Mapping[str, Fit], Document):
     source : str
         What was calibrated.
     rate : float
-        Sampling rate, Hz.
+        Sampling rate, Hz; the highest, where channels have their own, which is that of ``fit.wv``.
     n : int
-        Samples per channel, of all recordings.
+        Samples per channel of that rate, of all recordings.
     notices : tuple of Notice
         Those of the reader; what was found in the recording, worst first in each channel, with
         what was done about it, if it was examined; with the code "ambiguity", which models
@@ -108,6 +108,13 @@ class Calibration(Mapping[str, Fit], Document):
     def duration(self) -> float:
         """Length of the recording, s."""
         return self.n / self.rate
+
+    @property
+    def has_one_rate(self) -> bool:
+        """Whether all channels have the sampling rate `rate`."""
+        return not any(
+            notice.code == "topics-joined" and notice.values["rates"] > 1 for notice in self.notices
+        )
 
     @property
     def valid(self) -> bool:
@@ -226,7 +233,7 @@ def load(path: str | os.PathLike[str]) -> Any:
 
 
 def calibrate(
-    recording: Recording | Sequence[Recording],
+    recording: Recording | Sequence[Recording] | Any,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     screening: Collection[str] = SCREENING,
@@ -249,7 +256,9 @@ def calibrate(
     Parameters
     ----------
     recording : Recording or sequence of Recording
-        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`.
+        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`. A DataFrame or
+        an Arrow table is read with `gmwm.read`, which needs a column of time stamps and units in
+        the names of the others.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
@@ -271,9 +280,9 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
-    given = [recording] if isinstance(recording, Recording) else list(recording)
+    given = _recordings(recording)
     _check_together(given)
-    treated = [screened(each, screening) for each in given]
+    treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -319,21 +328,21 @@ def calibrate(
         for name, error in found.items()
         if isinstance(error, InputError)
     }
-    source = ", ".join(each.source for each in recordings)
+    source = ", ".join(each.source for each in given)
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
     issues = [issue for each in treated for issue in each.notices]
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
     fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
-    several = len(recordings) > 1
+    several = len(given) > 1
     tied = {name: each for name, (_, each) in done.items() if each is not None and each.rivals}
     notices = with_outcomes(
-        [
+        _each_once(
             replace(notice, source=each.recording.source) if several else notice
             for each in treated
             for notice in each.notices
-        ],
+        ),
         {name: fitted.model for name, fitted in fits.items()},
         offered if model is None else {},
     )
@@ -341,12 +350,27 @@ def calibrate(
         fits=fits,
         skipped=skipped,
         source=source,
-        rate=recordings[0].rate,
-        n=sum(each.n for each in recordings),
+        rate=given[0].rate,
+        n=sum(each.n for each in given),
         notices=(*notices, *(_ambiguity(name, each) for name, each in tied.items())),
         rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
-        left_out={} if several else _left_out(given[0], recordings[0]),
+        left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
     )
+
+
+def _recordings(given: Any) -> list[Any]:
+    """What was given, as a list; frames are read."""
+    alone = isinstance(given, Recording) or is_frame(given)
+    return [read(each) if is_frame(each) else each for each in ([given] if alone else given)]
+
+
+def _each_once(notices: Iterable[Notice]) -> list[Notice]:
+    """Sensors with rates of their own share those of the reader."""
+    found: list[Notice] = []
+    for notice in notices:
+        if notice not in found:
+            found.append(notice)
+    return found
 
 
 def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tuple[int, int], ...]]:
@@ -371,18 +395,20 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             )
     first = recordings[0]
     for other in recordings[1:]:
-        if abs(other.rate / first.rate - 1.0) > tuning.SAME_RATE:
-            raise InputError(
-                f"{other.source} has {other.rate:g} Hz and {first.source} {first.rate:g} Hz: "
-                "calibrate recordings of different rates one by one"
-            )
+        for channel in other.inertial:
+            known = first.get(channel.name, channel)
+            if abs(known.dt / channel.dt - 1.0) > tuning.SAME_RATE:
+                raise InputError(
+                    f"{other.source} has {1.0 / channel.dt:g} Hz and {first.source} "
+                    f"{1.0 / known.dt:g} Hz: calibrate recordings of different rates one by one"
+                )
 
 
 def _usable(
     treated: Sequence[Screened],
 ) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
     """Each channel in the recordings where it can be used, why others are skipped, and which."""
-    rate = treated[0].recording.rate
+    interval: dict[str, float] = {}
     alive: dict[str, list[Channel]] = {}
     sources: dict[str, list[str]] = {}
     dead: dict[str, Notice] = {}
@@ -392,7 +418,7 @@ def _usable(
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:
-                channel = replace(channel, dt=1.0 / rate)
+                channel = replace(channel, dt=interval.setdefault(channel.name, channel.dt))
                 repeated = each.repeated.get(channel.name)
                 own = thinned(channel, repeated) if repeated else channel
                 alive.setdefault(channel.name, []).append(own)

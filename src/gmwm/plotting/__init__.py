@@ -14,7 +14,16 @@ from gmwm.plotting.deviation import (
     straight_lines,
     trace,
 )
-from gmwm.plotting.navigation import errors, growth, innovations, literal, measured_track, track
+from gmwm.plotting.intervals import intervals
+from gmwm.plotting.navigation import (
+    errors,
+    growth,
+    innovations,
+    literal,
+    measured_outage,
+    measured_track,
+    track,
+)
 
 __all__ = [
     "COMPONENT_COLOURS",
@@ -29,7 +38,9 @@ __all__ = [
     "errors",
     "growth",
     "innovations",
+    "intervals",
     "literal",
+    "measured_outage",
     "measured_track",
     "residuals",
     "straight_lines",

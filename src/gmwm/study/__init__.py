@@ -5,6 +5,7 @@ from gmwm.study.choice import choice_study, choice_table
 from gmwm.study.demo import compare, simulated_imu
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
+from gmwm.study.rotation import reproduce_rotation
 from gmwm.study.runs import run_study
 from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
@@ -20,6 +21,7 @@ __all__ = [
     "converge",
     "convergence_table",
     "reproduce_figure",
+    "reproduce_rotation",
     "run_study",
     "simulated_imu",
     "summarise",

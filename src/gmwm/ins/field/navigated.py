@@ -45,7 +45,7 @@ class Hole:
         s since the filter's start.
     sd : tuple of three floats
         Predicted standard deviations of the position to the north, east and down before the fix
-        at its end, m.
+        at its end, m; NaN if the filter diverged before.
     distance : float or None
         Horizontal distance of that fix from where it was expected, m; ``None`` if none follows.
     """
@@ -89,8 +89,9 @@ class Navigated:
             If the initial state cannot be known, or no fix follows it.
         """
         alignment = align(
-            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd
-        )
+            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
+            measured.attitude, measured.attitude_sd,
+        )  # fmt: skip
         imu, aiding = started(measured.imu, measured.aiding, alignment)
         times = next(each.time for each in aiding.fixes if each.kind == "position")
         if not times.size:
@@ -118,7 +119,7 @@ class Navigated:
         kind : {"position", "velocity"}, optional
             By default both together.
         """
-        found = [KINDS[kind]] if kind else list(np.unique(self.solution.innovations.kind))
+        found = [KINDS[each] for each in ((kind,) if kind else self.kinds)]
         innovations = self.solution.innovations
         parts = [innovations.standard[innovations.kind == each] for each in found]
         seen = np.concatenate([part[np.isfinite(part)] for part in parts])
@@ -134,7 +135,7 @@ class Navigated:
         return tuple(
             each.kind
             for each in self.measured.aiding.fixes
-            if each.kind in KINDS and each.time.size
+            if each.kind != "standstill" and each.time.size
         )
 
     @property
@@ -142,6 +143,27 @@ class Navigated:
         """NIS per degree of freedom by the median, which a few far ones do not move."""
         squares = self.solution.innovations.standard**2
         return float(np.nanmedian(squares) / chi2.median(1))
+
+    @property
+    def rejections(self) -> tuple[Notice, ...]:
+        """Fixes that were beyond their gate and not used, kind by kind."""
+        innovations = self.solution.innovations
+        notices = []
+        for kind, code in KINDS.items():
+            rejected = np.flatnonzero((innovations.kind == code) & ~innovations.used)
+            if not rejected.size:
+                continue
+            size = np.sqrt(innovations.nis[rejected])
+            far = int(np.argmax(size))
+            at = float(self.clock(innovations.time[rejected[far : far + 1]])[0])
+            of = int(np.count_nonzero(innovations.kind == code))
+            text = (
+                f"{rejected.size} of {of} are rejected; the farthest is {size[far]:.3g} sigma off "
+                f"at {at:.10g} s"
+            )
+            values = {"count": rejected.size, "of": of, "size": float(size[far]), "time": at}
+            notices.append(Notice("fixes-rejected", "warning", kind, text, values))
+        return tuple(notices)
 
     @property
     def farthest(self) -> tuple[float, float]:
@@ -247,7 +269,7 @@ class Navigated:
         solution, imu = self.solution, self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        for notice in (*self.measured.notices, *self.alignment.notices):
+        for notice in (*self.measured.notices, *self.alignment.notices, *self.rejections):
             lines += wrapped(str(notice), "- ", 2)
         if solution.diverged_at is not None:
             at = float(self.clock(np.array([solution.diverged_at]))[0])
@@ -282,9 +304,13 @@ class Navigated:
         begin, end = self.clock(np.array([hole.start, hole.end]))
         text = (
             f"Longest time without a position fix: {hole.end - hole.start:.4g} s, from "
-            f"{begin:.10g} s to {end:.10g} s; predicted error at its end, 1 sigma: horizontal "
-            f"{np.hypot(hole.sd[0], hole.sd[1]):.3g} m, vertical {hole.sd[2]:.3g} m"
+            f"{begin:.10g} s to {end:.10g} s"
         )
+        if np.all(np.isfinite(hole.sd)):
+            text += (
+                "; predicted error at its end, 1 sigma: horizontal "
+                f"{np.hypot(hole.sd[0], hole.sd[1]):.3g} m, vertical {hole.sd[2]:.3g} m"
+            )
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
         return lines + wrapped(text)
@@ -335,7 +361,7 @@ class Navigated:
         panels = {}
         for kind in self.kinds:
             of_kind = innovations.kind == KINDS[kind]
-            unit = "m" if kind == "position" else "m/s"
+            unit = "m/s" if kind == "velocity" else "m"
             panels[f"{kind} [{unit}]"] = (
                 self.clock(innovations.time[of_kind]),
                 innovations.value[of_kind],
@@ -346,11 +372,13 @@ class Navigated:
 
 def _hole(solution: Solution, start: float, end: float) -> Hole:
     """What was predicted for the end of a time without fixes, and how far off the next one was."""
-    early = np.flatnonzero(solution.before & (np.abs(solution.time - end) < 1e-6))
+    # The one epoch that is kept before its measurements is the nearest to the end; none, if the
+    # filter diverged earlier.
+    early = np.flatnonzero(solution.before)
     sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
     innovations = solution.innovations
     first = np.flatnonzero(
-        (np.abs(innovations.time - end) < 1e-6) & (innovations.kind == KINDS["position"])
+        (np.abs(innovations.time - end) < 1e-5) & (innovations.kind == KINDS["position"])
     )
     distance = None
     if first.size and np.all(np.isfinite(innovations.value[first[0], :2])):

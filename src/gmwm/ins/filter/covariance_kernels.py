@@ -234,15 +234,19 @@ def propagate(
 
 
 @compiled()
-def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple[float, float]:
+def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float:
     """Allow for the square of the tilt error over a step, which a linear filter does not know.
 
     Specific force that is resolved with a tilt error phi falls short of gravity by ``g phi^2 / 2``.
     Where gyros are poor and accelerometers good, that is more than the vertical error that a linear
-    filter expects. Mean and variance of the square follow from the covariance of the tilt, as in
-    the Gaussian second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*,
-    sec. 9.3). The tilt hardly changes from step to step, so standard deviations add up, not
-    variances, until a fix corrects it; heights and standstills do not show it.
+    filter expects. The filter linearises about its estimate, which contains the tilt error: given
+    the horizontal errors, its linear terms predict ``g phi^2``, twice the shortfall and of its
+    sign. What is left is ``-g phi^2 / 2`` given them, and ``+g phi^2 / 2`` if nothing is given, so
+    that no mean is subtracted: the one would be made worse by what mends the other. Its mean square
+    is the same in both cases and follows from the covariance of the tilt, as in the Gaussian
+    second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*, sec. 9.3). The
+    tilt hardly changes from step to step, so root mean squares add up, not squares, until a fix
+    corrects it; heights and standstills do not show it.
 
     Parameters
     ----------
@@ -253,20 +257,45 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
     step : float
         s.
     gathered : float
-        Standard deviation of the velocity error of this kind since the last GNSS fix, m/s.
+        Root mean square of the velocity error of this kind since the last GNSS fix, m/s.
 
     Returns
     -------
-    mean : float
-        Downward velocity error that the step makes on average, m/s.
     gathered : float
         After the step.
     """
     north, east, both = P[6, 6], P[7, 7], P[6, 7]
-    spread = g * math.sqrt(0.5 * (north * north + east * east) + both * both)
-    after = gathered + spread * step
+    fourth = (north + east) ** 2 + 2.0 * (north * north + east * east) + 4.0 * both * both
+    after = gathered + 0.5 * g * math.sqrt(fourth) * step
     P[5, 5] += after * after - gathered * gathered
-    return 0.5 * g * (north + east) * step, after
+    return after
+
+
+@compiled()
+def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
+    """Variance of a measurement for the products of errors that a linear filter does not know.
+
+    The errors that a linear filter predicts for position and velocity are wrong by half an attitude
+    error times themselves: what it leaves out is the second term of the rotation by phi,
+    ``phi x (phi x f)/2`` after ``phi x f``. Without fixes for long, that is far more than the noise
+    of a precise fix, which must not be believed to the last centimetre then; after a few fixes,
+    little is left of it.
+
+    Parameters
+    ----------
+    P : (n, n) ndarray
+    h : (9,) ndarray
+        As in `measurement_update`.
+    attitude : float
+        Variance of the attitude, its three axes together, before the measurements of the epoch,
+        rad^2.
+    """
+    total = 0.0
+    for i in range(9):
+        if h[i] != 0.0:
+            for j in range(9):
+                total += h[i] * P[i, j] * h[j]
+    return 0.25 * attitude * total
 
 
 @compiled(fastmath=_FAST)
@@ -316,6 +345,8 @@ def measurement_update(
         total -= K[state]
         innovation += x[state]
     # By its root, so that the product of two gains is the same both ways: P stays symmetric.
+    # Joseph's form costs twice as much and adds nothing: rounding errors are 1e-16 of the variance
+    # before, and after a long time without fixes `excess` keeps that after it far above them.
     root = 1.0 / math.sqrt(total)
     for i in range(n):
         K[i] *= root
