@@ -80,6 +80,46 @@ LOST = 5.0
 MOSTLY_FINE = 1.5
 """NIS by the median, below which a few outliers make the mean large."""
 
+# -- faults of a log -------------------------------------------------------------------------------
+
+LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
+"""s, of a constant error of the fixes' stamps that is looked for: leap seconds are more, and leave
+no fix near; and of the fixes left out at both ends beside it."""
+
+LARGEST_ARM = 5.0
+"""m, usual length of a lever arm that was left out: 1 sigma."""
+
+HEADINGS = 8
+"""Directions that are tried where the filter is lost: 45 deg apart."""
+
+ROUGH_HEADING, FINE_HEADING = math.radians(15.0), math.radians(0.5)
+"""rad, 1 sigma of each direction when it is tried (the nearest is up to 22.5 deg off), and when the
+error is estimated: small, so that the data and not the start decide."""
+
+DIAGNOSED = 3600.0
+"""s from the start in which faults are looked for: tens of runs of the filter."""
+
+MOST_FAULTS = 4
+"""At once: with more, nothing can be known."""
+
+ROUNDS, SETTLED_GAIN = 6, 0.05
+"""Gauss-Newton steps, and the gain of the log-likelihood below which they end."""
+
+REFINED, TRIALS = 3, 40
+"""Explanations that are worked out, by their gain at first sight; and runs to fit coloured noise."""
+
+SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
+"""Logarithm of the factors on a noise that are tried first, and of the largest."""
+
+AMBIGUOUS = 3.0
+"""Of the log-likelihood: an explanation that is less than 20 times as probable is no decision."""
+
+CLEANINGS, MOST_OUTLIERS = 10, 0.1
+"""Rounds in which outliers are removed, and the fraction of fixes beyond which they are none."""
+
+WAKE, WAKE_SHARE = 15, 0.3
+"""Fixes that the wake of an outlier takes, and the share of its NIS that the wake stays below."""
+
 # -- validations ----------------------------------------------------------------------------------
 
 SETTLED = 0.25
