@@ -124,8 +124,10 @@ def align(
     )
     if velocity is None:
         velocity, velocity_sd = _first_velocity(aiding, epoch, imu.dt)
+    # The fix may be half a sampling interval from the epoch.
+    later = velocity * (epoch * imu.dt - positions.time[fix])
     state = NavState(
-        offset(positions.value[fix], -C @ np.asarray(aiding.lever_arm)), velocity,
+        offset(positions.value[fix], later - C @ np.asarray(aiding.lever_arm)), velocity,
         rpy_from_matrix(C),
     )  # fmt: skip
     sd = InitialSd(

@@ -45,7 +45,7 @@ class Hole:
         s since the filter's start.
     sd : tuple of three floats
         Predicted standard deviations of the position to the north, east and down before the fix
-        at its end, m.
+        at its end, m; NaN if the filter diverged before.
     distance : float or None
         Horizontal distance of that fix from where it was expected, m; ``None`` if none follows.
     """
@@ -282,9 +282,13 @@ class Navigated:
         begin, end = self.clock(np.array([hole.start, hole.end]))
         text = (
             f"Longest time without a position fix: {hole.end - hole.start:.4g} s, from "
-            f"{begin:.10g} s to {end:.10g} s; predicted error at its end, 1 sigma: horizontal "
-            f"{np.hypot(hole.sd[0], hole.sd[1]):.3g} m, vertical {hole.sd[2]:.3g} m"
+            f"{begin:.10g} s to {end:.10g} s"
         )
+        if np.all(np.isfinite(hole.sd)):
+            text += (
+                "; predicted error at its end, 1 sigma: horizontal "
+                f"{np.hypot(hole.sd[0], hole.sd[1]):.3g} m, vertical {hole.sd[2]:.3g} m"
+            )
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
         return lines + wrapped(text)
@@ -346,11 +350,13 @@ class Navigated:
 
 def _hole(solution: Solution, start: float, end: float) -> Hole:
     """What was predicted for the end of a time without fixes, and how far off the next one was."""
-    early = np.flatnonzero(solution.before & (np.abs(solution.time - end) < 1e-6))
+    # The one epoch that is kept before its measurements is the nearest to the end; none, if the
+    # filter diverged earlier.
+    early = np.flatnonzero(solution.before)
     sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
     innovations = solution.innovations
     first = np.flatnonzero(
-        (np.abs(innovations.time - end) < 1e-6) & (innovations.kind == KINDS["position"])
+        (np.abs(innovations.time - end) < 1e-5) & (innovations.kind == KINDS["position"])
     )
     distance = None
     if first.size and np.all(np.isfinite(innovations.value[first[0], :2])):

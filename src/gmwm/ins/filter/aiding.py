@@ -129,11 +129,15 @@ class Events:
     Attributes
     ----------
     epoch, kind : (E,) ndarray of int
+        Of the nearest epoch of the IMU.
+    offset : (E,) ndarray
+        Time of the fix less that of its epoch, s; 0 where they are the same.
     value, sd : (E, 3) ndarray
     """
 
     epoch: IntArray
     kind: IntArray
+    offset: FloatArray
     value: FloatArray
     sd: FloatArray
 
@@ -196,7 +200,7 @@ class Aiding:
         return replace(self, fixes=tuple(fixes))
 
     def events(self, dt: float, n: int) -> Events:
-        """Fixes sorted by time, at the nearest epochs of an IMU with ``n`` intervals of ``dt``.
+        """Fixes in order of time, beside the epochs of an IMU with ``n`` intervals of ``dt``.
 
         Raises
         ------
@@ -206,7 +210,7 @@ class Aiding:
         fixes = [each for each in self.fixes if each.time.size]
         if not fixes:
             none = np.zeros(0, dtype=np.int64)
-            return Events(none, none, np.zeros((0, 3)), np.zeros((0, 3)))
+            return Events(none, none, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
         for each in fixes:
             outside = (each.time < -0.5 * dt) | (each.time > (n + 0.5) * dt)
             if np.any(outside):
@@ -214,14 +218,18 @@ class Aiding:
                     f"{each.kind} fix at {each.time[np.argmax(outside)]:g} s: the IMU record goes "
                     f"from 0 to {n * dt:g} s; cut the fixes or shift their clock"
                 )
-        epoch = np.concatenate([np.rint(each.time / dt).astype(np.int64) for each in fixes])
+        time = np.concatenate([each.time for each in fixes])
         kind = np.concatenate([np.full(each.time.size, KINDS[each.kind]) for each in fixes])
-        order = np.lexsort((kind, epoch))
+        epoch = np.clip(np.rint(time / dt), 0, n).astype(np.int64)
+        offset = time - epoch * dt
+        offset[np.abs(offset) <= _SAME_TIME] = 0.0
+        order = np.lexsort((kind, offset, epoch))
         value = np.concatenate([each.value for each in fixes])
         sd = np.concatenate([each.sd for each in fixes])
         return Events(
-            np.clip(epoch, 0, n)[order],
+            epoch[order],
             kind.astype(np.int64)[order],
+            offset[order],
             np.ascontiguousarray(value[order]),
             np.ascontiguousarray(sd[order]),
         )

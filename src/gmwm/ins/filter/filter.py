@@ -161,7 +161,8 @@ class Filter:
             imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
             table.noise, table.noise_off, table.cross, table.integral, self.coloured,
-            events.epoch, events.kind, events.value, events.sd, self.lever_arm, self.second_order,
+            events.epoch, events.kind, events.offset, events.value, events.sd, self.lever_arm,
+            self.second_order,
             outputs.epoch, outputs.before,
             nav, matrices, nav_P, sensor, sensor_P, innovation, sd,
         )  # fmt: skip
@@ -176,7 +177,7 @@ class Filter:
             sensor_errors=sensor[:done],
             sensor_covariance=sensor_P[:done],
             innovations=FilterInnovations(
-                time=np.asarray(events.epoch * imu.dt, dtype=float),
+                time=events.epoch * imu.dt + events.offset,
                 kind=events.kind,
                 value=innovation,
                 sd=sd,

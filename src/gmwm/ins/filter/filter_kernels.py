@@ -121,6 +121,40 @@ def correct(C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray) -> Non
 
 
 @compiled()
+def propagated(
+    C: FloatArray, v: FloatArray, lla: FloatArray, rate: FloatArray, force: FloatArray,
+    offset: float, C_at: FloatArray, v_at: FloatArray, lla_at: FloatArray, F: FloatArray,
+    A: FloatArray, B: FloatArray,
+) -> None:  # fmt: skip
+    """Fill the solution some time from an epoch, and the transition of its errors to there.
+
+    Noise and sensor errors that gather over a part of a sampling interval are left out: they are
+    far below the noise of any fix.
+
+    Parameters
+    ----------
+    C, v, lla : ndarray
+        Attitude, velocity and position at the epoch.
+    rate, force : (3,) ndarray
+        Angular rate and specific force about it, rad/s and m/s^2.
+    offset : float
+        s; negative for back in time.
+    C_at, v_at, lla_at : ndarray
+        Overwritten by the solution there.
+    F, A, B : ndarray
+        As in `transition`; A is overwritten by the transition.
+    """
+    for i in range(3):
+        v_at[i], lla_at[i] = v[i], lla[i]
+        for j in range(3):
+            C_at[i, j] = C[i, j]
+    ax, ay, az = rate[0] * offset, rate[1] * offset, rate[2] * offset
+    fx, fy, fz = force[0] * offset, force[1] * offset, force[2] * offset
+    step(C_at, v_at, lla_at, ax, ay, az, fx, fy, fz, ax, ay, az, fx, fy, fz, offset)
+    transition(v, lla, C, offset, F, A, B)
+
+
+@compiled()
 def sample_error(
     first: IntArray, output: FloatArray, phi: FloatArray, phi_off: FloatArray, partner: IntArray,
     paired: bool, x: FloatArray, held: FloatArray, error: FloatArray,
@@ -171,8 +205,9 @@ def run(
     first: IntArray, axis: IntArray, output: FloatArray, partner: IntArray,
     phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
     noise_off: FloatArray, cross: FloatArray, integral: FloatArray, coloured: IntArray,
-    event_epoch: IntArray, event_kind: IntArray, event_value: FloatArray, event_sd: FloatArray,
-    lever: FloatArray, second_order: bool, out_epoch: IntArray, out_before: IntArray,
+    event_epoch: IntArray, event_kind: IntArray, event_offset: FloatArray,
+    event_value: FloatArray, event_sd: FloatArray, lever: FloatArray, second_order: bool,
+    out_epoch: IntArray, out_before: IntArray,
     out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
     out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
 ) -> int:  # fmt: skip
@@ -197,6 +232,8 @@ def run(
         State of the coloured noise of the north, east and down position; -1 for none.
     event_epoch, event_kind : (E,) ndarray of int
         Measurements in order of time.
+    event_offset : (E,) ndarray
+        Times of the measurements less those of their epochs, s.
     event_value, event_sd : (E, 3) ndarray
     lever : (3,) ndarray
     second_order : bool
@@ -222,7 +259,9 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     S, T, U = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6))
     row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
     estimated, held = np.zeros(n), np.zeros(m)
-    C_mid, v_mid, lla_mid, rate = np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3)
+    C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)
     ax = ay = az = fx = fy = fz = 0.0
     epoch = event = out = steps = 0
     gathered = 0.0
@@ -243,13 +282,35 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         while event < n_events and event_epoch[event] == epoch:
             kind = event_kind[event]
             of_gnss = of_gnss or kind in (IS_POSITION, IS_VELOCITY)
+            offset = event_offset[event]
+            moved = offset != 0.0 and n_samples > 0
+            if moved:
+                i = min(max(epoch if offset > 0.0 else epoch - 1, 0), n_samples - 1)
+                for a in range(3):
+                    rate_at[a], force_at[a] = rotation[i, a] / dt, increment[i, a] / dt
+                for k in range(m):
+                    if 0 <= axis[k] < 3:
+                        rate_at[axis[k]] -= output[k] * x[k]
+                    elif axis[k] >= 3:
+                        force_at[axis[k] - 3] -= output[k] * x[k]
+                propagated(C, v, lla, rate_at, force_at, offset, C_at, v_at, lla_at, F, A, B)
             components = 1 if kind == IS_HEIGHT else 3
             for component in range(components):
                 sd = event_sd[event, component]
                 if not sd > 0.0:
                     continue
-                measurement_row(kind, component, C, v, rate, lever, h)
-                z = residual(kind, component, event_value[event], C, v, lla, rate, lever)
+                if moved:
+                    measurement_row(kind, component, C_at, v_at, rate_at, lever, h_at)
+                    z = residual(
+                        kind, component, event_value[event], C_at, v_at, lla_at, rate_at, lever
+                    )
+                    for j in range(9):
+                        h[j] = 0.0
+                        for k in range(9):
+                            h[j] += h_at[k] * A[k, j]
+                else:
+                    measurement_row(kind, component, C, v, rate, lever, h)
+                    z = residual(kind, component, event_value[event], C, v, lla, rate, lever)
                 state = -1
                 if kind == IS_POSITION and coloured[component] >= 0:
                     state = 9 + coloured[component]

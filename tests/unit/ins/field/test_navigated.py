@@ -306,3 +306,18 @@ def test_whiteness_is_that_from_one_fix_to_the_next(tmp_path, lag, white):
     changed = replace(innovations, value=standard * innovations.sd)
     solution = replace(found.solution, innovations=changed)
     assert (replace(found, solution=solution).test("position").whiteness > 0.01) is white
+
+
+def test_the_longest_time_without_a_fix_ends_at_a_fix_between_two_samples(tmp_path):
+    """Its predicted error was nan where the fix was not at a sample of the IMU."""
+    drive(tmp_path)
+    path = tmp_path / "fixes.csv"
+    header, *rows = path.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    moved = [",".join([f"{float(first) + 0.013:.6f}", *rest]) for first, *rest in cells]
+    path.write_text("\n".join([header, *moved]))
+    found = Navigated.of(Measured.of(content(), tmp_path))
+    assert np.all(np.isfinite(found.hole.sd)) and 1.0 < found.hole.sd[0] < 100.0
+    assert found.hole.distance is not None
+    assert found.hole.end - found.hole.start == pytest.approx(20.0)
+    assert "nan" not in str(found)

@@ -121,7 +121,8 @@ def test_events_come_in_order_of_time():
     events = aiding.events(dt, n)
     assert events.epoch.tolist() == [0, 0, 0, 500, 500, 1000, 1000]
     p, v = KINDS["position"], KINDS["velocity"]
-    assert events.kind.tolist() == [p, p, v, p, v, p, v]
+    assert events.kind.tolist() == [p, p, v, p, v, v, p]
+    np.testing.assert_allclose(events.offset, [0, 0, 0, 0, 0.004, 0, 0.0049], atol=1e-12)
     assert Aiding().events(dt, n).value.shape == (0, 3)
 
 
