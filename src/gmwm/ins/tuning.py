@@ -120,6 +120,38 @@ CLEANINGS, MOST_OUTLIERS = 10, 0.1
 WAKE, WAKE_SHARE = 15, 0.3
 """Fixes that the wake of an outlier takes, and the share of its NIS that the wake stays below."""
 
+SEEN = 5.0
+"""Standard errors that a constant error must have to be found at the level of the tests."""
+
+UNSEEN = {"s": 0.5, "m": 3.0, "heading": math.radians(10.0)}
+"""Least constant error that is found, beyond which a motion is reported not to show it: more is
+rare in practice."""
+
+MILD = 1.5
+"""Factor on the deviations of fixes up to which the solution may be used all the same."""
+
+# -- comparisons on a log --------------------------------------------------------------------------
+
+SMOOTHER_STEP = 0.5
+"""s between steps of the smoother's covariance: a turn of 6 deg/s makes 3 deg of it."""
+
+OUTAGE, LONGEST_OUTAGE = 30.0, 600.0
+"""s without fixes, and as long with them before the next: what a tunnel or a street of houses
+takes, and long enough that errors of sensors are larger than those of the fixes."""
+
+OUTAGES_FROM = 60.0
+"""s from the start of the filter, in which it settles, to the first outage."""
+
+FEWEST_OUTAGES = 8
+"""Of a comparison: with fewer the interval of a ratio is a guess."""
+
+ACCURACY_LEVEL, SCORE_LEVEL = 0.04, 0.01
+"""Probability that equal models are not a tie, by their errors and by what they predict: 5 % in
+all."""
+
+POWER, WORTH = 0.95, 0.9
+"""Probability with which a difference is found, and the ratio of errors that is worth it."""
+
 # -- validations ----------------------------------------------------------------------------------
 
 SETTLED = 0.25

@@ -24,6 +24,9 @@ TESTS = 14
 """Ways in which a log can contradict a filter, or be explained better: each gets its share of the
 probability of a false alarm."""
 
+LEVEL = tuning.CONTRADICTED / TESTS
+"""Of each test, so that a right model is blamed with ``tuning.CONTRADICTED`` at most (Bonferroni)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
@@ -80,7 +83,7 @@ class Candidate:
 
 def cost(parameters: int, among: int = 1) -> float:
     """Gain of a right model by chance, with its share of the probability of a false alarm."""
-    return float(0.5 * chi2.isf(tuning.CONTRADICTED / (TESTS * among), parameters))
+    return float(0.5 * chi2.isf(LEVEL / among, parameters))
 
 
 # -- constant errors ------------------------------------------------------------------------------
@@ -110,8 +113,7 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
     """Stamps, antenna, heading: four runs of the filter and one."""
     for each in CONSTANTS:
         zero = np.zeros(len(each.names))
-        move, covariance, gain = _step(base, base, each, zero)
-        del move
+        _, covariance, gain = _step(base, base, each, zero)
 
         def refined(each: _Constant = each) -> Explanation | None:
             return _fitted(base, base, each)
@@ -185,7 +187,7 @@ def outliers(base: Replay) -> Candidate | None:
     count = {kind: int(np.sum(base.innovations.kind == KINDS[kind])) for kind in base.kinds()}
     total = sum(count.values())
     rejected = {kind: np.zeros(each, dtype=bool) for kind, each in count.items()}
-    limit = chi2.isf(tuning.CONTRADICTED / (TESTS * max(total, 1)), 3)
+    limit = chi2.isf(LEVEL / max(total, 1), 3)
     here = base
     for _ in range(tuning.CLEANINGS):
         found = 0

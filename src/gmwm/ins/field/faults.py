@@ -9,7 +9,7 @@ import numpy as np
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
     CONSTANTS,
-    TESTS,
+    LEVEL,
     Candidate,
     Explanation,
     coloured,
@@ -83,11 +83,10 @@ class Faults:
 
 def contradicted(replay: Replay) -> bool:
     """Whether the innovations have another size than expected, or depend on those before."""
-    level = tuning.CONTRADICTED / TESTS
     if not np.isfinite(replay.log_likelihood):
         return True
     tests = [replay.test(kind) for kind in replay.kinds()]
-    return any(each.nis.p_value <= level or each.whiteness <= level for each in tests)
+    return any(each.nis.p_value <= LEVEL or each.whiteness <= LEVEL for each in tests)
 
 
 def _candidates(

@@ -10,6 +10,8 @@ import numpy.typing as npt
 from scipy.stats import norm
 
 from gmwm._core.typing import FloatArray
+from gmwm.ins.field.alignment import Alignment, started
+from gmwm.ins.field.measured import Measured
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
 from gmwm.ins.geometry import matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
@@ -39,6 +41,22 @@ class Replay:
     sd: InitialSd
     models: SensorModels
     aiding: Aiding
+
+    @classmethod
+    def of(cls, measured: Measured, alignment: Alignment) -> Replay:
+        """Real data from where they are aligned.
+
+        Parameters
+        ----------
+        measured : Measured
+        alignment : Alignment
+        """
+        imu, aiding = started(measured.imu, measured.aiding, alignment)
+        models = measured.sensors
+        if alignment.gyro_bias_sd is not None:
+            known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
+            models = replace(models, bias_sd={**models.bias_sd, **known})
+        return cls(imu, alignment.state, alignment.sd, models, aiding)
 
     # -- what comes of it -------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, gnss
+from gmwm.ins.filter.aiding import KINDS, Aiding, Events, Fixes, Outage, gnss
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION,
     measurement_update,
@@ -10,7 +10,7 @@ from gmwm.ins.filter.covariance_kernels import (
 )
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, modified, navigate, unmodified
 from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_VELOCITY, measurement_row
-from gmwm.ins.filter.solution import Solution
+from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import IntArray, SensorStates
 
 __all__ = [
@@ -20,7 +20,9 @@ __all__ = [
     "KINDS",
     "NAVIGATION",
     "Aiding",
+    "Events",
     "Filter",
+    "FilterInnovations",
     "Fixes",
     "InitialSd",
     "IntArray",
