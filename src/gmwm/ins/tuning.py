@@ -145,6 +145,9 @@ OUTAGES_FROM = 60.0
 FEWEST_OUTAGES = 8
 """Of a comparison: with fewer the interval of a ratio is a guess."""
 
+LEAST_SHARE = 0.01
+"""Of the predicted variance, that the difference of two covariances is at least."""
+
 ACCURACY_LEVEL, SCORE_LEVEL = 0.04, 0.01
 """Probability that equal models are not a tie, by their errors and by what they predict: 5 % in
 all."""

@@ -1,11 +1,12 @@
 """The self-contained HTML report of a calibration; opens without a network."""
 
 from gmwm.report.calibration import duration_text, write_report
-from gmwm.report.navigated import write_navigated_report
+from gmwm.report.navigated import write_comparison_report, write_navigated_report
 from gmwm.report.validation import write_validation_report
 
 __all__ = [
     "duration_text",
+    "write_comparison_report",
     "write_navigated_report",
     "write_report",
     "write_validation_report",

@@ -17,12 +17,14 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.alignment import align
-from gmwm.ins.field.measured import Measured
+from gmwm.ins.field.measured import Measured, MeasuredSpec
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import Smoothed, smooth
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
+from gmwm.ins.imu import SensorModels
 from gmwm.ins.montecarlo import InnovationTest, Ratio, mean_ratio
+from gmwm.ins.spec import read_models
 
 _PARTS = {"horizontal": (0, 1), "vertical": (2,)}
 
@@ -111,6 +113,39 @@ class Comparison:
     pairs: dict[tuple[str, str], Paired]
     duration: float
     notices: tuple[Notice, ...] = ()
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Comparison:
+        """From the content of a file.
+
+        Parameters
+        ----------
+        content : mapping
+            As for `Measured.of`, but with ``compare``, a mapping of names to sensor models, in
+            place of ``sensors``; and ``outages``, see `compare`.
+        folder : Path, optional
+            That paths are relative to.
+
+        Raises
+        ------
+        InputError
+            If something is missing, unknown or cannot be used.
+        """
+        rest = dict(content)
+        named, outages = rest.pop("compare"), rest.pop("outages", "auto")
+        if not isinstance(named, Mapping) or len(named) < 2 or "sensors" in rest:
+            raise InputError(
+                "compare: write two names or more, each with its sensor models, and no sensors "
+                "beside it"
+            )
+        specs = {str(name): MeasuredSpec.parse({**rest, "sensors": each})
+                 for name, each in named.items()}  # fmt: skip
+        models = {
+            name: read_models(f"compare, {name}", spec.sensors, folder)
+            for name, spec in specs.items()
+        }
+        measured = Measured.of({**rest, "sensors": next(iter(named.values()))}, folder)
+        return compare(measured, models, outages)
 
     @property
     def verdict(self) -> Notice:
@@ -233,9 +268,10 @@ def compare(
     Parameters
     ----------
     measured : Measured
-        The log; its ``sensors`` are not used.
-    sensors : mapping of str to SensorModels
-        Two or more, by name.
+        The log; of its ``sensors`` only the biases are used.
+    sensors : mapping of str to SensorModels, Calibration or mapping
+        Two or more by name; see `SensorModels.of`. Axes without a constant bias are given that of
+        ``measured``.
     outages : "auto" or float, optional
         Length of each outage, s.
 
@@ -275,8 +311,10 @@ def compare(
     return Comparison(measured.title, every, outcomes, pairs, duration, measured.notices)
 
 
-def _replay(measured: Measured, models: Any) -> Replay:
-    own = replace(measured, sensors=models)
+def _replay(measured: Measured, source: Any) -> Replay:
+    models, usual = SensorModels.of(source), measured.sensors.bias_sd
+    bias = {axis: each or usual[axis] for axis, each in models.bias_sd.items()}
+    own = replace(measured, sensors=replace(models, bias_sd=bias))
     alignment = align(own.imu, own.aiding, own.sensors, own.heading, own.heading_sd)
     return Replay.of(own, alignment)
 
@@ -383,11 +421,3 @@ def _two_sided(value: float, error: float, count: int) -> float:
     if error == 0.0:
         return 1.0 if value == 0.0 else 0.0
     return float(2.0 * t.sf(abs(value) / error, count - 1))
-
-
-def named_models(content: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
-    """Sensor models by name, as a file gives them; see `Measured.of`."""
-    return {
-        name: Measured.of({**content, "sensors": source}, folder).sensors
-        for name, source in content["sensors"].items()
-    }

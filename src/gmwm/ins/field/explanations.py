@@ -187,17 +187,14 @@ def outliers(base: Replay) -> Candidate | None:
     count = {kind: int(np.sum(base.innovations.kind == KINDS[kind])) for kind in base.kinds()}
     total = sum(count.values())
     rejected = {kind: np.zeros(each, dtype=bool) for kind, each in count.items()}
-    limit = chi2.isf(LEVEL / max(total, 1), 3)
+    limit = float(chi2.isf(LEVEL / max(total, 1), 3))
     here = base
     for _ in range(tuning.CLEANINGS):
-        found = 0
-        for kind, out in rejected.items():
-            nis = here.innovations.nis[here.innovations.kind == KINDS[kind]]
-            far = _peaks(np.nan_to_num(nis), float(limit))
-            found += int(np.sum(far))
-            out[np.flatnonzero(~out)[far]] = True
-        if not found:
+        far = _farthest(here, limit)
+        if not np.any(far):
             break
+        for kind, out in rejected.items():
+            out[np.flatnonzero(~out)[far[here.innovations.kind == KINDS[kind]]]] = True
         if sum(int(np.sum(out)) for out in rejected.values()) > tuning.MOST_OUTLIERS * total + 1.0:
             return None
         here = base.without(rejected)
@@ -205,27 +202,33 @@ def outliers(base: Replay) -> Candidate | None:
     if not gone:
         return None
     # Each is as if its error were a parameter: it costs no density, but for its size.
-    log_sd = sum(
-        float(np.nansum(np.log(base.innovations.sd[base.innovations.kind == KINDS[kind]][out])))
-        for kind, out in rejected.items()
-    )
+    log_sd, times = 0.0, []
+    for kind, out in rejected.items():
+        of_kind = base.innovations.kind == KINDS[kind]
+        log_sd += float(np.nansum(np.log(base.innovations.sd[of_kind][out])))
+        times += base.innovations.time[of_kind][out].tolist()
     gain = here.log_likelihood - log_sd - base.log_likelihood
-    number = sum(gone.values())
-    kind = max(gone, key=lambda each: gone[each])
-    times = base.innovations.time[base.innovations.kind == KINDS[kind]][rejected[kind]]
-    values = {"count": float(number), "fraction": number / total, "time": float(times[0])}
-    found_all = Explanation(
-        "outliers", kind, here, gain, number * cost(3, total), values, {}
-    )  # fmt: skip
-    return Candidate("outliers", gain, lambda: found_all)
+    most = max(gone, key=lambda each: gone[each])
+    values = {"count": float(len(times)), "fraction": gone[most] / count[most], "time": min(times)}
+    found = Explanation("outliers", most, here, gain, len(times) * cost(3, total), values)
+    return Candidate("outliers", gain, lambda: found)
 
 
-def _peaks(nis: FloatArray, limit: float) -> np.typing.NDArray[np.bool_]:
-    """Far ones that are not the wake of one farther: a filter that took it needs time."""
-    width = tuning.WAKE
-    padded = np.pad(nis, width, constant_values=0.0)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1).max(axis=1)
-    return np.asarray((nis > limit) & (nis >= tuning.WAKE_SHARE * around))
+def _farthest(replay: Replay, limit: float) -> np.typing.NDArray[np.bool_]:
+    """Fixes that are far off and not in the wake of one farther: a filter that took it needs time.
+
+    Those of one time are its wake too, for they are used one after the other.
+    """
+    nis = np.nan_to_num(replay.innovations.nis)
+    kinds = max(len(replay.kinds()), 1)
+
+    def largest(width: int) -> FloatArray:
+        padded = np.pad(nis, width * kinds, constant_values=0.0)
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width * kinds + 1)
+        return np.asarray(windows.max(axis=1))
+
+    near, around = largest(1), largest(tuning.WAKE)
+    return np.asarray((nis > limit) & (nis >= near) & (nis >= tuning.WAKE_SHARE * around))
 
 
 def fix_noise(base: Replay) -> Iterator[Candidate]:

@@ -116,7 +116,7 @@ class Measured:
             If something is missing, unknown or cannot be used.
         """
         spec = MeasuredSpec.parse(content)
-        sensors, assumed = _with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
+        sensors, assumed = with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
         log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding, cut = _within(
@@ -145,7 +145,7 @@ class Measured:
         )
 
 
-def _with_bias(
+def with_bias(
     models: SensorModels, given: Mapping[str, float]
 ) -> tuple[SensorModels, tuple[Notice, ...]]:
     """Models with a constant that is drawn when a sensor is switched on, and what was assumed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -319,6 +319,23 @@ class Navigated:
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
         return lines + wrapped(text)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was found, in JSON types: the verdict, faults, tests of the innovations."""
+        return {
+            "title": self.measured.title,
+            "verdict": self.verdict.to_dict(),
+            "faults": [each.to_dict() for each in self.fault_notices],
+            "resolution": resolution_notice(self.faults).to_dict(),
+            "notices": [
+                each.to_dict() for each in (*self.measured.notices, *self.alignment.notices)
+            ],
+            "innovations": {
+                kind: {"nis": test.nis.value, "nis_p_value": test.nis.p_value,
+                       "whiteness": None if np.isnan(test.whiteness) else test.whiteness}
+                for kind, test in ((kind, self.test(kind)) for kind in self.kinds)
+            },
+        }  # fmt: skip
 
     def write_solution(self, path: Path) -> Path:
         """Write the solution as a CSV file.
