@@ -134,8 +134,8 @@ def navigate(
     if _OF_DATA.isdisjoint(content):
         if as_json or outage_length is not None:
             raise InputError(
-                f"{'--json' if as_json else '--outages'} is about your own data: give --imu, --gnss "
-                "and --sensors"
+                f"{'--json' if as_json else '--outages'} is about your own data: give --imu, "
+                "--gnss and --sensors"
             )
         # The rate is also that of a ready-made trajectory.
         if "rate" in reading:

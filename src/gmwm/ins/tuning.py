@@ -105,8 +105,11 @@ MOST_FAULTS = 4
 ROUNDS, SETTLED_GAIN = 6, 0.05
 """Gauss-Newton steps, and the gain of the log-likelihood below which they end."""
 
-REFINED, TRIALS = 3, 40
-"""Explanations that are worked out, by their gain at first sight; and runs to fit coloured noise."""
+REFINED, TRIALS = 4, 40
+"""Explanations that are worked out, by their gain at first sight; runs to fit coloured noise."""
+
+LEAST_WHITE, LONGEST_COLOUR = -4.0, 1e4
+"""Logarithm of the least factor on the white part of coloured fixes; s, longest correlation."""
 
 SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
 """Logarithm of the factors on a noise that are tried first, and of the largest."""
@@ -151,6 +154,10 @@ LEAST_SHARE = 0.01
 ACCURACY_LEVEL, SCORE_LEVEL = 0.04, 0.01
 """Probability that equal models are not a tie, by their errors and by what they predict: 5 % in
 all."""
+
+TIE_RATIO, TIE_SCORE = 0.02, 0.05
+"""Logarithm of a ratio of errors, and difference of scores, below which models are as good as each
+other however surely they differ: nearly equal models differ surely by nothing that matters."""
 
 POWER, WORTH = 0.95, 0.9
 """Probability with which a difference is found, and the ratio of errors that is worth it."""

@@ -155,9 +155,11 @@ class Comparison:
 
         def beats(a: str, b: str) -> str:
             pair = self.pairs[a, b]
-            if pair.p_value < tuning.ACCURACY_LEVEL / share:
+            size = abs(np.log(pair.ratio))
+            if pair.p_value < tuning.ACCURACY_LEVEL / share and size > tuning.TIE_RATIO:
                 return "better" if pair.ratio < 1.0 else ""
-            if pair.score_p_value < tuning.SCORE_LEVEL / share and pair.score < 0.0:
+            honest = pair.score < -tuning.TIE_SCORE
+            if honest and pair.score_p_value < tuning.SCORE_LEVEL / share:
                 return "more-honest"
             return ""
 
@@ -175,11 +177,14 @@ class Comparison:
                 )  # fmt: skip
                 return Notice(code, "good", best, f"Take {best}: {why}.", values)
         shown = " and ".join(unbeaten or names)
-        text = (
-            f"A tie: {shown} are as good as each other as far as this log shows. It tells errors "
-            f"apart that differ by {100.0 * (1.0 - self.resolved):.0f} % or more; for 10 % it "
-            f"would have to be {self.length_needed / 60.0:.0f} min long."
-        )
+        text = f"A tie: {shown} are as good as each other as far as this log shows. "
+        if self.resolved > tuning.WORTH:
+            text += "Errors that differ by 10 % would have been found."
+        else:
+            text += (
+                f"It tells errors apart that differ by {100.0 * (1.0 - self.resolved):.0f} % or "
+                f"more; for 10 % it would have to be {self.length_needed / 60.0:.0f} min long."
+            )
         return Notice("tie", "note", "", text, values)
 
     @property
@@ -224,7 +229,9 @@ class Comparison:
         first, *others = self.outcomes
         width = max(map(len, (*self.outcomes, "against")))
         length = self.outages[0].duration
-        lines = [f"{self.title}: {self.duration:.6g} s, {len(self.outages)} outages of {length:g} s"]
+        lines = [
+            f"{self.title}: {self.duration:.6g} s, {len(self.outages)} outages of {length:g} s"
+        ]
         for notice in self.notices:
             lines += wrapped(str(notice), "- ", 2)
         lines += [
@@ -236,9 +243,8 @@ class Comparison:
                 f"{each.rms[part]:>8.4g} ({each.predicted[part]:>7.4g})" for part in _PARTS
             )
             mark = " " if each.nees.within else "*"
-            lines.append(
-                f"{name:{width}}  {parts}  {each.nees.value:>8.3g}{mark}  {each.nis.nis.value:>8.4g}"
-            )
+            nis = each.nis.nis.value
+            lines.append(f"{name:{width}}  {parts}  {each.nees.value:>8.3g}{mark}  {nis:>8.4g}")
         lines += [
             "", f"Errors over those of {first}, paired",
             f"{'':{width}}  {'ratio':>6}  {'95 %':>15}   {'score':>7}  {'p':>7}",
@@ -257,9 +263,9 @@ def compare(
 ) -> Comparison:
     """Compare sensor models on a log without a known truth.
 
-    Fixes are removed, so that the filter goes without them for a while; what it estimates at the end
-    of that time is compared with a smoother's position from all fixes. Outages fill the log: those
-    of a first run leave gaps in which the outages of a second one lie.
+    Fixes are removed, so that the filter goes without them for a while; what it estimates at the
+    end of that time is compared with a smoother's position from all fixes. Outages fill the log:
+    those of a first run leave gaps in which the outages of a second one lie.
 
     The smoothed position is the projection of the true one on all data, so that its own error is
     uncorrelated with the difference of the filter from it: covariances subtract, and the mean
@@ -324,9 +330,7 @@ def _length(outages: str | float) -> float:
         return tuning.OUTAGE
     length = checks.positive("outages", outages, 'give "auto", or seconds above zero')
     if length > tuning.LONGEST_OUTAGE:
-        raise InputError(
-            f"outages of {length:g} s: give {tuning.LONGEST_OUTAGE:g} s or less"
-        )
+        raise InputError(f"outages of {length:g} s: give {tuning.LONGEST_OUTAGE:g} s or less")
     return length
 
 
@@ -336,8 +340,8 @@ def _passes(duration: float, length: float, dt: float) -> tuple[tuple[Outage, ..
     count = int((duration - tuning.OUTAGES_FROM) / step)
     if count < tuning.FEWEST_OUTAGES:
         raise InputError(
-            f"the log is {duration:.4g} s long, enough for {max(count, 0)} outages of {length:g} s: "
-            f"{tuning.FEWEST_OUTAGES} are needed; give a log of "
+            f"the log is {duration:.4g} s long, enough for {max(count, 0)} outages of "
+            f"{length:g} s: {tuning.FEWEST_OUTAGES} are needed; give a log of "
             f"{tuning.OUTAGES_FROM + tuning.FEWEST_OUTAGES * step:g} s or shorter outages"
         )
     every = [Outage(tuning.OUTAGES_FROM + i * step, step) for i in range(count)]

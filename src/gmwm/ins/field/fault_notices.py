@@ -29,8 +29,9 @@ def fault_notice(fault: Explanation) -> Notice:
 
 def resolution_notice(faults: Faults) -> Notice:
     """How small a constant error this motion shows, and which it does not show."""
-    seen, unseen = [], []
-    values = {}
+    seen: list[tuple[str, float, str]] = []
+    unseen: list[tuple[str, float, str]] = []
+    values: dict[str, float] = {}
     for name, (_, what, unit, factor) in _MOTION.items():
         if name not in faults.resolution:
             continue
@@ -56,7 +57,7 @@ def _time(fault: Explanation) -> tuple[str, str]:
         f"the fixes are stamped {abs(offset):.3g} s too {'late' if offset > 0.0 else 'early'} "
         f"(standard error {fault.errors['time offset']:.1g} s)"
     )
-    return text, f"{'subtract' if offset > 0.0 else 'add'} it {'from' if offset > 0.0 else 'to'} their times"
+    return text, "subtract it from their times" if offset > 0.0 else "add it to their times"
 
 
 def _arm(fault: Explanation) -> tuple[str, str]:

@@ -8,19 +8,17 @@ import numpy as np
 
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
-    CONSTANTS,
     LEVEL,
     Candidate,
     Explanation,
-    coloured,
     constant_errors,
     cost,
     far_heading,
-    fix_noise,
-    outliers,
-    sensor_noise,
 )
+from gmwm.ins.field.noises import coloured, fix_noise, outliers, sensor_noise
 from gmwm.ins.field.replay import Replay
+
+_CONSTANT = frozenset({"time-offset", "lever-arm", "heading"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +36,7 @@ class Faults:
     replay : Replay
         The log with these allowed for.
     resolution : dict
-        Constant error -> its standard error from this motion, s, m, rad; it is seen if it is five
-        times as large.
+        Constant error -> its standard error from this motion, s, m, rad.
     """
 
     found: tuple[Explanation, ...]
@@ -59,25 +56,27 @@ class Faults:
         ----------
         whole : Replay
         """
-        here = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
-        found: list[Explanation] = []
+        base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
+        here, found = base, list[Explanation]()
         alternatives: tuple[str, ...] = ()
         resolution: dict[str, float] = {}
         while len(found) < tuning.MOST_FAULTS:
             first = list(constant_errors(here))
             resolution = {name: e for each in first for name, e in each.errors.items()}
-            refined = _best(_candidates(here, first, {_key(each) for each in found}))
-            if not refined or refined[0].excess <= 0.0:
+            known = _CONSTANT & {each.code for each in found}
+            refined = _best(_candidates(here, first, known))
+            if not refined or refined[0][0].excess <= 0.0:
                 break
             best = refined[0]
             if not found:
                 alternatives = tuple(
-                    each.code for each in refined[1:]
-                    if each.excess > 0.0 and best.excess - each.excess < tuning.AMBIGUOUS
-                    and each.code != best.code
+                    each[0].code for each in refined[1:]
+                    if each[0].excess > max(best[0].excess - tuning.AMBIGUOUS, 0.0)
+                    and each[0].code not in {one.code for one in best}
                 )  # fmt: skip
-            found.append(best)
-            here = best.replay
+            found += best
+            here = found[-1].replay
+        found, here = _cleaned_again(base, found, here)
         return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
 
 
@@ -89,32 +88,45 @@ def contradicted(replay: Replay) -> bool:
     return any(each.nis.p_value <= LEVEL or each.whiteness <= LEVEL for each in tests)
 
 
-def _candidates(
-    here: Replay, constants: list[Candidate], known: set[str]
-) -> list[Candidate]:
+def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str]) -> list[Candidate]:
     """Those worth a look; the costly ones only where something is wrong."""
-    found = [each for each in constants if each.key not in known]
+    found = constants
     cleaned = outliers(here)
     if cleaned is not None:
         found.append(cleaned)
     if contradicted(here) or any(each.gain > cost(1) for each in found):
-        lost = max((here.test(kind).nis.value for kind in here.kinds()), default=1.0)
-        if not np.isfinite(here.log_likelihood) or lost > tuning.LOST:
+        sizes = [here.test(kind).nis.value for kind in here.kinds()]
+        if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
             found.append(far_heading(here))
-        white = coloured(here)
-        if white is not None:
-            found.append(white)
+        slow = coloured(here)
+        if slow is not None:
+            found.append(slow)
         found += [*fix_noise(here), *sensor_noise(here)]
-    return [each for each in found if each.key not in known]
+    return [each for each in found if not each.codes & known]
 
 
-def _key(explanation: Explanation) -> str:
-    return explanation.code if explanation.code in {each.code for each in CONSTANTS} else ""
-
-
-def _best(candidates: list[Candidate]) -> list[Explanation]:
+def _best(candidates: list[Candidate]) -> list[tuple[Explanation, ...]]:
     """The most probable explanations, best first."""
     promising = [each for each in candidates if each.gain > cost(1)]
     promising = sorted(promising, key=lambda each: -each.gain)[: tuning.REFINED]
     refined = [each.refined() for each in promising]
-    return sorted((each for each in refined if each is not None), key=lambda each: -each.excess)
+    return sorted((each for each in refined if each), key=lambda each: -each[0].excess)
+
+
+def _cleaned_again(
+    base: Replay, found: list[Explanation], here: Replay
+) -> tuple[list[Explanation], Replay]:
+    """Outliers anew, where something else was found after them that made good fixes look bad."""
+    codes = [each.code for each in found]
+    if "outliers" not in codes or codes[-1] == "outliers":
+        return found, here
+    others = [each for each in found if each.code != "outliers"]
+    replay = base
+    for each in others:
+        replay = each.change(replay)
+    cleaned = outliers(replay)
+    if cleaned is None:
+        return (others, replay) if not contradicted(replay) else (found, here)
+    (again,) = cleaned.refined()
+    place = codes.index("outliers")
+    return [*others[:place], again, *others[place:]], again.replay

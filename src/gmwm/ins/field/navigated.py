@@ -121,7 +121,8 @@ class Navigated:
     @cached_property
     def faults(self) -> Faults:
         """What explains the innovations better than that all is right; tens of runs of the filter
-        where they contradict it, five where they do not."""
+        where they contradict it, five where they do not.
+        """
         return Faults.of(Replay.of(self.measured, self.alignment))
 
     @property
@@ -172,9 +173,7 @@ class Navigated:
         """Kinds whose innovations have another size than expected -> how many times it is."""
         tests = {kind: self.test(kind).nis for kind in self.kinds}
         tests["all"] = self.test().nis
-        found = {
-            k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL
-        }
+        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
 
     @property

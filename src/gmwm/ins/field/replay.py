@@ -180,5 +180,5 @@ def _scaled(term: Process, factor: float) -> Process:
     linear = term.linear_parameter
     if linear is None:
         return term
-    value = float(term.values[linear.name]) * factor ** (2.0 / linear.power)
+    value = float(term.values[linear.name] or 0.0) * factor ** (2.0 / linear.power)
     return term.with_values(**{linear.name: value})
