@@ -17,11 +17,13 @@ from gmwm.ins import Navigated, SensorModels
 from gmwm.study import FAULTS, emulated_log, sensors
 
 TOGETHER = (("stamps", "lever arm"), ("one far", "coloured"), ("outliers", "stamps"))
+COARSE = {"gyro": 30.0, "accel": 100.0}
+"""Factors on white noise of a sensor so poor, or so shaken, that it shows between two fixes."""
+
 WRONG: dict[str, SensorModels] = {
-    "gyro N x 0.1": sensors(gyro=0.1),
-    "gyro N x 10": sensors(gyro=10.0),
-    "accel N x 0.1": sensors(accel=0.1),
-    "accel N x 10": sensors(accel=10.0),
+    f"{kind} N x {factor:g}": sensors(**{**COARSE, kind: factor * COARSE[kind]})
+    for kind in COARSE
+    for factor in (0.1, 10.0)
 }
 VEHICLES = ("car", "helicopter", "loiter")
 
@@ -51,7 +53,9 @@ def main() -> None:
             log, _ = emulated_log(arguments.seed, vehicle, faults=faults)
             print(f"  {' + '.join(faults):22} {_shown(Navigated.of(log))}", flush=True)
         for name, believed in WRONG.items():
-            log, _ = emulated_log(arguments.seed, vehicle, believed=believed)
+            log, _ = emulated_log(
+                arguments.seed, vehicle, truth=sensors(**COARSE), believed=believed
+            )
             print(f"  {name:22} {_shown(Navigated.of(log))}", flush=True)
     blamed = []
     for i in range(arguments.clean):

@@ -76,7 +76,8 @@ class Candidate:
     refined : callable
         What is found; several that go together have the same gain and cost.
     errors : dict
-        Standard errors of constant errors, whether there are any or not.
+        Standard errors of constant errors that are estimated together, whether there are any or
+        not.
     """
 
     codes: frozenset[str]
@@ -136,8 +137,7 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
         names = [name for each in errors for name in each.names]
         deviations = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         yield Candidate(
-            frozenset(each.code for each in errors), gain, refined,
-            deviations if len(errors) == 1 else {},
+            frozenset(each.code for each in errors), gain, refined, deviations
         )  # fmt: skip
 
 

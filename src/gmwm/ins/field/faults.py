@@ -62,7 +62,9 @@ class Faults:
         resolution: dict[str, float] = {}
         while len(found) < tuning.MOST_FAULTS:
             first = list(constant_errors(here))
-            resolution = {name: e for each in first for name, e in each.errors.items()}
+            alone = {name: e for each in first[:-1] for name, e in each.errors.items()}
+            # Those of stamps and antenna together, for each could be taken for the other.
+            resolution = alone | first[-1].errors
             known = _CONSTANT & {each.code for each in found}
             refined = _best(_candidates(here, first, known))
             if not refined or refined[0][0].excess <= 0.0:
@@ -74,6 +76,11 @@ class Faults:
                     if each[0].excess > max(best[0].excess - tuning.AMBIGUOUS, 0.0)
                     and each[0].code not in {one.code for one in best}
                 )  # fmt: skip
+                if len(best) == 1 and best[0].code in first[-1].codes and any(
+                    resolution[name] > tuning.SEEN * alone[name] for name in best[0].values
+                ):  # fmt: skip
+                    other = first[-1].codes - {best[0].code}
+                    alternatives = tuple(sorted({*alternatives, *other}))
             found += best
             here = found[-1].replay
         found, here = _cleaned_again(base, found, here)

@@ -13,14 +13,13 @@ from gmwm.ins.filter import InitialSd
 from gmwm.ins.tuning import CONTRADICTED
 from gmwm.study.emulated_logs import LEVER_ARM, emulated_log, sensors
 
-SENSOR_CODES = {"sensor-white-noise", "sensor-slow-errors"}
-DURATION = 240.0
+DURATION = 160.0
 
 
 def found(seed, *faults, vehicle="car", **options):
     """What is found in a log with faults; the sensor models are right."""
     log, _ = emulated_log(
-        seed, vehicle, duration=options.pop("duration", DURATION), rate=20.0, faults=faults,
+        seed, vehicle, duration=options.pop("duration", DURATION), rate=10.0, faults=faults,
         **options,
     )  # fmt: skip
     return Navigated.of(log)
@@ -36,18 +35,25 @@ def within(fault, name, truth, sigmas=4.0):
     return error
 
 
-@pytest.mark.parametrize("vehicle", ["car", "loiter"])
-def test_stamps_that_are_late(vehicle):
-    navigated = found(201, "stamps", vehicle=vehicle)
+def test_stamps_that_are_late():
+    navigated = found(201, "stamps")
     (fault,) = navigated.fault_notices
     assert navigated.verdict.code == fault.code == "time-offset"
     assert within(fault, "time offset", 0.2) < 0.02
     assert navigated.verdict.values["explained"]
+    assert not navigated.faults.alternatives
+
+
+def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
+    faults = found(201, "stamps", vehicle="loiter").faults
+    (fault,) = faults.found
+    assert {fault.code, *faults.alternatives} == {"time-offset", "lever-arm"}
+    assert faults.resolution["time offset"] > 0.03
 
 
 @pytest.mark.parametrize("vehicle", ["car", "helicopter"])
 def test_a_lever_arm_left_out(vehicle):
-    (fault,) = found(202, "lever arm", vehicle=vehicle, duration=400.0).fault_notices
+    (fault,) = found(202, "lever arm", vehicle=vehicle, duration=300.0).fault_notices
     assert fault.code == "lever-arm"
     for name, truth in zip(("forward", "right", "down"), LEVER_ARM, strict=True):
         within(fault, name, truth)
@@ -73,8 +79,8 @@ def test_one_fix_far_off():
 
 
 def test_outliers_are_counted():
-    log, _ = emulated_log(206, duration=DURATION, rate=20.0, faults=("outliers",))
-    right, _ = emulated_log(206, duration=DURATION, rate=20.0)
+    log, _ = emulated_log(206, duration=DURATION, rate=10.0, faults=("outliers",))
+    right, _ = emulated_log(206, duration=DURATION, rate=10.0)
     moved = np.any(log.aiding.fixes[0].value != right.aiding.fixes[0].value, axis=1)
     navigated = Navigated.of(log)
     (fault,) = navigated.fault_notices
@@ -97,7 +103,7 @@ def test_an_imu_mounted_rotated():
 
 
 def test_two_faults_together():
-    navigated = found(208, "stamps", "lever arm", duration=400.0)
+    navigated = found(208, "stamps", "lever arm", duration=300.0)
     assert set(codes(navigated)) == {"time-offset", "lever-arm"}
     assert navigated.verdict.values["explained"]
 
@@ -120,15 +126,17 @@ def test_right_models_are_not_blamed_in_a_hundred_logs():
     assert len(blamed) <= 1, blamed
 
 
-@pytest.mark.parametrize(
-    ("factors", "where"), [({"accel": 0.03}, "accel"), ({"gyro": 30.0}, "gyro")]
-)
-def test_a_wrong_sensor_model_is_still_named(factors, where):
-    navigated = found(209, believed=sensors(**factors), duration=400.0, vehicle="loiter")
-    assert SENSOR_CODES & set(codes(navigated)), codes(navigated)
-    assert navigated.fault_notices[0].where == where
-    too_small = next(iter(factors.values())) < 1.0
-    assert (navigated.fault_notices[0].values["factor"] > 1.0) is too_small
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+@pytest.mark.parametrize("kind", ["gyro", "accel"])
+def test_a_wrong_sensor_model_is_still_named(kind, factor):
+    """Of sensors so poor, or so shaken, that their white noise shows between two fixes."""
+    coarse = {"gyro": 30.0, "accel": 100.0}
+    navigated = found(
+        209, truth=sensors(**coarse), believed=sensors(**{**coarse, kind: factor * coarse[kind]})
+    )
+    (fault,) = navigated.fault_notices
+    assert (fault.code, fault.where) == ("sensor-white-noise", kind)
+    assert fault.values["factor"] == pytest.approx(1.0 / factor, rel=0.4)
 
 
 def test_straight_flight_at_constant_speed_shows_no_lever_arm():
@@ -156,10 +164,10 @@ def test_false_alarms_are_shared_between_the_tests():
 
 
 def test_the_wake_of_an_outlier_is_not_counted():
-    log, _ = emulated_log(210, duration=DURATION, rate=20.0)
+    log, _ = emulated_log(210, duration=DURATION, rate=10.0)
     position = log.aiding.fixes[0]
     value = position.value.copy()
-    value[100:102, 2] += 80.0
+    value[80:82, 2] += 80.0
     fixes = (Fixes("position", position.time, value, position.sd), *log.aiding.fixes[1:])
     changed = type(log)(log.imu, type(log.aiding)(fixes, log.aiding.lever_arm), log.sensors)
     (fault,) = Navigated.of(changed).fault_notices
