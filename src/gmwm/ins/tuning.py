@@ -20,6 +20,18 @@ POSITION_SD = (1.0, 1.0, 1.5)
 VELOCITY_SD = (0.1, 0.1, 0.15)
 """The same of velocities, m/s."""
 
+GATE = 1e-5
+"""Probability of a larger innovation beyond which a standstill is not believed: one in a day of one
+a second is rejected falsely."""
+
+GATE_PATIENCE = 5
+"""Rejections in a row after which the filter is more likely wrong than the fixes: of 3 % outliers,
+five in a row come once in 40 million."""
+
+BAROMETER = (10.0, 3600.0)
+"""m and s: how far the height of a pressure is off once it is set at the start, and for how long;
+weather changes it by some hPa, 8 m each, in hours."""
+
 TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
 """Of a bias from one switching on to the next, which a static calibration cannot know, where nobody
 specifies better: rad/s, m/s^2."""
@@ -117,11 +129,9 @@ SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
 AMBIGUOUS = 3.0
 """Of the log-likelihood: an explanation that is less than 20 times as probable is no decision."""
 
-CLEANINGS, MOST_OUTLIERS = 10, 0.1
-"""Rounds in which outliers are removed, and the fraction of fixes beyond which they are none."""
-
-WAKE, WAKE_SHARE = 15, 0.3
-"""Fixes that the wake of an outlier takes, and the share of its NIS that the wake stays below."""
+MOST_OUTLIERS = 0.1
+"""Fraction of the fixes beyond which those that a gate rejects are no outliers: it is the filter
+that is wrong."""
 
 SEEN = 5.0
 """Standard errors that a constant error must have to be found at the level of the tests."""

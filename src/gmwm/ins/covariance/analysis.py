@@ -145,7 +145,7 @@ class Course:
         scenario, dt = self.scenario, self.scenario.trajectory.dt
         aiding = scenario.aiding.without(scenario.outages)
         ready = Filter.of(believed, aiding, dt, scenario.step, scenario.second_order)
-        real = Filter.of(truth, aiding, dt, scenario.step)
+        real = Filter.of(truth, aiding, dt, scenario.step, drift_known=True)
         events = aiding.events(dt, scenario.trajectory.n)
         initial = scenario.trajectory.state(0)
         table, joint = ready.states, _joint(ready.states, real.states)

@@ -17,8 +17,10 @@ from gmwm.ins.filter import (
     IS_POSITION,
     IS_VELOCITY,
     IntArray,
+    excess,
     measurement_row,
     measurement_update,
+    noise_state,
     propagate,
     tilt_squared,
     transition,
@@ -133,6 +135,8 @@ def run_both(
         while out < out_epoch.size and out_epoch[out] == epoch[s] and out_before[out] == 1:
             out_P[out], out_J[out] = P, J
             out += 1
+        attitude = P[6, 6] + P[7, 7] + P[8, 8] if second_order else 0.0
+        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if second_order else 0.0
         while event < event_epoch.size and event_epoch[event] == epoch[s]:
             kind = event_kind[event]
             for component in range(1 if kind == IS_HEIGHT else 3):
@@ -141,11 +145,13 @@ def run_both(
                     continue
                 measurement_row(kind, component, end_matrix[s], end_v[s], end_rate[s], lever, h)
                 state = estimate = truth = -1
-                if kind == IS_POSITION and coloured[component] >= 0:
-                    state = estimate = 9 + coloured[component]
-                    truth = 9 + j_coloured[component]
-                measurement_update(P, h, state, sd * sd, 0.0, x, K)
-                update_jointly(J, h, estimate, truth, sd * sd, K, m, a, k)
+                if noise_state(kind, component, coloured) >= 0:
+                    state = estimate = 9 + noise_state(kind, component, coloured)
+                    truth = 9 + noise_state(kind, component, j_coloured)
+                expected = sd * sd + excess(P, h, attitude)
+                measurement_update(P, h, state, expected, 0.0, x, K)
+                variance = sd * sd + excess(J, h, j_attitude)
+                update_jointly(J, h, estimate, truth, variance, K, m, a, k)
             if kind in (IS_POSITION, IS_VELOCITY):
                 gathered = j_gathered = 0.0
             event += 1

@@ -187,11 +187,10 @@ class Navigated:
 
         A fault of the log comes before a fault of the sensor models.
         """
-        faults = self.fault_notices
-        if faults:
-            return self._fault_verdict(faults)
-        sizes = self._misfits
+        faults, sizes = self.fault_notices, self._misfits
         largest = max(sizes.values(), default=1.0)
+        if faults and (self.faults.explained or largest <= tuning.LOST):
+            return self._fault_verdict(faults)
         if self.solution.diverged_at is not None:
             return Notice(
                 "diverged", "bad", "",

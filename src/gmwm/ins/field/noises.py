@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
-from scipy.stats import chi2
 
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
@@ -20,55 +20,26 @@ Scaling = Callable[[Replay, float], Replay]
 
 
 def outliers(base: Replay) -> Candidate | None:
-    """Few fixes that are far off: those without which the rest fit."""
-    count = {kind: int(np.sum(base.innovations.kind == KINDS[kind])) for kind in base.kinds()}
-    total = sum(count.values())
-    rejected = {kind: np.zeros(each, dtype=bool) for kind, each in count.items()}
-    limit = float(chi2.isf(LEVEL / max(total, 1), 3))
-    here = base
-    for _ in range(tuning.CLEANINGS):
-        far = _farthest(here, limit)
-        if not np.any(far):
-            break
-        for kind, out in rejected.items():
-            out[np.flatnonzero(~out)[far[here.innovations.kind == KINDS[kind]]]] = True
-        if sum(int(np.sum(out)) for out in rejected.values()) > tuning.MOST_OUTLIERS * total + 1.0:
-            return None
-        here = base.without(rejected)
-    gone = {kind: int(np.sum(out)) for kind, out in rejected.items() if np.any(out)}
-    if not gone:
+    """Few fixes that are far off: those that a gate rejects when they come."""
+    total = base.innovations.kind.size
+    aiding = replace(base.aiding, gate=LEVEL / max(total, 1))
+    gated = replace(base, aiding=aiding).innovations
+    count = int(np.count_nonzero(~gated.used))
+    if not 0 < count <= tuning.MOST_OUTLIERS * total + 1.0:
         return None
+    rejected = {kind: ~gated.used[gated.kind == KINDS[kind]] for kind in base.kinds()}
+    here = base.without(rejected)
     # Each is as if its error were a parameter: it costs no density, but for its size.
-    log_sd, times = 0.0, []
-    for kind, out in rejected.items():
-        of_kind = base.innovations.kind == KINDS[kind]
-        log_sd += float(np.nansum(np.log(base.innovations.sd[of_kind][out])))
-        times += base.innovations.time[of_kind][out].tolist()
+    log_sd = float(np.nansum(np.log(gated.sd[~gated.used])))
     gain = here.log_likelihood - log_sd - base.log_likelihood
-    most = max(gone, key=lambda each: gone[each])
-    values = {"count": float(len(times)), "fraction": gone[most] / count[most], "time": min(times)}
+    most = max(rejected, key=lambda kind: np.count_nonzero(rejected[kind]))
+    values = {"count": float(count), "fraction": float(np.mean(rejected[most])),
+              "time": float(gated.time[~gated.used][0])}  # fmt: skip
     found = Explanation(
         "outliers", most, lambda replay: replay.without(rejected), here, gain,
-        len(times) * cost(3, total), values,
+        count * cost(3, total), values,
     )  # fmt: skip
     return Candidate(frozenset({"outliers"}), gain, lambda: (found,))
-
-
-def _farthest(replay: Replay, limit: float) -> np.typing.NDArray[np.bool_]:
-    """Fixes that are far off and not in the wake of one farther: a filter that took it needs time.
-
-    Those of one time are its wake too, for they are used one after the other.
-    """
-    nis = np.nan_to_num(replay.innovations.nis)
-    kinds = max(len(replay.kinds()), 1)
-
-    def largest(width: int) -> FloatArray:
-        padded = np.pad(nis, width * kinds, constant_values=0.0)
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width * kinds + 1)
-        return np.asarray(windows.max(axis=1))
-
-    near, around = largest(1), largest(tuning.WAKE)
-    return np.asarray((nis > limit) & (nis >= near) & (nis >= tuning.WAKE_SHARE * around))
 
 
 def fix_noise(base: Replay) -> Iterator[Candidate]:

@@ -121,12 +121,15 @@ class Replay:
         )
 
     def with_fixes_scaled(self, factor: float, kind: str) -> Replay:
-        """Standard deviations of the fixes of a kind times ``factor``."""
+        """Standard deviations of the fixes of a kind times ``factor``, the first one's too."""
+        sd = self.sd
+        if kind == "position":
+            sd = replace(sd, position=factor * sd.position)
         fixes = tuple(
             replace(each, sd=factor * each.sd) if each.kind == kind else each
             for each in self.aiding.fixes
         )
-        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+        return replace(self, sd=sd, aiding=replace(self.aiding, fixes=fixes))
 
     def coloured(self, sd: FloatArray, tau: float) -> Replay:
         """Positions with a Gauss-Markov error."""
@@ -153,14 +156,14 @@ class Replay:
         return replace(self, aiding=replace(self.aiding, fixes=fixes))
 
     def within(self, margin: float, longest: float) -> Replay:
-        """Without fixes near the ends, and without what comes after ``longest`` (s)."""
+        """Without fixes near the ends and what comes after ``longest`` (s); no fix is rejected."""
         n = min(self.imu.n, round(longest / self.imu.dt))
         imu = Imu(self.imu.dt, self.imu.rotation[:n], self.imu.velocity[:n])
         end = n * imu.dt - margin
         fixes = tuple(
             each.part((each.time > margin) & (each.time < end)) for each in self.aiding.fixes
         )
-        return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes))
+        return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes, gate=None))
 
 
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:

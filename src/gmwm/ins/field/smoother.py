@@ -15,7 +15,6 @@ from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.filter import (
-    IS_POSITION,
     NAVIGATION,
     Events,
     Filter,
@@ -24,6 +23,7 @@ from gmwm.ins.filter import (
     Solution,
     measurement_row,
     measurement_update,
+    noise_state,
     propagate,
     transition,
 )
@@ -185,19 +185,20 @@ class _Forward:
         found, n = [], self._P.shape[0]
         for component in range(3):
             value, sd = innovations.value[event, component], self._events.sd[event, component]
-            if not np.isfinite(value):
+            if not (np.isfinite(value) and innovations.used[event]):
                 continue
             h, row, gain = np.zeros(NAVIGATION), np.zeros(n), np.zeros(n)
             lever = np.asarray(self._aiding.lever_arm)
             measurement_row(kind, component, np.ascontiguousarray(C), v, rate, lever, h)
             row[:NAVIGATION] = h
-            state = -1
-            if kind == IS_POSITION and self._ready.coloured[component] >= 0:
-                state = NAVIGATION + int(self._ready.coloured[component])
+            state = noise_state(kind, component, self._ready.coloured)
+            if state >= 0:
+                state += NAVIGATION
                 row[state] = -1.0
-            _, variance = measurement_update(
-                self._P, h, state, float(sd**2), 0.0, np.zeros(n), gain
-            )
+            # The filter's own variance, with what it allows for beyond the noise of the fix.
+            predicted = float(row @ self._P @ row)
+            noise = max(float(innovations.sd[event, component] ** 2) - predicted, float(sd**2))
+            _, variance = measurement_update(self._P, h, state, noise, 0.0, np.zeros(n), gain)
             found.append(_Update(row, gain, float(value), float(variance)))
         return found
 

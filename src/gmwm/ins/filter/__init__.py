@@ -3,13 +3,20 @@
 from gmwm.ins.filter.aiding import KINDS, Aiding, Events, Fixes, Outage, gnss
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION,
+    excess,
     measurement_update,
     propagate,
     tilt_squared,
     transition,
 )
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, modified, navigate, unmodified
-from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_VELOCITY, measurement_row
+from gmwm.ins.filter.filter_kernels import (
+    IS_HEIGHT,
+    IS_POSITION,
+    IS_VELOCITY,
+    measurement_row,
+    noise_state,
+)
 from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import IntArray, SensorStates
 
@@ -30,11 +37,13 @@ __all__ = [
     "Outputs",
     "SensorStates",
     "Solution",
+    "excess",
     "gnss",
     "measurement_row",
     "measurement_update",
     "modified",
     "navigate",
+    "noise_state",
     "propagate",
     "tilt_squared",
     "transition",

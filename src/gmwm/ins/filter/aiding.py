@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
@@ -133,6 +134,8 @@ class Events:
     offset : (E,) ndarray
         Time of the fix less that of its epoch, s; 0 where they are the same.
     value, sd : (E, 3) ndarray
+    gate : (E,) ndarray
+        Normalised innovation squared beyond which a fix is rejected; infinite for none.
     """
 
     epoch: IntArray
@@ -140,6 +143,7 @@ class Events:
     offset: FloatArray
     value: FloatArray
     sd: FloatArray
+    gate: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +160,22 @@ class Aiding:
         first-order Gauss-Markov process that the filter has states for; zero for none.
     coloured_tau : float
         Its correlation time, s.
+    barometer_sd, barometer_tau : float
+        The same of barometric heights, m and s: how far the height of a pressure is off.
+    gate : float or None
+        Probability of a larger innovation, below which a fix is rejected; ``None`` to use all.
+        After `gmwm.ins.tuning.GATE_PATIENCE` rejections of a kind in a row the filter is more
+        likely wrong than the fixes, and they are used until as many in a row agree. Standstills are
+        always gated, and never used against the filter: they are recognised, not measured.
     """
 
     fixes: tuple[Fixes, ...] = ()
     lever_arm: FloatArray | Sequence[float] = (0.0, 0.0, 0.0)
     coloured_sd: FloatArray | Sequence[float] = (0.0, 0.0, 0.0)
     coloured_tau: float = 100.0
+    barometer_sd: float = 0.0
+    barometer_tau: float = tuning.BAROMETER[1]
+    gate: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lever_arm", _three("lever_arm", self.lever_arm))
@@ -169,10 +183,25 @@ class Aiding:
         if np.any(np.asarray(self.coloured_sd) < 0.0):
             raise InputError("coloured_sd: give 0 or more metres to the north, east and down")
         checks.positive("coloured_tau", self.coloured_tau, "give seconds above zero")
+        checks.positive("barometer_tau", self.barometer_tau, "give seconds above zero")
+        if not (checks.is_number(self.barometer_sd) and 0.0 <= self.barometer_sd < np.inf):
+            raise InputError(
+                f"barometer_sd = {checks.shown(self.barometer_sd)}: give 0 or more metres"
+            )
+        if self.gate is not None and not (checks.is_number(self.gate) and 0.0 < self.gate < 1.0):
+            raise InputError(
+                f"gate = {checks.shown(self.gate)}: give a probability between 0 and 1, e.g. 1e-5"
+            )
 
     def __add__(self, other: Aiding) -> Aiding:
-        """Both together; the antenna and the coloured noise of the first."""
-        return replace(self, fixes=(*self.fixes, *other.fixes))
+        """Both together; the antenna and the noise of the first, or the other's barometer."""
+        own = self if self.barometer_sd else other
+        return replace(
+            self,
+            fixes=(*self.fixes, *other.fixes),
+            barometer_sd=own.barometer_sd,
+            barometer_tau=own.barometer_tau,
+        )
 
     def without(self, outages: Iterable[Outage]) -> Aiding:
         """The same without the GNSS fixes of the outages."""
@@ -196,6 +225,9 @@ class Aiding:
             if each.kind == "position" and np.any(self.coloured_sd):
                 slow = _markov(each.time, self.coloured_tau, rng) * self.coloured_sd
                 drawn = replace(drawn, value=drawn.moved(slow))
+            if each.kind == "height" and self.barometer_sd:
+                slow = _markov(each.time, self.barometer_tau, rng) * self.barometer_sd
+                drawn = replace(drawn, value=drawn.moved(slow))
             fixes.append(drawn)
         return replace(self, fixes=tuple(fixes))
 
@@ -210,7 +242,8 @@ class Aiding:
         fixes = [each for each in self.fixes if each.time.size]
         if not fixes:
             none = np.zeros(0, dtype=np.int64)
-            return Events(none, none, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+            empty = np.zeros((0, 3))
+            return Events(none, none, np.zeros(0), empty, empty, np.zeros(0))
         for each in fixes:
             outside = (each.time < -0.5 * dt) | (each.time > (n + 0.5) * dt)
             if np.any(outside):
@@ -232,7 +265,16 @@ class Aiding:
             offset[order],
             np.ascontiguousarray(value[order]),
             np.ascontiguousarray(sd[order]),
+            self._gates(kind[order], sd[order]),
         )
+
+    def _gates(self, kind: IntArray, sd: FloatArray) -> FloatArray:
+        """Largest normalised innovation squared of each fix that is used."""
+        result = np.full(kind.size, np.inf)
+        gated = np.full(kind.size, self.gate is not None) | (kind == IS_STANDSTILL)
+        freedom = np.where(kind == IS_HEIGHT, 1, np.maximum(np.count_nonzero(sd, axis=1), 1))
+        result[gated] = chi2.isf(self.gate or tuning.GATE, freedom[gated])
+        return result
 
 
 def gnss(

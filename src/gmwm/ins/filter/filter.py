@@ -70,14 +70,15 @@ class Filter:
         Sampling interval of the IMU, s.
     stride : int
         Samples per step of the covariance.
-    coloured : (3,) ndarray of int
-        States of the coloured noise of GNSS positions; -1 for none.
+    coloured : (4,) ndarray of int
+        States of the coloured noise of GNSS positions to the north, east and down, and of
+        barometric heights; -1 for none.
     lever_arm : (3,) ndarray
         m.
     second_order : bool
-        Whether the square of the tilt error is allowed for; without it the filter is linear, and
-        too sure of its vertical channel where gyros are poor and accelerometers good; see
-        `gmwm.ins.filter.covariance_kernels.tilt_squared`.
+        Whether products of errors are allowed for; without it the filter is linear: too sure of its
+        vertical channel where gyros are poor and accelerometers good, and of what precise fixes say
+        after a long outage; see `gmwm.ins.filter.covariance_kernels.tilt_squared` and ``excess``.
     """
 
     states: SensorStates
@@ -95,17 +96,24 @@ class Filter:
         dt: float,
         step: float = tuning.COVARIANCE_STEP,
         second_order: bool = True,
+        drift_known: bool = False,
     ) -> Filter:
-        """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s)."""
+        """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s).
+
+        For ``drift_known`` see `SensorStates.of`.
+        """
         stride = max(round(checks.positive("step", step) / dt), 1)
-        states = SensorStates.of(sensors, dt, stride)
-        coloured = np.full(3, -1, dtype=np.int64)
-        sd = np.asarray(aiding.coloured_sd)
+        states = SensorStates.of(sensors, dt, stride, drift_known)
+        coloured = np.full(4, -1, dtype=np.int64)
+        sd = np.append(aiding.coloured_sd, aiding.barometer_sd)
         if np.any(sd):
-            names = [f"GNSS {axis}" for axis, s in zip(("north", "east", "down"), sd, strict=True)
-                     if s > 0.0]  # fmt: skip
-            coloured[sd > 0.0] = states.m + np.arange(len(names))
-            states = states.with_markov(names, sd[sd > 0.0], aiding.coloured_tau, dt)
+            tau = np.append(np.full(3, aiding.coloured_tau), aiding.barometer_tau)
+            names = ("GNSS north", "GNSS east", "GNSS down", "barometer")
+            coloured[sd > 0.0] = states.m + np.arange(np.count_nonzero(sd))
+            states = states.with_markov(
+                [name for name, s in zip(names, sd, strict=True) if s > 0.0],
+                sd[sd > 0.0], tau[sd > 0.0], dt,
+            )  # fmt: skip
         return cls(states, dt, stride, coloured, np.asarray(aiding.lever_arm), second_order)
 
     @property
@@ -155,16 +163,17 @@ class Filter:
         nav, matrices, nav_P = np.zeros((kept, 6)), np.zeros((kept, 3, 3)), np.zeros((kept, 9, 9))
         sensor, sensor_P = np.zeros((kept, 6)), np.zeros((kept, 6, 6))
         innovation, sd = np.full((2, events.epoch.size, 3), np.nan)
+        used = np.ones(events.epoch.size, dtype=np.bool_)
         axis = table.axis[table.axis != NO_AXIS]
         first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
         stopped = run(
             imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
             table.noise, table.noise_off, table.cross, table.integral, self.coloured,
-            events.epoch, events.kind, events.offset, events.value, events.sd, self.lever_arm,
-            self.second_order,
+            events.epoch, events.kind, events.offset, events.value, events.sd, events.gate,
+            self.lever_arm, self.second_order,
             outputs.epoch, outputs.before,
-            nav, matrices, nav_P, sensor, sensor_P, innovation, sd,
+            nav, matrices, nav_P, sensor, sensor_P, innovation, sd, used,
         )  # fmt: skip
         done = kept if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
         return Solution(
@@ -181,6 +190,7 @@ class Filter:
                 kind=events.kind,
                 value=innovation,
                 sd=sd,
+                used=used,
             ),
             state_names=table.names,
             states=x,
@@ -306,7 +316,7 @@ def navigate(
     models = SensorModels.of(sensors)
     ready = Filter.of(models, aiding, imu.dt, step, second_order)
     events = aiding.events(imu.dt, imu.n)
-    if not np.any(events.kind == IS_POSITION) and aiding.fixes and np.any(ready.coloured >= 0):
+    if not np.any(events.kind == IS_POSITION) and aiding.fixes and np.any(ready.coloured[:3] >= 0):
         raise InputError("coloured_sd without position fixes: set it to zero")
     outputs = Outputs.every(interval, imu.dt, imu.n, before)
     return ready.run(imu, initial, initial_sd or InitialSd(), events, outputs)

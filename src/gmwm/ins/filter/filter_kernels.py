@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
+from gmwm.ins import tuning
 from gmwm.ins.filter.covariance_kernels import (
+    excess,
     measurement_update,
     propagate,
     tilt_squared,
@@ -22,6 +25,7 @@ IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = 0, 1, 2, 3
 """Kinds of measurements."""
 
 _LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
+_PATIENCE = tuning.GATE_PATIENCE
 _CLEAN_EVERY = 1000  # steps of the covariance: the attitude matrix is brought back to a rotation
 
 
@@ -98,6 +102,16 @@ def residual(
     east = lla[1] - value[1]
     east -= 2.0 * math.pi * math.floor(east / (2.0 * math.pi) + 0.5)
     return (transverse + lla[2]) * math.cos(lla[0]) * east + arm
+
+
+@compiled()
+def noise_state(kind: int, component: int, coloured: IntArray) -> int:
+    """State of the coloured noise of a component of a measurement; -1 for none."""
+    if kind == IS_POSITION:
+        return coloured[component]
+    if kind == IS_HEIGHT:
+        return coloured[3]
+    return -1
 
 
 @compiled()
@@ -206,10 +220,11 @@ def run(
     phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
     noise_off: FloatArray, cross: FloatArray, integral: FloatArray, coloured: IntArray,
     event_epoch: IntArray, event_kind: IntArray, event_offset: FloatArray,
-    event_value: FloatArray, event_sd: FloatArray, lever: FloatArray, second_order: bool,
-    out_epoch: IntArray, out_before: IntArray,
+    event_value: FloatArray, event_sd: FloatArray, event_gate: FloatArray, lever: FloatArray,
+    second_order: bool, out_epoch: IntArray, out_before: IntArray,
     out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
     out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
+    used: npt.NDArray[np.bool_],
 ) -> int:  # fmt: skip
     """Filter a record; returns the epoch at which it diverged, or -1.
 
@@ -228,17 +243,20 @@ def run(
         Range of the states of each sensor.
     axis, ..., integral : ndarray
         As in `gmwm.ins.filter.states.SensorStates`.
-    coloured : (3,) ndarray of int
-        State of the coloured noise of the north, east and down position; -1 for none.
+    coloured : (4,) ndarray of int
+        State of the coloured noise of the north, east and down position and of the barometric
+        height; -1 for none.
     event_epoch, event_kind : (E,) ndarray of int
         Measurements in order of time.
     event_offset : (E,) ndarray
         Times of the measurements less those of their epochs, s.
     event_value, event_sd : (E, 3) ndarray
+    event_gate : (E,) ndarray
+        Normalised innovation squared beyond which a measurement is rejected.
     lever : (3,) ndarray
     second_order : bool
-        Whether the square of the tilt error is allowed for; see
-        `gmwm.ins.filter.covariance_kernels.tilt_squared`.
+        Whether products of errors are allowed for; see
+        `gmwm.ins.filter.covariance_kernels.tilt_squared` and ``excess``.
     out_epoch : (K,) ndarray of int
         Epochs to be kept, in order of time.
     out_before : (K,) ndarray of int
@@ -249,6 +267,8 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         Results; position and velocity, attitude, covariance, sums of sensor states and their
         covariance; innovations of the components, each given those before it, with their standard
         deviation.
+    used : (E,) ndarray of bool
+        Set to False where a measurement was rejected.
     """
     n, m = P.shape[0], x.size
     n_samples, n_events, n_out = rotation.shape[0], event_epoch.size, out_epoch.size
@@ -259,6 +279,8 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     S, T, U = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6))
     row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
     estimated, held = np.zeros(n), np.zeros(m)
+    P_held, estimated_held = np.zeros((n, n)), np.zeros(n)
+    rejected = np.zeros(4, dtype=np.int64)
     C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)
@@ -272,6 +294,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                   out_sensor_P)  # fmt: skip
             out += 1
         measured = of_gnss = False
+        attitude = P[6, 6] + P[7, 7] + P[8, 8] if second_order else 0.0
         if event < n_events and event_epoch[event] == epoch:
             measured = True
             if epoch > 0:
@@ -281,7 +304,6 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                     rate[i] = rotation[0, i] / dt
         while event < n_events and event_epoch[event] == epoch:
             kind = event_kind[event]
-            of_gnss = of_gnss or kind in (IS_POSITION, IS_VELOCITY)
             offset = event_offset[event]
             moved = offset != 0.0 and n_samples > 0
             if moved:
@@ -294,6 +316,15 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                     elif axis[k] >= 3:
                         force_at[axis[k] - 3] -= output[k] * x[k]
                 propagated(C, v, lla, rate_at, force_at, offset, C_at, v_at, lla_at, F, A, B)
+            gated = event_gate[event] < np.inf and (
+                kind == IS_STANDSTILL or rejected[kind] < _PATIENCE
+            )
+            if gated:
+                for j in range(n):
+                    estimated_held[j] = estimated[j]
+                    for k in range(n):
+                        P_held[j, k] = P[j, k]
+            squares = 0.0
             components = 1 if kind == IS_HEIGHT else 3
             for component in range(components):
                 sd = event_sd[event, component]
@@ -311,13 +342,31 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
                 else:
                     measurement_row(kind, component, C, v, rate, lever, h)
                     z = residual(kind, component, event_value[event], C, v, lla, rate, lever)
-                state = -1
-                if kind == IS_POSITION and coloured[component] >= 0:
-                    state = 9 + coloured[component]
-                    z += x[coloured[component]]
-                found, variance = measurement_update(P, h, state, sd * sd, z, estimated, K)
+                state = noise_state(kind, component, coloured)
+                if state >= 0:
+                    z += x[state]
+                    state += 9
+                variance = sd * sd + excess(P, h, attitude)
+                found, variance = measurement_update(P, h, state, variance, z, estimated, K)
                 innovation[event, component] = found
                 innovation_sd[event, component] = math.sqrt(variance)
+                squares += found * found / variance
+            if squares <= event_gate[event]:
+                # As many must agree in a row before an open gate is closed again.
+                rejected[kind] = rejected[kind] - 1 if rejected[kind] > _PATIENCE else 0
+            elif not gated:
+                rejected[kind] = 2 * _PATIENCE
+            else:
+                used[event] = False
+                rejected[kind] += 1
+                if rejected[kind] == _PATIENCE:
+                    rejected[kind] = 2 * _PATIENCE
+                for j in range(n):
+                    estimated[j] = estimated_held[j]
+                    for k in range(n):
+                        P[j, k] = P_held[j, k]
+            if used[event] and kind in (IS_POSITION, IS_VELOCITY):
+                of_gnss = True
             event += 1
         if measured:
             for i in range(m):

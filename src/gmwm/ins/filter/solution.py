@@ -27,12 +27,15 @@ class FilterInnovations:
         Each component given those before it, with the standard deviation that the filter expected;
         so ``value / sd`` is white with unit variance if the filter is right. NaN where a component
         was not measured, or not reached.
+    used : (E,) ndarray of bool
+        False where the measurement was beyond its gate, and was not used.
     """
 
     time: FloatArray
     kind: IntArray
     value: FloatArray
     sd: FloatArray
+    used: np.typing.NDArray[np.bool_]
 
     @property
     def standard(self) -> FloatArray:

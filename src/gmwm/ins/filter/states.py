@@ -9,7 +9,7 @@ covariance, as that of an analogue filter in front of the sampler is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +41,7 @@ class SensorStates:
     partner : (m,) ndarray of int
         The other state of its block; itself if there is none.
     mean : (m,) ndarray
-        Before the first sample.
+        Before the first sample; zero but for drifts that are known.
     covariance : (m, m) ndarray
     phi, phi_off : (k_max + 1, m) ndarray
         ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
@@ -75,8 +75,21 @@ class SensorStates:
         return len(self.names)
 
     @classmethod
-    def of(cls, sensors: SensorModels, dt: float, k_max: int) -> SensorStates:
+    def of(
+        cls, sensors: SensorModels, dt: float, k_max: int, drift_known: bool = False
+    ) -> SensorStates:
         """States of six models at a sampling interval of ``dt`` (s).
+
+        A drift is a constant slope with a standard deviation of its size: how a sensor drifts
+        depends on when it was switched on, and a calibration knows how fast, but not which way.
+
+        Parameters
+        ----------
+        sensors : SensorModels
+        dt : float
+        k_max : int
+        drift_known : bool, optional
+            Whether drifts start at zero and have their slopes exactly, as simulated ones do.
 
         Raises
         ------
@@ -86,11 +99,11 @@ class SensorStates:
         blocks: list[_Block] = []
         white = np.zeros(6)
         for i, axis in enumerate(AXES):
-            blocks += _of_axis(i, axis, sensors, dt, white)
+            blocks += _of_axis(i, axis, sensors, dt, white, drift_known)
         return _assembled(blocks, white, dt, k_max)
 
     def with_markov(
-        self, names: Sequence[str], sigma: FloatArray, tau: float, dt: float
+        self, names: Sequence[str], sigma: FloatArray, tau: FloatArray | float, dt: float
     ) -> SensorStates:
         """These states, and some first-order Gauss-Markov ones that add to no inertial sensor.
 
@@ -99,8 +112,10 @@ class SensorStates:
         names : sequence of str
         sigma : ndarray
             Standard deviation of each.
-        tau, dt : float
-            Correlation time and sampling interval, s.
+        tau : ndarray or float
+            Correlation times, s.
+        dt : float
+            Sampling interval, s.
         """
         k = np.arange(len(self.phi))[:, None]
         extra, zeros = len(names), np.zeros((len(self.phi), len(names)))
@@ -132,7 +147,7 @@ class _Block:
 
 
 def _of_axis(
-    index: int, axis: str, sensors: SensorModels, dt: float, white: FloatArray
+    index: int, axis: str, sensors: SensorModels, dt: float, white: FloatArray, drift_known: bool
 ) -> list[_Block]:
     """Blocks of one sensor; adds its white noise (variance of a sample) to ``white``."""
     blocks = []
@@ -150,6 +165,11 @@ def _of_axis(
         if term.is_walk and bias > 0.0:
             # A constant and a random walk are one state: the walk starts where the constant is.
             form = StateSpace.scalar(form.names[0], 1.0, float(form.process_noise[0, 0]), bias)
+            bias = 0.0
+        if term.is_drift and not drift_known:
+            # A constant and a drift are one block: the drift starts where the constant is.
+            spread = np.diag([bias, term.drift_rate() ** 2])
+            form = replace(form, initial_mean=np.zeros(2), initial_covariance=spread)
             bias = 0.0
         blocks.append(_Block(index, tuple(f"{axis}: {name}" for name in form.names), form))
     if bias > 0.0:

@@ -175,6 +175,7 @@ class _Task:
         truth = scenario.trajectory
         fixes = [(each.kind, each.time, each.value, each.sd) for each in aiding.fixes]
         arms = aiding.lever_arm, aiding.coloured_sd, aiding.coloured_tau
+        arms += aiding.barometer_sd, aiding.barometer_tau, aiding.gate or 0.0
         drawn = _exactly(source.models) if isinstance(source, Simulated) else source
         return {
             "seed": self.seed,

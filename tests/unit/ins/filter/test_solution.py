@@ -17,7 +17,9 @@ def made(time, lla, velocity, matrix):
         time=np.asarray(time), before=np.zeros(k, dtype=bool), lla=lla, velocity=velocity,
         matrix=matrix, covariance=np.tile(np.diag(np.arange(1.0, 10.0) ** 2), (k, 1, 1)),
         sensor_errors=np.zeros((k, 6)), sensor_covariance=np.zeros((k, 6, 6)),
-        innovations=FilterInnovations(np.zeros(0), np.zeros(0, dtype=np.int64), empty, empty),
+        innovations=FilterInnovations(
+            np.zeros(0), np.zeros(0, dtype=np.int64), empty, empty, np.zeros(0, dtype=bool)
+        ),
         state_names=(), states=np.zeros(0), state_covariance=np.zeros((0, 0)),
     )  # fmt: skip
 
@@ -70,7 +72,9 @@ def test_no_epochs_have_no_errors(truth):
 def test_innovations_are_normalised_and_gaps_are_no_zeros():
     value = np.array([[2.0, np.nan, np.nan], [1.0, -2.0, 3.0], [np.nan] * 3])
     sd = np.array([[4.0, np.nan, np.nan], [1.0, 2.0, 1.0], [np.nan] * 3])
-    found = FilterInnovations(np.arange(3.0), np.array([2, 0, 0]), value, sd)
+    found = FilterInnovations(
+        np.arange(3.0), np.array([2, 0, 0]), value, sd, np.ones(3, dtype=bool)
+    )
     np.testing.assert_allclose(found.nis, [0.25, 11.0, np.nan])
     np.testing.assert_array_equal(np.isnan(found.standard), np.isnan(value))
 

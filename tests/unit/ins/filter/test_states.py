@@ -36,10 +36,10 @@ TERMS = [
 IDS = [repr(term) for term in TERMS]
 
 
-def states_of(term, k_max=12, bias=0.0, white=None):
+def states_of(term, k_max=12, bias=0.0, white=None, drift_known=False):
     model = term if white is None else term + WhiteNoise(white)
     models = {"gyro": WhiteNoise(1.0), "accel": WhiteNoise(1.0), "accel_y": model}
-    return SensorStates.of(SensorModels.of(models, {"accel_y": bias}), DT, k_max)
+    return SensorStates.of(SensorModels.of(models, {"accel_y": bias}), DT, k_max, drift_known)
 
 
 def matrices(states, k):
@@ -55,7 +55,7 @@ def matrices(states, k):
 
 @pytest.mark.parametrize("term", TERMS, ids=IDS)
 def test_tables_are_sums_over_samples(term):
-    states, form = states_of(term), term.state_space(DT)
+    states, form = states_of(term, drift_known=True), term.state_space(DT)
     F, Q, h = form.transition, form.process_noise, form.output
     np.testing.assert_array_equal(states.covariance, form.initial_covariance)
     np.testing.assert_array_equal(states.mean, form.initial_mean)
@@ -93,8 +93,18 @@ def test_the_integral_of_simulated_errors_has_the_variance_of_the_tables(term):
     assert np.mean(sums**2) == pytest.approx(expected, rel=4.5 * np.sqrt(2.0 / draws))
 
 
-def test_a_ramp_is_known_and_adds_to_the_mean():
+def test_a_ramp_is_a_slope_that_is_not_known():
+    """What a calibration saw is its size; which way it goes after switching on, nobody knows."""
     states = states_of(RateRamp(-0.4))
+    assert not np.any(states.mean)
+    np.testing.assert_allclose(states.covariance, np.diag([0.0, 0.16]))
+    with_bias = states_of(RateRamp(-0.4), bias=3.0)
+    assert with_bias.m == 2
+    np.testing.assert_allclose(with_bias.covariance, np.diag([9.0, 0.16]))
+
+
+def test_a_ramp_that_is_known_adds_to_the_mean():
+    states = states_of(RateRamp(-0.4), drift_known=True)
     k = 12
     expected = DT * RateRamp(-0.4).simulate(k, DT, 1).sum()
     assert states.gain[k] @ states.mean == pytest.approx(expected)
