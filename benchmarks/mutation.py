@@ -39,8 +39,6 @@ OPERATORS = re.compile(
     "(Lt|Gt|LtE|GtE|Eq|NotEq)$|NumberReplacer|ReplaceUnaryOperator_USub_UAdd|AddNot|"
     "ReplaceTrueWithFalse|ReplaceFalseWithTrue|ReplaceAndWithOr|ReplaceOrWithAnd|ZeroIteration"
 )
-LONGEST = 240.0
-"""s, after which the tests of a change are stopped: it hangs, and is noticed."""
 
 
 @dataclass(frozen=True)
@@ -128,14 +126,14 @@ def tests_of(mutant: Mutant, tree: Path, data: CoverageData) -> list[str]:
     return [name for _, name in sorted(set(found))] or [str(own)]
 
 
-def survives(mutant: Mutant, tree: Path, data: CoverageData) -> bool:
+def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> bool:
     """Whether no test fails."""
     file = tree / mutant.path
     source, stat = file.read_text(), file.stat()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
     try:
         file.write_text(changed)
-        result = pytest(tree, "-m", "pytest", "-x", *tests_of(mutant, tree, data), timeout=LONGEST)
+        result = pytest(tree, "-m", "pytest", "-x", *tests_of(mutant, tree, data), timeout=longest)
     except subprocess.TimeoutExpired:
         return False
     finally:
@@ -150,6 +148,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--mutants", type=int, default=304)
     parser.add_argument("--seed", type=int, default=0)
+    longest = "s, after which the tests of a change are stopped: it hangs, and is noticed"
+    parser.add_argument("--longest", type=float, default=240.0, help=longest)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
     folder = options.output.resolve()
@@ -163,7 +163,7 @@ def main() -> None:
     for mutant in drawn(tree, options.mutants, options.seed):
         key = json.dumps(asdict(mutant))
         if key not in results:
-            results[key] = survives(mutant, tree, data)
+            results[key] = survives(mutant, tree, data, options.longest)
             record.write_text(json.dumps(results))
     report({Mutant(**json.loads(key)): alive for key, alive in results.items()}, tree)
 

@@ -1,5 +1,11 @@
 """What every test runs under."""
 
+import os
+
+# Before numpy is imported: as many workers as cores, each with threads of its own, wait for each
+# other more than they compute.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 from hypothesis import settings
 
 # A suite that fails one day in fifty teaches people to run it again; the bounds of statistical

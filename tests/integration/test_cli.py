@@ -506,7 +506,7 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("calibrate", "--help"), ("health", "f.csv")])
+@pytest.mark.parametrize("arguments", [("--help",), ("health", "f.csv")])
 @pytest.mark.parametrize("what", ["closed", "full", "head"])
 def test_output_that_nobody_takes(tmp_path, arguments, what):
     (tmp_path / "f.csv").write_text("\n".join(good_lines()))

@@ -8,6 +8,8 @@ import pytest
 
 from places import REPOSITORY
 
+pytestmark = pytest.mark.slow  # half a minute; `.ci/run` runs it beside the linters
+
 USER = REPOSITORY / "tests" / "typed_user"
 
 

@@ -1,28 +1,44 @@
 """Names that come from files and command lines: text everywhere, obeyed nowhere."""
 
+import io
 import json
 import os
-import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 
 import gmwm
+from gmwm import cli
 from gmwm.errors import InputError, printable
 from gmwm.export import export
 
 X = np.random.default_rng(0).normal(size=(400, 6))
 
 
-def run(folder, *arguments, **variables):
-    done = subprocess.run(
-        [sys.executable, "-m", "gmwm", *arguments],
-        cwd=folder, capture_output=True, env={**os.environ, **variables},
-    )  # fmt: skip
-    assert b"Traceback" not in done.stderr
-    return done
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run ``gmwm ARGUMENTS`` in the folder of the test, with what a terminal gets as bytes."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments, encoding="utf-8", **variables):
+        streams = {name: io.TextIOWrapper(io.BytesIO(), encoding) for name in ("stdout", "stderr")}
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "argv", ["gmwm", *arguments])
+            for name, value in variables.items():
+                patch.setenv(name, value)
+            for name, stream in streams.items():
+                patch.setattr(sys, name, stream)
+            with pytest.raises(SystemExit) as stop:
+                cli.main()
+        for stream in streams.values():
+            stream.flush()
+        written = {name: stream.buffer.getvalue() for name, stream in streams.items()}
+        return SimpleNamespace(returncode=stop.value.code, **written)
+
+    return _run
 
 
 def recording(path, names=("wx", "wy", "wz", "ax", "ay", "az"), extra="temp [/degC]"):
@@ -58,17 +74,17 @@ def test_a_message_is_not_longer_than_people_read():
     assert len(str(InputError("x" * 5000))) == 800
 
 
-def test_markup_in_a_header_is_shown_as_it_is(tmp_path):
+def test_markup_in_a_header_is_shown_as_it_is(run, tmp_path):
     path = recording(tmp_path / "static.csv", extra="x [/degC][bold]:smile:")
-    done = run(tmp_path, "calibrate", path.name, *OPTIONS, "-o", "out")
+    done = run("calibrate", path.name, *OPTIONS, "-o", "out")
     assert done.returncode == 0, done.stderr
     assert "x [/degC][bold]:smile:" in " ".join(done.stdout.decode().split())
 
 
-def test_escape_codes_of_a_header_do_not_reach_the_terminal(tmp_path):
+def test_escape_codes_of_a_header_do_not_reach_the_terminal(run, tmp_path):
     path = recording(tmp_path / "static.csv", extra="temp\x1b[31mred")
     for command in (("health", path.name), ("calibrate", path.name, "-o", "out")):
-        done = run(tmp_path, command[0], command[1], *OPTIONS[:6], *command[2:])
+        done = run(command[0], command[1], *OPTIONS[:6], *command[2:])
         assert done.returncode == 0, done.stderr
         assert b"\x1b" not in done.stdout + done.stderr
     assert b"\x1b" not in (tmp_path / "out" / "report.html").read_bytes()
@@ -88,44 +104,42 @@ def test_names_inject_nothing_into_yaml(tmp_path):
     assert len(path.read_text().splitlines()) == len(path.read_bytes().split(b"\n")) - 1
 
 
-def test_a_file_name_that_is_not_utf8(tmp_path):
+def test_a_file_name_that_is_not_utf8(run, tmp_path):
     name = os.fsdecode(b"stat\xff\x1b[31mic.csv")
     recording(tmp_path / name)
-    done = run(tmp_path, "calibrate", name, *OPTIONS, "-o", "out")
+    done = run("calibrate", name, *OPTIONS, "-o", "out")
     assert done.returncode == 0, done.stderr
     assert b"stat\\udcff" in done.stdout
     assert b"\x1b" not in done.stdout
     assert gmwm.load(tmp_path / "out" / "calibration.json").source == "stat\\udcff\\x1b[31mic.csv"
-    done = run(tmp_path, "calibrate", os.fsdecode(b"no\xff.csv"), *OPTIONS)
+    done = run("calibrate", os.fsdecode(b"no\xff.csv"), *OPTIONS)
     assert done.returncode == 2
     assert done.stderr.startswith(b"gmwm: no\\udcff.csv does not exist")
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_a_terminal_that_lacks_letters(tmp_path, encoding):
+def test_a_terminal_that_lacks_letters(run, tmp_path, encoding):
     recording(tmp_path / "Größe²Ω.csv", extra="température Ω")
-    done = run(
-        tmp_path, "calibrate", "Größe²Ω.csv", *OPTIONS, "-o", "out", PYTHONIOENCODING=encoding
-    )
+    done = run("calibrate", "Größe²Ω.csv", *OPTIONS, "-o", "out", encoding=encoding)
     assert done.returncode == 0, done.stderr
     assert "\\u03a9" in done.stdout.decode(encoding)
 
 
-def test_no_memory_is_a_sentence(tmp_path):
+def test_no_memory_is_a_sentence(run, tmp_path):
     recording(tmp_path / "static.csv")
-    done = run(tmp_path, "calibrate", "static.csv", *OPTIONS, GMWM_MEMORY="1e-6")
+    done = run("calibrate", "static.csv", *OPTIONS, GMWM_MEMORY="1e-6")
     assert done.returncode == 2
     assert b"may be used" in done.stderr
     assert done.stderr.count(b"\n") == 1
 
 
-def test_a_pipe_is_refused(tmp_path):
+def test_a_pipe_is_refused(run, tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
-    done = run(tmp_path, "calibrate", "pipe.csv", *OPTIONS)
+    done = run("calibrate", "pipe.csv", *OPTIONS)
     assert done.returncode == 2
     assert b"pipe.csv is a pipe or a device: write its content to a file first" in done.stderr
     for name in ("pipe.csv", "/dev/zero"):
-        done = run(tmp_path, "budget", name)
+        done = run("budget", name)
         assert done.returncode == 2
         assert b"is a pipe or a device" in done.stderr
 
@@ -135,22 +149,22 @@ def test_a_pipe_is_refused(tmp_path):
     ["!!float x", "!!bool 2", "!!timestamp x", "!!binary '='", "!!null 3", "!!map [1]", "!!omap 3",
      "!!set [a]", "1.0e+999", ".nan", "2001-13-45", "9" * 5000],
 )  # fmt: skip
-def test_values_of_a_study_that_are_none(tmp_path, text):
+def test_values_of_a_study_that_are_none(run, tmp_path, text):
     (tmp_path / "study.yaml").write_text(
         f"trajectory: car\nduration: {text}\ntruth: x\nfilters: {{}}\n"
     )
-    done = run(tmp_path, "navigate", "study.yaml")
+    done = run("navigate", "study.yaml")
     assert done.returncode == 2, done.stdout
     assert done.stderr.startswith(b"gmwm: study.yaml: ")
     assert done.stderr.count(b"\n") == 1
     assert len(done.stderr) < 400
 
 
-def test_a_document_of_aliases_is_not_written_out(tmp_path):
+def test_a_document_of_aliases_is_not_written_out(run, tmp_path):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 12)]
     (tmp_path / "study.yaml").write_text("\n".join([*lines, "trajectory: *a11", ""]))
-    done = run(tmp_path, "navigate", "study.yaml")
+    done = run("navigate", "study.yaml")
     assert done.returncode == 2
     assert len(done.stderr) < 400
 

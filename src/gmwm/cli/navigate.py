@@ -21,7 +21,8 @@ _NEEDED = (
     "navigate --help)"
 )
 
-_READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time"}
+_READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
+            "start": "--imu-start"}  # fmt: skip
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 
 
@@ -58,6 +59,23 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
               help="m, from the IMU to the antenna: forward, right, down.")  # fmt: skip
 @click.option("--heading", type=float,
               help="deg, at the first fix; by default from GNSS once it moves.")  # fmt: skip
+@click.option("--attitude", metavar="ROLL,PITCH,YAW",
+              help="deg, at the first fix, of a record that begins in motion; by default from the "
+                   "data.")  # fmt: skip
+@click.option(
+    "--imu-start",
+    type=float,
+    metavar="S",
+    help="Time of the first IMU sample, without time stamps, on the clock of the fixes.",
+)
+@click.option("--barometer", metavar="FILE", help="Barometric heights: time, height.")
+@click.option(
+    "--zero-velocity",
+    metavar="VALUE",
+    help="Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'.",
+)
+@click.option("--gate", type=float, metavar="P",
+              help="Reject fixes whose innovation is less likely, e.g. 1e-5.")  # fmt: skip
 @click.option(
     "--gyro-bias",
     metavar="VALUE",
@@ -86,6 +104,11 @@ def navigate(
     outage_length: str | None,
     lever_arm: str | None,
     heading: float | None,
+    attitude: str | None,
+    imu_start: float | None,
+    barometer: str | None,
+    zero_velocity: str | None,
+    gate: float | None,
     gyro_bias: str | None,
     accel_bias: str | None,
     as_json: bool,
@@ -123,6 +146,7 @@ def navigate(
     data = _given_data(imu, gnss_fixes, sensors, lever_arm, heading, gyro_bias, accel_bias)
     if outage_length is not None:
         data["outages"] = _length(outage_length)
+    data |= _given_aiding(attitude, barometer, zero_velocity, gate)
     if file is None and not options and not data:
         raise InputError(_NEEDED)
     content: dict[str, Any] = {} if file is None else read_document(file)
@@ -131,6 +155,8 @@ def navigate(
     # Where options were given too, what is wrong may be theirs.
     place = None if options or data else file
     reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
+    if imu_start is not None:
+        reading["start"] = imu_start
     if _OF_DATA.isdisjoint(content):
         if as_json or outage_length is not None:
             raise InputError(
@@ -268,11 +294,24 @@ def _given_data(
     return found
 
 
-def _three(name: str, text: str) -> list[float]:
+def _given_aiding(
+    attitude: str | None, barometer: str | None, zero_velocity: str | None, gate: float | None
+) -> dict[str, Any]:
+    """The options of what else aids the filter, as the file would have them."""
+    found: dict[str, Any] = {"zero_velocity": zero_velocity, "gate": gate}
+    if attitude is not None:
+        angles = _three("--attitude", attitude, "ROLL,PITCH,YAW in degrees, e.g. 2,-1,135")
+        found["attitude"] = [f"{angle!r} deg" for angle in angles]
+    if barometer is not None:
+        found["barometer"] = _absolute(barometer)
+    return {name: each for name, each in found.items() if each is not None}
+
+
+def _three(name: str, text: str, form: str = "X,Y,Z in metres, e.g. 0.5,0,-1.2") -> list[float]:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"{name} {text}: write X,Y,Z in metres, e.g. 0.5,0,-1.2") from None
+        raise InputError(f"{name} {text}: write {form}") from None
     return [x, y, z]
 
 

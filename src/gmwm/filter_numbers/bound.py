@@ -13,10 +13,8 @@ from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
-from gmwm.filter_numbers.dominance import KINDS, Problem, dominating
-from gmwm.filter_numbers.region import region_targets
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
-from gmwm.filter_numbers.target import Target
+from gmwm.filter_numbers.spectra import KINDS, Problem, Target, dominating, region_targets
 from gmwm.process import Model
 
 

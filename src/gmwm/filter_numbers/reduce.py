@@ -14,9 +14,8 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
 from gmwm.filter_numbers.bound import about, predicted
-from gmwm.filter_numbers.dominance import Problem, with_correlation_times
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
-from gmwm.filter_numbers.target import Target
+from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
 from gmwm.process import Model
 
 _TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}

@@ -28,6 +28,9 @@ GATE_PATIENCE = 5
 """Rejections in a row after which the filter is more likely wrong than the fixes: of 3 % outliers,
 five in a row come once in 40 million."""
 
+BAROMETER_SD = 0.5
+"""m, of one height of a barometer: a few Pa of noise and gusts."""
+
 BAROMETER = (10.0, 3600.0)
 """m and s: how far the height of a pressure is off once it is set at the start, and for how long;
 weather changes it by some hPa, 8 m each, in hours."""
@@ -36,8 +39,15 @@ TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
 """Of a bias from one switching on to the next, which a static calibration cannot know, where nobody
 specifies better: rad/s, m/s^2."""
 
+LONGEST_FILLED = 0.1
+"""s of missing IMU samples that are filled along a straight line: short against a manoeuvre."""
+
 SPECIFIC_FORCE = (0.5, 2.0)
 """Of standard gravity: mean specific force of a record, beyond which its unit is wrong."""
+
+ZERO_VELOCITY = (2.0, 1.0)
+"""How many times as much an IMU may scatter as where the vehicle stood at the start to count as at
+rest, and the length that is looked at, s: engines and roads shake it by far more."""
 
 # -- alignment ------------------------------------------------------------------------------------
 
@@ -53,6 +63,15 @@ STEADY = (0.01, 0.15)
 
 SEARCHED = 300.0
 """s from the start in which steady motion and a course are looked for."""
+
+MOTION_LEAST, MOTION_MOST = 10.0, 120.0
+"""s of motion to find an attitude by: less has little change of velocity, more lets gyros drift."""
+
+MOTION_SD = math.radians(10.0)
+"""rad of heading, beyond which it is not found: a filter is linear up to some 10 deg."""
+
+ATTITUDE_SD = math.radians(1.0)
+"""rad, of an attitude that is given without one."""
 
 SIGMAS = 5.0
 """Standard deviations within which a mean or velocity counts as zero: one false in two million."""
@@ -91,6 +110,9 @@ LOST = 5.0
 
 MOSTLY_FINE = 1.5
 """NIS by the median, below which a few outliers make the mean large."""
+
+OUTAGES_SHOWN = 6
+"""Times without fixes that a report draws, the longest ones: more make it long."""
 
 # -- faults of a log -------------------------------------------------------------------------------
 

@@ -14,7 +14,15 @@ from gmwm.plotting.deviation import (
     straight_lines,
     trace,
 )
-from gmwm.plotting.navigation import errors, growth, innovations, literal, measured_track, track
+from gmwm.plotting.navigation import (
+    errors,
+    growth,
+    innovations,
+    literal,
+    measured_outage,
+    measured_track,
+    track,
+)
 
 __all__ = [
     "COMPONENT_COLOURS",
@@ -30,6 +38,7 @@ __all__ = [
     "growth",
     "innovations",
     "literal",
+    "measured_outage",
     "measured_track",
     "residuals",
     "straight_lines",

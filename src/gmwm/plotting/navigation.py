@@ -243,6 +243,51 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     return figure
 
 
+def measured_outage(
+    *, track: FloatArray, without: FloatArray, fixes: FloatArray, time: FloatArray, sd: FloatArray,
+    fix_time: FloatArray, error: FloatArray,
+) -> Figure:  # fmt: skip
+    """A time without fixes: its track, and errors of three components with their bands.
+
+    Parameters
+    ----------
+    track, without, fixes : (n, 2), (j, 2), (k, 2) ndarray
+        East and north, m: of the solution, of its part without fixes, and of the fixes.
+    time : (n,) ndarray
+        Of the solution, s.
+    sd : (n, 3) ndarray
+        Predicted standard deviations to the north, east and down, m.
+    fix_time : (e,) ndarray
+        s.
+    error : (e, 3) ndarray
+        Fixes less where they were expected, m.
+    """
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.6), layout="constrained")
+    ax = axes[0, 0]
+    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=4, label="fixes")
+    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
+            label="without fixes")  # fmt: skip
+    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel("east [m]")
+    ax.set_ylabel("north [m]")
+    ax.legend(fontsize="x-small")
+    _plain(ax)
+    for i, (ax, name) in enumerate(zip((axes[0, 1], axes[1, 0], axes[1, 1]),
+                                       ("north", "east", "down"), strict=True)):  # fmt: skip
+        ax.fill_between(time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0,
+                        label="1 sigma predicted")  # fmt: skip
+        ax.plot(fix_time, error[:, i], ".", color=COMPONENT_COLOURS[1], markersize=5,
+                label="fix less expected")  # fmt: skip
+        ax.set_title(f"{name} [m]", fontsize="medium")
+        ax.set_xlabel("s since the last fix")
+        _plain(ax)
+    axes[0, 1].legend(fontsize="x-small", loc="upper left")
+    return figure
+
+
 def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> Figure:
     """Innovations of three components with the bands of 1 and 3 sigma that a filter expected.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from inspect import Signature, signature
 from typing import Any, ClassVar, Self
@@ -82,6 +83,7 @@ class Process:
     """Whether `state_space`, where there is one, is exact."""
 
     _constructor: ClassVar[Signature] = Signature()
+    _accepted: ClassVar[tuple[str, ...]] = ()  # names of its arguments
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -93,14 +95,17 @@ class Process:
         }
         cls.parameters = tuple(declared.values())
         cls._constructor = signature(cls.__init__)
+        cls._accepted = tuple(cls._constructor.parameters)[1:]
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         # A constructor that names its parameters would answer with a TypeError.
-        try:
-            cls._constructor.bind_partial(None, *args, **kwargs)
-        except TypeError as error:
-            names = ", ".join([*cls._constructor.parameters][1:]) or "none"
-            raise InputError(f"{cls.__name__}: {error}, its parameters are {names}") from None
+        names = cls._accepted
+        if len(args) > len(names) or not kwargs.keys() <= set(names[len(args) :]):
+            try:
+                cls._constructor.bind_partial(None, *args, **kwargs)
+            except TypeError as error:
+                listed = ", ".join(names) or "none"
+                raise InputError(f"{cls.__name__}: {error}, its parameters are {listed}") from None
         return super().__new__(cls)
 
     def __init__(self, *args: float | None, **kwargs: float | None) -> None:
@@ -126,14 +131,15 @@ class Process:
 
     def _checked(self, parameter: Parameter, value: Any) -> float:
         where = f"{type(self).__name__}: {parameter.name}"
-        wrong = f"{where} is {checks.shown(value)}: give a number, or None to estimate"
-        if isinstance(value, str):
-            raise InputError(wrong)
         try:
+            if isinstance(value, str):
+                raise TypeError
             number = float(value)
         except (TypeError, ValueError, OverflowError):
-            raise InputError(wrong) from None
-        if not np.isfinite(number) or not parameter.admits(number):
+            raise InputError(
+                f"{where} is {checks.shown(value)}: give a number, or None to estimate"
+            ) from None
+        if not math.isfinite(number) or not parameter.admits(number):
             raise InputError(
                 f"{where} = {number:g} is out of range: it must lie in "
                 f"({parameter.lower:g}, {parameter.upper:g})"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import gmwm
 from gmwm._core.files import written
-from gmwm.ins.field import Comparison, Navigated
+from gmwm.ins.field import Comparison, Navigated, outage_pictures
 from gmwm.report.page import rendered
 from gmwm.report.validation import svg
 
@@ -32,6 +32,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         version=gmwm.__version__,
         verdict=navigated.verdict.text,
         track=svg(navigated.plot_track()),
+        outages=[(title, svg(figure)) for title, figure in outage_pictures(navigated)],
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
         summary=str(navigated),

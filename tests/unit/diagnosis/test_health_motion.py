@@ -62,8 +62,10 @@ def moved(record):
     return _moved
 
 
-@pytest.mark.parametrize(("seed", "only"), [(0, ""), (1, ""), (2, "gyro")])
-@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.6, 0, 0.8)])
+@pytest.mark.parametrize(
+    ("seed", "only", "axis"),
+    [(0, "", (0, 0, 1)), (1, "", (1, 0, 0)), (2, "gyro", (0, 0, 1)), (3, "gyro", (0.6, 0, 0.8))],
+)
 def test_a_turn_and_the_stretches_before_and_after(moved, seed, only, axis):
     found = gmwm.health(moved(turn(30_000, 100, 200, 60.0, axis), seed, only=only))
     assert [n.code for n in found.notices if n.severity == "bad"] == ["not-static"]

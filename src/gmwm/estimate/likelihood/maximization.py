@@ -125,7 +125,7 @@ def _(process: GaussMarkov, like: Process, m: StateMoments, dt: float) -> Proces
                 size = float(loss(delta))
                 return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / variance / size)
 
-        delta = _best_root(condition, log_likelihood, 1.0 - phi)
+        delta = _best_root(condition, log_likelihood, min(1.0 - phi, _FASTEST))
         process = process.with_values(tau=float(-dt / np.log1p(-delta)))
     else:
         delta = 1.0 - phi

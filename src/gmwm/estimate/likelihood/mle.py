@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -139,7 +139,12 @@ def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Proc
         tilt = gradient(exact, z, alone) - gradient(spectral, z, alone)
         objective = _tilted(objective_of(whittle, coordinates, processes), z, tilt)
         found = maximise(objective, z, information)
-        processes = coordinates.processes(found.z, processes)
+        reached = coordinates.processes(found.z, processes)
+        if not np.isfinite(defined(KalmanLikelihood(columns), reached)):
+            # Along what the data hardly know, only the exact likelihood ends the climb.
+            found = replace(found, z=z, converged=False)
+            break
+        processes = reached
         if np.all(np.abs(found.z - z) < tuning.PREWHITENING_SETTLED * deviation):
             break
     observed = observed_information(objective, found.z, information)

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import leastsq
 
 from gmwm._core.typing import FloatArray
 from gmwm.estimate.moments.design import Design
@@ -37,6 +38,16 @@ class Point:
     shapes: Sequence[Shape]
     x: FloatArray
     objective: float
+
+
+class _Place(NamedTuple):
+    """What is known where residuals were asked for."""
+
+    z: FloatArray
+    shapes: Sequence[Shape]
+    curves: FloatArray
+    x: FloatArray
+    residual: FloatArray
 
 
 class Profile:
@@ -76,14 +87,21 @@ class Profile:
         template = start.shapes
         owners = design.owners()
 
+        visited: list[_Place] = []
+
+        def at(z: FloatArray) -> _Place:
+            # The Jacobian is asked for where the residuals were.
+            if not visited or not np.array_equal(visited[-1].z, z):
+                shapes = design.unpack(np.clip(z, low, high), template)
+                curves = design.curves(shapes)
+                visited[:] = [_Place(z.copy(), shapes, curves, *self.amplitudes(curves))]
+            return visited[-1]
+
         def residual(z: FloatArray) -> FloatArray:
-            shapes = design.unpack(np.clip(z, low, high), template)
-            return -self.amplitudes(design.curves(shapes))[1]
+            return -at(z).residual
 
         def jacobian(z: FloatArray) -> FloatArray:
-            shapes = design.unpack(np.clip(z, low, high), template)
-            curves = design.curves(shapes)
-            x, _ = self.amplitudes(curves)
+            _, shapes, curves, x, _ = at(z)
             weighted = self.root @ curves[:, list(design.linear)][:, x > 0.0]
             slope = self.root @ design.shape_derivatives(shapes)
             slope *= design.amplitudes(x)[owners]
@@ -94,9 +112,9 @@ class Profile:
 
         if z0.size > self.target.size:
             return self.at(start.shapes)
-        found = least_squares(
-            residual, z0, jac=jacobian, method="lm", xtol=1e-7, ftol=1e-9, gtol=1e-9,
-            max_nfev=_MAX_EVALUATIONS,
-        )  # fmt: skip
-        point = self.at(design.unpack(np.clip(found.x, low, high), template))
+        found = leastsq(
+            residual, z0, Dfun=jacobian, xtol=1e-7, ftol=1e-9, gtol=1e-9,
+            maxfev=_MAX_EVALUATIONS, full_output=True,
+        )[0]  # fmt: skip
+        point = self.at(design.unpack(np.clip(found, low, high), template))
         return point if point.objective <= start.objective else start

@@ -14,7 +14,7 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.problem import Scales, solve_nonnegative, weight_root
+from gmwm.estimate.problem import Scales, objectives_with, solve_nonnegative, weight_root
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -96,14 +96,11 @@ def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
     design = profile.design
     matrix, y = _columns(profile, shapes)
     candidates = profile.root @ design.grid_curves(i)
-    objective = np.empty(candidates.shape[1])
-    for g in range(candidates.shape[1]):
-        column = candidates[:, g]
-        if i in design.linear:
-            residual = solve_nonnegative(np.column_stack([matrix, column]), y)[1]
-        else:
-            residual = solve_nonnegative(matrix, y - column)[1]
-        objective[g] = residual @ residual
+    if i in design.linear:
+        objective = objectives_with(matrix, candidates, y)
+    else:
+        residuals = [solve_nonnegative(matrix, y - column)[1] for column in candidates.T]
+        objective = np.array([residual @ residual for residual in residuals])
     filled = list(shapes)
     filled[i] = design.grid(i)[int(np.argmin(objective))]
     return _present(profile, filled)

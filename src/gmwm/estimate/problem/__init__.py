@@ -7,6 +7,7 @@ from gmwm.estimate.problem.information import (
     slope_dof,
     spectral_information,
 )
+from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
 from gmwm.estimate.problem.parameters import (
     Coordinates,
     Term,
@@ -27,7 +28,7 @@ from gmwm.estimate.problem.ramp import (
 from gmwm.estimate.problem.scales import Scales
 from gmwm.estimate.problem.simulation import Simulation
 from gmwm.estimate.problem.targets import FittedMoments, Moments
-from gmwm.estimate.problem.whitening import chi_square, solve_nonnegative, weight_root
+from gmwm.estimate.problem.whitening import chi_square, weight_root
 
 __all__ = [
     "Coordinates",
@@ -48,6 +49,7 @@ __all__ = [
     "gls_slope",
     "in_model_order",
     "keys_by_term",
+    "objectives_with",
     "ols_slope",
     "shape_of",
     "slope_dof",

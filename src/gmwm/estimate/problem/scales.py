@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.problem.simulation import Simulation
@@ -40,6 +41,7 @@ class Scales:
     wavelet: str = "haar"
     simulation: Simulation = _USUAL
     simulate_all: bool = False
+    _steady: dict[Process, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, wv: WaveletVariance) -> Scales:
@@ -57,7 +59,12 @@ class Scales:
         """That of a process at another shape and unit amplitude, u^2, (J,)."""
         if self.is_simulated(process):
             return self.curve(process.at_unit(shape))
-        return process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
+        if shape:
+            return process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
+        if process not in self._steady:
+            found = process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
+            self._steady[process] = frozen(found)
+        return self._steady[process]
 
     def is_simulated(self, process: Process) -> bool:
         """Whether its curve is found by simulation."""

@@ -1,9 +1,8 @@
-"""Residuals by their covariance: whitened, as a chi-square, and least squares of them."""
+"""Residuals by their covariance: whitened, and as a chi-square."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from gmwm._core.typing import FloatArray
 
@@ -33,14 +32,3 @@ def chi_square(
     standard = (root - expected) / np.sqrt(share)
     whitened = weight_root(covariance / np.outer(scale, scale)) @ standard
     return standard, float(whitened @ whitened)
-
-
-def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Non-negative least squares with columns brought to unit length; amplitudes and residuals."""
-    if columns.shape[1] == 0:
-        return np.zeros(0), y
-    length = np.sqrt(np.sum(columns * columns, axis=0))
-    length[length == 0.0] = 1.0
-    unit = columns / length
-    scaled, _ = nnls(unit, y)
-    return scaled / length, y - unit @ scaled

@@ -14,6 +14,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
+from gmwm.ins.field.in_motion import attitude_in_motion, velocities
 from gmwm.ins.filter import Aiding, Fixes, InitialSd
 from gmwm.ins.geometry import (
     RATE,
@@ -60,6 +61,8 @@ def align(
     models: SensorModels,
     heading: float | None = None,
     heading_sd: float = tuning.HEADING_SD,
+    attitude: FloatArray | None = None,
+    attitude_sd: float = tuning.ATTITUDE_SD,
 ) -> Alignment:
     """Find an initial state in the data.
 
@@ -75,6 +78,11 @@ def align(
         GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros show it.
     heading_sd : float, optional
         How well a given heading is known, rad.
+    attitude : (3,) ndarray, optional
+        Roll, pitch and yaw at the first fix, rad. By default the vehicle is levelled while it is
+        steady; if it never is, the attitude follows from how its velocity changes.
+    attitude_sd : float, optional
+        How well a given attitude is known, rad, each axis.
 
     Returns
     -------
@@ -83,10 +91,16 @@ def align(
     Raises
     ------
     InputError
-        If there is no fix, no steady stretch to level by, or no way to know the heading.
+        If there is no fix, no steady stretch or acceleration to level by, or no way to know the
+        heading.
     """
     positions = _positions(aiding)
-    first, last = _steady(imu)
+    if attitude is not None:
+        return _given(imu, aiding, np.asarray(attitude, dtype=float), attitude_sd)
+    steady = _steady(imu)
+    if steady is None:
+        return _in_motion(imu, aiding, models)
+    first, last = steady
     still, velocity, velocity_sd = _motion(aiding, imu.dt, first, last)
     mean = np.concatenate([np.mean(imu.rotation[first:last], axis=0),
                            np.mean(imu.velocity[first:last], axis=0)]) / imu.dt  # fmt: skip
@@ -165,13 +179,58 @@ def _positions(aiding: Aiding) -> Fixes:
     return found
 
 
-def _steady(imu: Imu) -> tuple[int, int]:
+def _given(imu: Imu, aiding: Aiding, attitude: FloatArray, sd: float) -> Alignment:
+    """A start at the first fix with an attitude that is given."""
+    shown = ", ".join(f"{each:.2f}" for each in np.degrees(attitude))
+    text = f"roll, pitch and yaw as given: {shown} deg, 1 sigma {np.degrees(sd):.2g} deg"
+    notice = Notice("attitude-given", "note", "", text, {"attitude": attitude.tolist(), "sd": sd})
+    epoch, fix = _starting_fix(_positions(aiding), imu.dt, 0)
+    return _moving(imu, aiding, epoch, fix, matrix_from_rpy(attitude), (sd, sd), notice)
+
+
+def _in_motion(imu: Imu, aiding: Aiding, models: SensorModels) -> Alignment:
+    """A start at the first fix with an attitude from how the velocity changes."""
+    positions = _positions(aiding)
+    epoch, fix = _starting_fix(positions, imu.dt, 0)
+    constant = [
+        float(np.hypot(_bias(models, kind), _mean_sd(models, kind, tuning.MOTION_LEAST, imu.dt)))
+        for kind in ("gyro", "accel")
+    ]
+    C, sd = attitude_in_motion(
+        imu, epoch, velocities(positions, _of_kind(aiding, "velocity")), positions.value[fix],
+        np.asarray(aiding.lever_arm, dtype=float), constant[0], constant[1],
+    )  # fmt: skip
+    tilt, heading = float(np.max(sd[:2])), float(sd[2])
+    roll, pitch, yaw = np.degrees(rpy_from_matrix(C))
+    text = (
+        f"aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw {yaw % 360.0:.2f} deg, "
+        f"1 sigma {np.degrees(tilt):.2g} deg of tilt and {np.degrees(heading):.2g} of heading"
+    )
+    notice = Notice("aligned-in-motion", "note", "", text, {"tilt": tilt, "heading": heading})
+    return _moving(imu, aiding, epoch, fix, C, (tilt, heading), notice)
+
+
+def _moving(
+    imu: Imu, aiding: Aiding, epoch: int, fix: int, C: FloatArray, sd: tuple[float, float],
+    notice: Notice,
+) -> Alignment:  # fmt: skip
+    """A start at a fix in motion: nothing is known of the gyros' bias."""
+    positions = _positions(aiding)
+    velocity, velocity_sd = _first_velocity(aiding, epoch, imu.dt)
+    later = velocity * (epoch * imu.dt - positions.time[fix])
+    place = offset(positions.value[fix], later - C @ np.asarray(aiding.lever_arm))
+    known = InitialSd(
+        position=float(np.sqrt(np.mean(positions.sd[fix] ** 2))),
+        velocity=velocity_sd, tilt=sd[0], heading=sd[1],
+    )  # fmt: skip
+    state = NavState(place, velocity, rpy_from_matrix(C))
+    return Alignment(epoch, state, known, np.zeros(3), None, (notice,))
+
+
+def _steady(imu: Imu) -> tuple[int, int] | None:
     """First stretch in which means over a window stay near the first one: rest, or steady motion.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    ``None`` if there is none.
     """
     window = max(round(tuning.STEADY_WINDOW / imu.dt), 1)
     count = min(imu.n, round(tuning.SEARCHED / imu.dt)) // window
@@ -193,10 +252,7 @@ def _steady(imu: Imu) -> tuple[int, int]:
         if end - begin >= least:
             return begin * window, end * window
         begin = end
-    raise InputError(
-        f"the IMU is steady for {tuning.STEADY_LEAST:g} s nowhere in the first "
-        f"{tuning.SEARCHED:g} s: begin the record where the vehicle stands still, to level by it"
-    )
+    return None
 
 
 def _scatter(windows: FloatArray, dt: float) -> FloatArray:
@@ -370,6 +426,37 @@ def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> flo
 def _stationary(models: SensorModels, axis: str, dt: float) -> float:
     form = models.models[axis].state_space(dt)
     return float(form.output @ form.initial_covariance @ form.output)
+
+
+def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
+    """Standstills wherever the IMU is as quiet as where the vehicle stood at first.
+
+    ``None`` if it stands nowhere at the start. Motion as quiet as that is taken for rest too; the
+    filter rejects what contradicts it.
+
+    Parameters
+    ----------
+    imu : Imu
+    aiding : Aiding
+    sd : float
+        Of the velocity of a vehicle at rest, m/s.
+    """
+    steady = _steady(imu)
+    if steady is None or not _motion(aiding, imu.dt, *steady)[0]:
+        return None
+    quieter, length = tuning.ZERO_VELOCITY
+    window = max(round(length / imu.dt), 2)
+    samples = np.hstack([imu.rotation, imu.velocity])[: imu.n // window * window] / imu.dt
+    windows = samples.reshape(-1, window, 6)
+    mean, scatter = windows.mean(axis=1), windows.std(axis=1)
+    first, last = (-(-steady[0] // window), steady[1] // window)
+    rest = slice(first, max(last, first + 1))
+    level, usual = mean[rest].mean(axis=0), np.sqrt(np.mean(scatter[rest] ** 2, axis=0))
+    slow = np.abs(mean[:, :3] - level[:3]) <= tuning.STEADY[0]
+    still = np.all(scatter <= quieter * usual, axis=1) & np.all(slow, axis=1)
+    time = (np.flatnonzero(still) + 1) * window * imu.dt
+    zeros = np.zeros((time.size, 3))
+    return Fixes("standstill", time, zeros, zeros + sd)
 
 
 def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding]:

@@ -24,7 +24,8 @@ _LOOKED_AT = 1 << 16  # bytes
 _NAMES = {"sdn(m)": "sd_north", "sde(m)": "sd_east", "sdu(m)": "sd_up", "vn(m/s)": "velocity_north",
           "ve(m/s)": "velocity_east", "vu(m/s)": "velocity_up", "sdvn": "sd_velocity_north",
           "sdve": "sd_velocity_east", "sdvu": "sd_velocity_up", "latitude(deg)": "latitude_deg",
-          "longitude(deg)": "longitude_deg", "height(m)": "height_m"}  # fmt: skip
+          "longitude(deg)": "longitude_deg", "height(m)": "height_m",
+          "ns": "satellites"}  # fmt: skip
 """Columns of RTKLIB; others keep their names."""
 
 

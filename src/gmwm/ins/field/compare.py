@@ -321,7 +321,10 @@ def _replay(measured: Measured, source: Any) -> Replay:
     models, usual = SensorModels.of(source), measured.sensors.bias_sd
     bias = {axis: each or usual[axis] for axis, each in models.bias_sd.items()}
     own = replace(measured, sensors=replace(models, bias_sd=bias))
-    alignment = align(own.imu, own.aiding, own.sensors, own.heading, own.heading_sd)
+    alignment = align(
+        own.imu, own.aiding, own.sensors, own.heading, own.heading_sd, own.attitude,
+        own.attitude_sd,
+    )  # fmt: skip
     return Replay.of(own, alignment)
 
 

@@ -13,6 +13,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
+from gmwm.ins.field.calendar import in_seconds
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.logs import (
     POSITION_WORDS,
@@ -111,9 +112,10 @@ def read_fixes(
     Parameters
     ----------
     path : str or path
-        Delimited text, plain or gzip, with columns time, latitude, longitude and height, and where
-        there are any ``velocity_north``, ``velocity_east``, ``velocity_down`` (or ``_up``), and
-        standard deviations: ``sd_north``, ``sd_east``, ``sd_down`` (m; or ``latitude_sd`` ...) and
+        Delimited text, plain or gzip, or a solution of RTKLIB (.pos), with columns time (seconds,
+        or dates in ISO 8601), latitude, longitude and height, and where there are any
+        ``velocity_north``, ``velocity_east``, ``velocity_down`` (or ``_up``), and standard
+        deviations: ``sd_north``, ``sd_east``, ``sd_down`` (m; or ``latitude_sd`` ...) and
         ``sd_velocity_north`` ... (m/s). Units stand at the end (``latitude_deg``); without one,
         angles are in degrees if a latitude is beyond pi/2. Empty fields are epochs without a fix.
     start : float, optional
@@ -137,7 +139,11 @@ def read_fixes(
 
 def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     """Read GNSS fixes on the receiver's own clock; see `read_fixes`."""
-    table = open_log(Path(path))
+    with in_seconds(Path(path)) as (numbers, scale):
+        return _read(open_log(numbers), scale)
+
+
+def _read(table: CsvTable, scale: str) -> FixLog:
     columns, unused = _columns(table)
     values = table.load(sorted(set(columns.values())))
     found = {name: values[column] for name, column in columns.items()}
@@ -147,6 +153,9 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     if all(name in found for name in _VELOCITY):
         velocity = np.stack([found[name] for name in _VELOCITY], axis=1)
     notices = []
+    if scale:
+        text = f"dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds"
+        notices.append(Notice("dates", "note", "", text, {"scale": scale}))
     if unused:
         text = f"columns not used: {', '.join(unused)}"
         notices.append(Notice("columns-unused", "note", "", text, {"columns": ", ".join(unused)}))
@@ -167,6 +176,35 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         source=table.source,
         notices=tuple(notices),
     )
+
+
+def read_heights(path: str | os.PathLike[str]) -> tuple[str, FloatArray, FloatArray]:
+    """Read heights of a barometer.
+
+    Parameters
+    ----------
+    path : str or path
+        Delimited text with columns time and height.
+
+    Returns
+    -------
+    source : str
+    time, height : (E,) ndarray
+        s and m; NaN where there is none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
+    with in_seconds(Path(path)) as (numbers, _):
+        table = open_log(numbers)
+        columns, _ = find_columns(table, _quantities, (TIME, "height"), "time_s,height_m")
+        values = table.load(sorted({columns[TIME], columns["height"]}))
+    _check_clock(table, columns[TIME], values[columns[TIME]])
+    unit = stated_seconds(table.source, table.names[columns[TIME]]) or 1.0
+    height = values[columns["height"]] * length_factor(table, columns["height"], "height")
+    return table.source, values[columns[TIME]] * unit, height
 
 
 def _quantities(name: str) -> tuple[str, ...]:

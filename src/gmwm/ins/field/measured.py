@@ -14,9 +14,10 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.fix_file import read_fix_log
-from gmwm.ins.field.imu_file import read_imu_log
-from gmwm.ins.filter import Aiding
+from gmwm.ins.field.alignment import standstills
+from gmwm.ins.field.fix_file import read_fix_log, read_heights
+from gmwm.ins.field.imu_file import ImuLog, read_imu_log
+from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.spec import (
     FileName,
@@ -24,13 +25,16 @@ from gmwm.ins.spec import (
     Models,
     PositiveMeters,
     PositiveRadians,
+    PositiveSeconds,
     PositiveSpeed,
     Radians,
     ReadingSpec,
+    Seconds,
     Spec,
     Three,
     number,
     read_models,
+    written,
 )
 
 _UNITS = {"position": "m", "velocity": "m/s"}
@@ -40,6 +44,11 @@ class ImuSpec(ReadingSpec):
     """The record of an IMU."""
 
     file: FileName
+    start: Seconds | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Arguments of `gmwm.ins.read_imu`."""
+        return super().options() | {"start": self.start}
 
 
 class BiasSpec(Spec):
@@ -47,6 +56,19 @@ class BiasSpec(Spec):
 
     gyro: Annotated[float, number(SI_UNIT["gyro"]), Field(ge=0.0)] | None = None
     accel: Annotated[float, number(SI_UNIT["accel"]), Field(ge=0.0)] | None = None
+
+
+class BarometerSpec(Spec):
+    """Heights of a barometer, set to the first fix."""
+
+    file: FileName
+    sd: PositiveMeters = tuning.BAROMETER_SD
+    drift_sd: PositiveMeters = tuning.BAROMETER[0]
+    drift_tau: PositiveSeconds = tuning.BAROMETER[1]
+
+
+def _of_file(given: Any) -> Any:
+    return given if isinstance(given, Mapping) else {"file": given}
 
 
 class MeasuredSpec(Spec):
@@ -57,16 +79,24 @@ class MeasuredSpec(Spec):
         "(sensors)"
     )
 
-    imu: Annotated[
-        ImuSpec, BeforeValidator(lambda each: each if isinstance(each, Mapping) else {"file": each})
-    ]
+    imu: Annotated[ImuSpec, BeforeValidator(_of_file)]
     gnss_fixes: FileName
     sensors: Models
     lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
     heading: Radians | None = None
     heading_sd: PositiveRadians = tuning.HEADING_SD
+    attitude: Annotated[tuple[Radians, Radians, Radians], written("[roll, pitch, yaw]")] | None = (
+        None
+    )
+    attitude_sd: PositiveRadians = tuning.ATTITUDE_SD
     position_sd: Three[PositiveMeters] = tuning.POSITION_SD
     velocity_sd: Three[PositiveSpeed] = tuning.VELOCITY_SD
+    coloured_sd: Three[Meters] = (0.0, 0.0, 0.0)
+    coloured_tau: PositiveSeconds = 100.0
+    gate: float | None = None
+    gnss_shift: Seconds = 0.0
+    barometer: Annotated[BarometerSpec, BeforeValidator(_of_file)] | None = None
+    zero_velocity: PositiveSpeed | None = None
     bias: BiasSpec = BiasSpec()
 
 
@@ -86,6 +116,10 @@ class Measured:
         Of the forward axis at the first fix, rad; ``None`` to find it in the data.
     heading_sd : float
         rad.
+    attitude : tuple of three floats or None
+        Roll, pitch and yaw at the first fix, rad; ``None`` to find them in the data.
+    attitude_sd : float
+        rad.
     title : str
     notices : tuple of Notice
     """
@@ -96,6 +130,8 @@ class Measured:
     start: float = 0.0
     heading: float | None = None
     heading_sd: float = tuning.HEADING_SD
+    attitude: tuple[float, float, float] | None = None
+    attitude_sd: float = tuning.ATTITUDE_SD
     title: str = ""
     notices: tuple[Notice, ...] = ()
 
@@ -116,13 +152,26 @@ class Measured:
             If something is missing, unknown or cannot be used.
         """
         spec = MeasuredSpec.parse(content)
+        if spec.attitude is not None and spec.heading is not None:
+            raise InputError("heading and attitude: the attitude has a yaw; leave the heading out")
         sensors, assumed = with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
         log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding, cut = _within(
-            found.aiding(log.start, spec.position_sd, spec.velocity_sd, spec.lever_arm),
+            replace(
+                found.aiding(
+                    log.start - spec.gnss_shift, spec.position_sd, spec.velocity_sd, spec.lever_arm
+                ),
+                coloured_sd=spec.coloured_sd, coloured_tau=spec.coloured_tau, gate=spec.gate,
+            ),
             log.imu, log.source, found.source, log.start,
         )  # fmt: skip
+        if spec.barometer is not None:
+            aiding, set_to = _with_barometer(aiding, spec.barometer, folder, log)
+            cut = (*cut, set_to)
+        if spec.zero_velocity is not None:
+            aiding, seen = _with_standstills(aiding, log.imu, spec.zero_velocity)
+            cut = (*cut, seen)
         for kind, own, usual in (("position", found.position_sd, spec.position_sd),
                                  ("velocity", found.velocity_sd, spec.velocity_sd)):  # fmt: skip
             if own is None and any(each.kind == kind for each in aiding.fixes):
@@ -140,6 +189,8 @@ class Measured:
             start=log.start,
             heading=spec.heading,
             heading_sd=spec.heading_sd,
+            attitude=spec.attitude,
+            attitude_sd=spec.attitude_sd,
             title=log.source,
             notices=(*log.notices, *found.notices, *cut, *assumed),
         )
@@ -166,6 +217,57 @@ def with_bias(
     )
     notices = (Notice("biases-assumed", "note", "", text, assumed),) if assumed else ()
     return replace(models, bias_sd=bias_sd), notices
+
+
+def _with_barometer(
+    aiding: Aiding, spec: BarometerSpec, folder: Path, log: ImuLog
+) -> tuple[Aiding, Notice]:
+    """The fixes, and heights that are set to the first position fix.
+
+    Raises
+    ------
+    InputError
+        If no height is near that.
+    """
+    source, time, height = read_heights(folder / spec.file)
+    time = time - log.start
+    inside = np.isfinite(height) & (time > -0.5 * log.imu.dt)
+    inside &= time < (log.imu.n + 0.5) * log.imu.dt
+    time, height = time[inside], height[inside]
+    first = next(
+        (each for each in aiding.fixes if each.kind == "position" and each.time.size), None
+    )
+    near = np.abs(time - (np.nan if first is None else first.time[0])) <= tuning.CHORD
+    if first is None or not np.any(near):
+        raise InputError(
+            f"{source} has no height within {tuning.CHORD:g} s of the first position fix, to be "
+            "set to it: bring both to one clock"
+        )
+    shift = float(first.value[0, 2] - np.mean(height[near]))
+    value, sd = np.zeros((time.size, 3)), np.zeros((time.size, 3))
+    value[:, 0], sd[:, 0] = height + shift, spec.sd
+    heights = Fixes("height", time, value, sd)
+    text = f"barometric heights are set to the first position fix, by {shift:.3g} m"
+    return (
+        replace(
+            aiding, fixes=(*aiding.fixes, heights), barometer_sd=spec.drift_sd,
+            barometer_tau=spec.drift_tau,
+        ),
+        Notice("barometer-set", "note", "", text, {"shift": shift}),
+    )  # fmt: skip
+
+
+def _with_standstills(aiding: Aiding, imu: Imu, sd: float) -> tuple[Aiding, Notice]:
+    """The fixes, and standstills that the IMU shows."""
+    found = standstills(imu, aiding, sd)
+    if found is None:
+        text = "no standstill can be recognised: the vehicle does not stand at the start"
+        return aiding, Notice("standstills-unknown", "warning", "", text)
+    text = f"{found.time.size} standstills of {tuning.ZERO_VELOCITY[1]:g} s are recognised"
+    return (
+        replace(aiding, fixes=(*aiding.fixes, found)),
+        Notice("standstills", "note", "", text, {"count": found.time.size}),
+    )
 
 
 def _within(

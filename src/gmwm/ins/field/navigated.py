@@ -18,8 +18,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.alignment import Alignment, align
 from gmwm.ins.field.explanations import LEVEL
-from gmwm.ins.field.fault_notices import fault_notice, resolution_notice
-from gmwm.ins.field.faults import Faults
+from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay, innovation_sizes
 from gmwm.ins.filter import KINDS, Solution
@@ -93,8 +92,9 @@ class Navigated:
             If the initial state cannot be known, or no fix follows it.
         """
         alignment = align(
-            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd
-        )
+            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
+            measured.attitude, measured.attitude_sd,
+        )  # fmt: skip
         replay = Replay.of(measured, alignment)
         imu = replay.imu
         times = next(each.time for each in replay.aiding.fixes if each.kind == "position")
@@ -136,7 +136,7 @@ class Navigated:
         return tuple(
             each.kind
             for each in self.measured.aiding.fixes
-            if each.kind in KINDS and each.time.size
+            if each.kind != "standstill" and each.time.size
         )
 
     @property
@@ -144,6 +144,27 @@ class Navigated:
         """NIS per degree of freedom by the median, which a few far ones do not move."""
         squares = self.solution.innovations.standard**2
         return float(np.nanmedian(squares) / chi2.median(1))
+
+    @property
+    def rejections(self) -> tuple[Notice, ...]:
+        """Fixes that were beyond their gate and not used, kind by kind."""
+        innovations = self.solution.innovations
+        notices = []
+        for kind, code in KINDS.items():
+            rejected = np.flatnonzero((innovations.kind == code) & ~innovations.used)
+            if not rejected.size:
+                continue
+            size = np.sqrt(innovations.nis[rejected])
+            far = int(np.argmax(size))
+            at = float(self.clock(innovations.time[rejected[far : far + 1]])[0])
+            of = int(np.count_nonzero(innovations.kind == code))
+            text = (
+                f"{rejected.size} of {of} are rejected; the farthest is {size[far]:.3g} sigma off "
+                f"at {at:.10g} s"
+            )
+            values = {"count": rejected.size, "of": of, "size": float(size[far]), "time": at}
+            notices.append(Notice("fixes-rejected", "warning", kind, text, values))
+        return tuple(notices)
 
     @property
     def farthest(self) -> tuple[float, float]:
@@ -271,7 +292,7 @@ class Navigated:
         solution, imu = self.solution, self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        for notice in (*self.measured.notices, *self.alignment.notices):
+        for notice in (*self.measured.notices, *self.alignment.notices, *self.rejections):
             lines += wrapped(str(notice), "- ", 2)
         if solution.diverged_at is not None:
             at = float(self.clock(np.array([solution.diverged_at]))[0])
@@ -381,7 +402,7 @@ class Navigated:
         panels = {}
         for kind in self.kinds:
             of_kind = innovations.kind == KINDS[kind]
-            unit = "m" if kind == "position" else "m/s"
+            unit = "m/s" if kind == "velocity" else "m"
             panels[f"{kind} [{unit}]"] = (
                 self.clock(innovations.time[of_kind]),
                 innovations.value[of_kind],

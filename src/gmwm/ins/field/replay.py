@@ -90,8 +90,10 @@ class Replay:
         return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(self.innovations.sd)))
 
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of fixes that there are."""
-        return tuple(dict.fromkeys(each.kind for each in self.aiding.fixes if each.time.size))
+        """Kinds of fixes that there are, whose innovations are judged."""
+        return tuple(dict.fromkeys(
+            each.kind for each in self.aiding.fixes if each.time.size and each.kind != "standstill"
+        ))  # fmt: skip
 
     def test(self, kind: str | None = None) -> InnovationTest:
         """Size and whiteness of the innovations of a kind, or of all; see `innovation_sizes`."""
@@ -169,6 +171,7 @@ class Replay:
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:
     """Size and whiteness of the innovations of a kind, or of all together."""
     found = [KINDS[kind]] if kind else list(np.unique(innovations.kind))
+    found = [each for each in found if each != KINDS["standstill"]]
     parts = [innovations.standard[innovations.kind == each] for each in found]
     seen = np.concatenate([part[np.isfinite(part)] for part in parts])
     products = np.concatenate([(part[1:] * part[:-1]).ravel() for part in parts])

@@ -7,11 +7,14 @@ from gmwm.ins.spec.fields import (
     Meters,
     PositiveMeters,
     PositiveRadians,
+    PositiveSeconds,
     PositiveSpeed,
     Radians,
+    Seconds,
     Spec,
     Three,
     number,
+    written,
 )
 from gmwm.ins.spec.sensor_terms import Models, read_models, sensor_models
 
@@ -21,9 +24,11 @@ __all__ = [
     "Models",
     "PositiveMeters",
     "PositiveRadians",
+    "PositiveSeconds",
     "PositiveSpeed",
     "Radians",
     "ReadingSpec",
+    "Seconds",
     "Spec",
     "Three",
     "experiment_from",
@@ -31,4 +36,5 @@ __all__ = [
     "read_document",
     "read_models",
     "sensor_models",
+    "written",
 ]

@@ -18,10 +18,12 @@ ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, haar_gain, quadrature
@@ -66,12 +68,51 @@ def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> Flo
 
 @dataclass(frozen=True, eq=False)
 class _LagSums:
-    """Everything about the coarse levels that does not depend on the spectrum."""
+    """Everything about the coarse levels that does not depend on the spectrum.
+
+    Attributes
+    ----------
+    first : int
+        The finest of the coarse levels.
+    grid : LagGrid
+    averaging : (L,) ndarray of int
+        Averaging times, blocks.
+    amplitude : (L, F) ndarray
+        Gains over their phases.
+    weights : (H,) ndarray
+        How often each lag from zero on stands for itself and its negative.
+    counts : (L, L, H) ndarray
+        Pairs of coefficients at each lag, of those that there are, times ``weights``.
+    """
 
     first: int
     grid: LagGrid
+    averaging: npt.NDArray[np.intp]
     amplitude: FloatArray
+    weights: FloatArray
     counts: FloatArray
+
+    def covariances(self, spectrum: FloatArray) -> Iterator[FloatArray]:
+        """For each level, its covariances with itself and the coarser ones, (levels, H).
+
+        A Haar gain over its phase is (1 - cos(2 pi m f)) / (2 m sin(pi f)), so that that of the
+        coarser level is a second difference over its averaging time m.
+        """
+        sine = np.sin(np.pi * self.grid.frequency[1:])
+        base = np.zeros_like(self.amplitude)
+        base[:, 1:] = self.amplitude[:, 1:] * (spectrum[1:] / sine)
+        once = self.grid.transform(base)
+        longest, lags = self.averaging[-1], self.weights.size
+        around = np.concatenate([once[:, -longest:], once[:, : lags + longest]], axis=1)
+        for j, own in enumerate(around):
+            centre = own[longest : longest + lags]
+            rows = np.empty((self.averaging.size - j, lags))
+            for row, m in zip(rows, self.averaging[j:], strict=True):
+                later, earlier = own[longest + m :][:lags], own[longest - m :][:lags]
+                row[:] = (centre - 0.5 * (later + earlier)) / (2.0 * m)
+            # The bin at zero frequency, which no difference shows.
+            product = self.amplitude[j, 0] * self.amplitude[j:, :1]
+            yield rows + product * (spectrum[0] / self.grid.size)
 
 
 @lru_cache(maxsize=2)
@@ -81,23 +122,26 @@ def _lag_sums(n: int) -> _LagSums:
     block, first = block_of(n)
     grid = LagGrid.holding(3 * n / block, block)
     available = haar_counts(n, m[first:])
-    lag = (block * grid.lag).astype(float)
-    counts = np.empty((available.size, available.size, grid.size))
+    lag = (block * np.arange(grid.size // 2 + 1)).astype(float)
+    weights = np.full(lag.size, 2.0)
+    weights[[0, -1]] = 1.0
+    counts = np.empty((available.size, available.size, lag.size))
     for j, own in enumerate(available):
         for k, other in enumerate(available):
             counts[j, k] = centred_pairs(own, other, lag, block) / (block * min(own, other))
-    return _LagSums(first, grid, grid.haar_amplitude(m[first:] / block), counts)
+    averaging = m[first:] / block
+    amplitude = grid.haar_amplitude(averaging)
+    return _LagSums(first, grid, averaging.astype(np.intp), amplitude, weights, weights * counts)
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
     spectrum = block_spectrum(psd, dt, sums.grid)
-    levels = sums.amplitude.shape[0]
+    levels = sums.averaging.size
     result = np.empty((levels, levels))
-    for j in range(levels):
-        cross = sums.grid.transform(sums.amplitude[j] * sums.amplitude[j:] * spectrum)
+    for j, cross in enumerate(sums.covariances(spectrum)):
         cross *= cross
-        result[j, j:] = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.sum(cross, axis=-1)
+        result[j, j:] = np.sum(sums.counts[j, j:] * cross, axis=-1) / (cross @ sums.weights)
         result[j:, j] = result[j, j:]
     return result
 
@@ -150,8 +194,7 @@ def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     m = dyadic_levels(n)
     counts = haar_counts(n, m)[sums.first :] / sums.grid.block
     result = np.zeros((m.size, m.size))
-    for j in range(counts.size):
-        cross = sums.grid.transform(sums.amplitude[j] * sums.amplitude[j:] * spectrum)
+    for j, cross in enumerate(sums.covariances(spectrum)):
         row = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.maximum(counts[j], counts[j:])
         result[sums.first + j, sums.first + j :] = row
         result[sums.first + j :, sums.first + j] = row

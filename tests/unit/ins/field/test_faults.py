@@ -5,8 +5,7 @@ import pytest
 
 from gmwm.ins import Fixes, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.field.explanations import LEVEL, TESTS
-from gmwm.ins.field.fault_notices import resolution_notice
-from gmwm.ins.field.faults import Faults
+from gmwm.ins.field.faults import Faults, resolution_notice
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.filter import InitialSd

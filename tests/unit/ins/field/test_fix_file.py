@@ -145,11 +145,11 @@ def test_a_clock_in_microseconds(tmp_path: Path) -> None:
 def test_bad_imu_files(tmp_path: Path) -> None:
     rows = imu_rows()
     holed = rows.copy()
-    holed[30, 3] = np.nan
+    holed[30:36, 3] = np.nan
     with pytest.raises(InputError, match=r"sample 31 of gyro_z, 0.6 s after the first, is missing"):
         read_imu(write_imu(tmp_path, holed))
     with pytest.raises(InputError, match="sample 31 of gyro_x"):
-        read_imu(write_imu(tmp_path, np.delete(rows, 30, axis=0)))
+        read_imu(write_imu(tmp_path, np.delete(rows, range(30, 36), axis=0)))
     with pytest.raises(InputError, match="no channel accel_z"):
         read_imu(write_imu(tmp_path, rows[:, :6], IMU_HEAD.rpartition(",")[0]))
     free = rows.copy()

@@ -350,8 +350,8 @@ GAPPY = [
 
 @pytest.mark.parametrize("truth", GAPPY, ids=repr)
 def test_fits_of_gappy_series_are_as_good_as_their_intervals(truth):
-    """Standardised errors of 30 fits; with a fifth of the record missing in 16 gaps."""
-    n, runs = 8000, 30
+    """Standardised errors of 12 fits; with a fifth of the record missing in 16 gaps."""
+    n, runs = 8000, 12
     rng = np.random.default_rng(5)
     squares, invalid = [], 0
     for _ in range(runs):

@@ -18,7 +18,8 @@ from scipy.optimize import linprog, minimize_scalar
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.target import Target
+from gmwm.filter_numbers.spectra.least_sum import least_sum
+from gmwm.filter_numbers.spectra.target import Target
 from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 
 KINDS = {"N+K": "NK", "N+GM": "NG", "N+K+GM": "NKG"}
@@ -106,27 +107,29 @@ def dominating(problem: Problem, form: str) -> Model:
     plain: list[Process] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in kinds)
     columns = _columns(problem, plain)
     if "G" not in kinds:
-        return _scaled(problem, plain, _solved(problem, columns)[1])
+        return _scaled(problem, plain, _solved(problem, columns)[0])
 
-    def at(log_tau: float) -> tuple[float, list[Process], FloatArray]:
-        processes = [*plain, GaussMarkov(1.0, float(np.exp(log_tau)))]
-        extended = np.column_stack([columns, _columns(problem, processes[-1:])])
-        least, variances = _solved(problem, extended)
-        return least, processes, variances
+    def at(log_taus: FloatArray) -> tuple[list[Process], FloatArray]:
+        """Gauss-Markov processes of unit amplitude, and the shares with each of them."""
+        gauss: list[Process] = [GaussMarkov(1.0, float(tau)) for tau in np.exp(log_taus)]
+        slow = _columns(problem, gauss).T[:, :, None]
+        fast = np.broadcast_to(columns, (len(gauss), *columns.shape))
+        return gauss, _solved(problem, np.concatenate([fast, slow], axis=2))
 
     grid = _correlation_times(problem)
-    costs = np.array([at(each)[0] for each in grid])
+    costs = np.sum(at(grid)[1], axis=1)
     # Of several that are as good, the shortest: a slower one would only have a larger variance.
     best = int(np.argmax(costs <= np.min(costs) * (1.0 + tuning.AS_GOOD)))
-    chosen = float(grid[best])
+    chosen = grid[best]
     around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
     found = minimize_scalar(
-        lambda x: at(x)[0], bounds=around, method="bounded", options={"xatol": 1e-3}
-    )
+        lambda x: float(np.sum(at(np.array([x]))[1])), bounds=around, method="bounded",
+        options={"xatol": 1e-3},
+    )  # fmt: skip
     if found.fun < costs[best] * (1.0 - tuning.AS_GOOD):
-        chosen = float(found.x)
-    _, processes, variances = at(chosen)
-    return _scaled(problem, processes, variances)
+        chosen = found.x
+    gauss, shares = at(np.array([chosen]))
+    return _scaled(problem, plain + gauss, shares[0])
 
 
 def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -> Model:
@@ -139,7 +142,7 @@ def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -
         processes.append(RandomWalk(1.0))
     processes += [GaussMarkov(1.0, tau) for tau in taus]
     walking = any(process.is_walk for process in processes)
-    shares = _solved(problem, _columns(problem, processes), walking)[1]
+    shares = _solved(problem, _columns(problem, processes), walking)[0]
     least = tuning.LEAST_SHARE * float(np.sum(shares))
     return _scaled(problem, processes, np.maximum(shares, least))
 
@@ -167,19 +170,28 @@ def _columns(problem: Problem, processes: Sequence[Process]) -> FloatArray:
     )
 
 
-def _solved(
-    problem: Problem, columns: FloatArray, is_walking: bool = True
-) -> tuple[float, FloatArray]:
-    """Least cost, and the share of it that each process has."""
-    rows = columns / np.max(columns, axis=1, keepdims=True)
-    right = 1.0 / np.max(columns, axis=1)
-    least = [0.0] * columns.shape[1]
+def _solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> FloatArray:
+    """The share of the least cost that each of m processes has, for each of b sets: (b, m).
+
+    Columns are those of one set, (n, m), or of several, (b, n, m).
+    """
+    least = np.zeros(columns.shape[-1])
     least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.dominated)
     walk = max(target.walk for target in problem.dominated)
     if walk > 0.0 and is_walking:
         least[1] = problem.cost(RandomWalk(1.0)) * walk
+    sets = columns.reshape(-1, *columns.shape[-2:])
+    shares = least_sum(sets, least)
+    for i in np.flatnonzero(np.any(np.isnan(shares), axis=1)):
+        shares[i] = _with_care(sets[i], least)
+    return shares
+
+
+def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:
+    """The same of one set whose numbers lie too far apart for bases of a few of them."""
+    largest = np.max(columns, axis=1)
     found = linprog(
-        np.ones(columns.shape[1]), A_ub=-rows, b_ub=-right,
+        np.ones(columns.shape[1]), A_ub=-columns / largest[:, None], b_ub=-1.0 / largest,
         bounds=[(value, None) for value in least], method="highs",
     )  # fmt: skip
     if found.x is None:
@@ -188,7 +200,7 @@ def _solved(
             "parameters are too far apart"
         )
     # Limits may lie below the tolerance of the program.
-    return float(found.fun), np.maximum(found.x, least)
+    return np.maximum(found.x, least)
 
 
 def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) -> Model:
@@ -204,9 +216,9 @@ def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) 
     ratio = short(fine)
     most = float(np.max(ratio))
     # A maximum lies between two of the points.
-    for place in np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most).tolist():
-        ends = fine[max(place - 1, 0)], fine[min(place + 1, fine.size - 1)]
-        most = max(most, float(np.max(short(np.geomspace(*ends, tuning.REFINED)))))
+    places = np.flatnonzero(ratio > (1.0 - tuning.NEAR) * most)
+    ends = fine[np.maximum(places - 1, 0)], fine[np.minimum(places + 1, fine.size - 1)]
+    most = max(most, float(np.max(short(np.geomspace(*ends, tuning.REFINED).ravel()))))
     variances = variances * max(most, 1.0) * tuning.SAFETY
     terms = (p.with_amplitude(float(v)) for p, v in zip(processes, variances, strict=True))
     return Model(tuple(terms))

@@ -12,7 +12,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.target import Target
+from gmwm.filter_numbers.spectra.target import Target
 from gmwm.process import Model
 
 

@@ -12,9 +12,6 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.process import Model, Process, evaluated
 
-LEFT_OUT = ("fast-peak-left-out", "line-left-out", "ramp-as-constant")
-"""Codes of notices of terms that no random walk or Gauss-Markov process stands for."""
-
 
 @dataclass(frozen=True, eq=False)
 class Target:

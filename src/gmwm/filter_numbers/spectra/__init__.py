@@ -1,0 +1,20 @@
+"""Spectra that lie above others at every frequency."""
+
+from gmwm.filter_numbers.spectra.dominance import (
+    KINDS,
+    Problem,
+    dominating,
+    with_correlation_times,
+)
+from gmwm.filter_numbers.spectra.region import ParameterRegion, region_targets
+from gmwm.filter_numbers.spectra.target import Target
+
+__all__ = [
+    "KINDS",
+    "ParameterRegion",
+    "Problem",
+    "Target",
+    "dominating",
+    "region_targets",
+    "with_correlation_times",
+]
