@@ -11,8 +11,9 @@ matplotlib.use("Agg")
 
 import gmwm
 from gmwm.study.demo import simulated_imu
+from gmwm.study.sensor_tables import TABLE_6
 
-recording, truth = simulated_imu(4 * 3600.0, seed=1)
+recording, truth = simulated_imu(4 * 3600.0, seed=1, sensors=TABLE_6)
 fit = gmwm.select(recording["gyro_x"]).fit
 print(fit)
 print()

@@ -123,8 +123,8 @@ def test_example_of_calibrate_works(run, tmp_path):
         write_csv(tmp_path / f"{name}.csv", columns)
     shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
     lines = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
-    assert len(lines) == 2
-    for line in lines:
+    assert len(lines) == 3
+    for line in (line for line in lines if ".csv" in line):
         code, printed, told = run(*line.split())
         assert code == 0, told
         assert ("2 recordings" in printed) == ("b.csv" in line)
@@ -751,7 +751,7 @@ def test_demo_shows_truth_beside_estimate(demo):
     assert printed.startswith("simulated IMU, seed 1: 3 min at 100 Hz\n")
     assert re.search(r"^channel .*truth +estimate +95 % interval +unit", printed, re.MULTILINE)
     assert max(map(len, printed.splitlines())) <= WIDTH
-    total = 3 * (1 + 2 * 3) + 3 * (1 + 2 * 2)
+    total = 3 * (1 + 2) + 3 * (1 + 1)
     text = " ".join(printed.split())
     counted = re.search(r"(\d+) of (\d+) parameters are determined by this record; (\d+)", text)
     determined, parameters, covered = map(int, counted.groups())
@@ -761,10 +761,10 @@ def test_demo_shows_truth_beside_estimate(demo):
 
 
 def test_demo_finds_the_white_noise_of_every_axis(demo):
-    # Three minutes tell it to a per cent, 140 deg/h/sqrt(Hz) = 2.333 deg/sqrt(h), unless a fast
+    # Three minutes tell it to a per cent, 12 deg/h/sqrt(Hz) = 0.2 deg/sqrt(h), unless a fast
     # Gauss-Markov took its place, which leaves an upper bound.
     lines = demo[0].stdout.splitlines()
-    for sensor, truth, unit in (("gyro", 2.333, "deg/sqrt(h)"), ("accel", 140.0, "ug/sqrt(Hz)")):
+    for sensor, truth, unit in (("gyro", 0.2, "deg/sqrt(h)"), ("accel", 80.0, "ug/sqrt(Hz)")):
         for axis in "xyz":
             row = next(line for line in lines if line.startswith(f"{sensor}_{axis} "))
             bound = re.search(r" N +(\S+) +(\S+)   below (\S+)", row)
@@ -943,6 +943,25 @@ def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
     code, _, told = run("reproduce", "appendix-a", *option, "-o", "s")
     assert code == 2
     assert f"appendix-a has no option {option[0]}: leave it out" in told
+    assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("table2", "--rotate"), "--rotate"),
+        (("fig7", "--rotate"), "--rotate"),
+        (("fig9", "--resume"), "--resume"),
+        (("fig9", "--rotate", "--method", "AV"), "--method"),
+    ],
+)
+def test_recordings_are_rotated_for_two_figures_only(run, tmp_path, arguments, option):
+    code, _, told = run("reproduce", *arguments, "-o", "s")
+    assert code == 2
+    assert f"{arguments[0]} has no option {option}: leave it out" in told
+    code, _, told = run("reproduce", "fig9", "--rotate", "-o", "s")
+    assert code == 2
+    assert "give two recordings or more" in told
     assert not (tmp_path / "s").exists()
 
 

@@ -14,6 +14,7 @@ from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.montecarlo.consistency import at_epoch, innovation_test, over_time
+from gmwm.ins.montecarlo.filter_errors import GROUPS
 from gmwm.ins.montecarlo.outage_errors import difference, sizes, spread
 from gmwm.ins.montecarlo.scenario import Scenario, Simulated
 from gmwm.ins.montecarlo.trials import monte_carlo
@@ -31,7 +32,7 @@ SLOW_ONLY = SensorModels.of(
         "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 300.0),
     }
 )
-NAMES = {"position", "velocity", "attitude", "navigation", "sensors"}
+NAMES = {*GROUPS, "sensors"}
 
 
 class Study:

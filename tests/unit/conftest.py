@@ -9,6 +9,7 @@ from gmwm._core.notices import Notice
 from gmwm.ins import FilterErrors, MonteCarlo, Outage, car_drive
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.geometry.rotation import matrix_from_rpy
+from gmwm.ins.montecarlo.filter_errors import GROUPS
 from gmwm.ins.montecarlo.validation import Validation
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}
@@ -56,8 +57,7 @@ def _runs(factor, spans, draws, rng, dead):
     if dead:
         error[:, time > 5.0] = np.nan
     z = (error / sd) ** 2
-    groups = [z[..., :3], z[..., 3:6], z[..., 6:], z]
-    nees = np.stack([np.sum(each, axis=-1) for each in groups], axis=-1)
+    nees = np.stack([np.sum(z[..., part], axis=-1) for part in GROUPS.values()], axis=-1)
     sensor = factor * rng.standard_normal((count, time.size, 6))
     white = rng.standard_normal((count, 300)) * factor
     return FilterErrors(

@@ -239,3 +239,24 @@ def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, .
     names = _FIELD_UNITS.get((quantity or "", parameter_unit), ())
     si_unit = si_parameter_unit(parameter_unit, quantity).replace(" s", "*s")
     return tuple(FieldUnit(name, 1.0 / factor(name, si_unit)) for name in names)
+
+
+def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]:
+    """The unit in which a plot shows a channel, and how many of it one SI unit is.
+
+    Parameters
+    ----------
+    quantity : {"gyro", "accel", None}
+    unit : str
+        The channel's own.
+    units : {"field", "si"}
+
+    Raises
+    ------
+    InputError
+        If ``units`` is anything else.
+    """
+    if units not in ("field", "si"):
+        raise InputError(f"units = {units!r}: give 'field' or 'si'")
+    known = field_units("u", quantity) if units == "field" else ()
+    return (known[0].unit, known[0].per_si) if known else (unit or "u", 1.0)

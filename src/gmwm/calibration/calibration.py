@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from html import escape
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from gmwm._core import checks
@@ -17,15 +18,17 @@ from gmwm._core.documents import Document, load_document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate as estimated
-from gmwm.process import Model, Process
-from gmwm.readers import Channel, Recording
+from gmwm.process import Model, Process, model_from_list
+from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.selection import Selection, select, wider_ranges
 from gmwm.variance import MIN_SAMPLES, wavelet_variance
 
@@ -58,13 +61,18 @@ class Calibration(Mapping[str, Fit], Document):
     source : str
         What was calibrated.
     rate : float
-        Sampling rate, Hz.
+        Sampling rate, Hz; the highest, where channels have their own, which is that of ``fit.wv``.
     n : int
-        Samples per channel, of all recordings.
+        Samples per channel of that rate, of all recordings.
     notices : tuple of Notice
         Those of the reader; what was found in the recording, worst first in each channel, with
         what was done about it, if it was examined; with the code "ambiguity", which models
         describe a channel equally well.
+    rivals : dict
+        Channel name -> the models, with their values, that describe it as well as the chosen one.
+    left_out : dict
+        Channel name -> samples of shocks and spikes that were left out, as pairs of the first and
+        the one after the last; of a single recording.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.calibration"
@@ -76,9 +84,11 @@ class Calibration(Mapping[str, Fit], Document):
     rate: float
     n: int
     notices: tuple[Notice, ...] = ()
+    rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
+    left_out: Mapping[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        freeze(self, "fits", "skipped")
+        freeze(self, "fits", "skipped", "rivals", "left_out")
 
     def __getitem__(self, name: str) -> Fit:
         if name in self.fits:
@@ -100,6 +110,13 @@ class Calibration(Mapping[str, Fit], Document):
         return self.n / self.rate
 
     @property
+    def has_one_rate(self) -> bool:
+        """Whether all channels have the sampling rate `rate`."""
+        return not any(
+            notice.code == "topics-joined" and notice.values["rates"] > 1 for notice in self.notices
+        )
+
+    @property
     def valid(self) -> bool:
         """Whether every channel has a valid fit."""
         return not self.skipped and all(fit.valid for fit in self.fits.values())
@@ -115,12 +132,25 @@ class Calibration(Mapping[str, Fit], Document):
         return f"<Calibration of {self.source or 'a recording'}: {', '.join(channels)}>"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+        html: str = import_module("gmwm.report").fragment(self)
+        return html
 
     def __str__(self) -> str:
-        blocks = [str(fit) for fit in self.fits.values()]
-        blocks += [f"{name}: skipped, {notice.text}" for name, notice in self.skipped.items()]
-        return "\n\n".join(blocks)
+        """One line a channel; ``print(cal["gyro_x"])`` shows its parameters."""
+        width = max(map(len, (*self.fits, *self.skipped)), default=0)
+        size = f"{self.duration:.6g} s at {self.rate:g} Hz, {self.n:,} samples a channel"
+        lines = wrapped(f"{self.source or 'a recording'}: {size}", indent=2)
+        for name, fit in self.items():
+            verdict = "valid" if fit.valid else "NOT VALID"
+            text = f"{fit.model.title()}. {sentence(fit)}"
+            lines += wrapped(text, first=f"{name:<{width}}  {verdict:<9}  ", indent=2)
+        for name, notice in self.skipped.items():
+            lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
+        counts = Counter(notice.severity for notice in self.notices)
+        found = [f"{counts[key]} {key}" for key in ("bad", "warning") if counts[key]]
+        if found:
+            lines.append(f"notices: {', '.join(found)}")
+        return "\n".join(lines)
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the parameters of all channels, one a row, in SI units; needs pandas."""
@@ -141,6 +171,11 @@ class Calibration(Mapping[str, Fit], Document):
             "notices": [notice.to_dict() for notice in self.notices],
             "skipped": {name: notice.to_dict() for name, notice in self.skipped.items()},
             "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
+            "rivals": {
+                name: [[term.to_dict() for term in model.terms] for model in models]
+                for name, models in self.rivals.items()
+            },
+            "left_out": {name: list(map(list, spans)) for name, spans in self.left_out.items()},
         }
 
     @classmethod
@@ -158,12 +193,29 @@ class Calibration(Mapping[str, Fit], Document):
             rate=content["rate_hz"],
             n=content["n"],
             notices=tuple(map(Notice.from_dict, content["notices"])),
+            rivals={
+                name: tuple(map(model_from_list, models))
+                for name, models in content.get("rivals", {}).items()
+            },
+            left_out={
+                name: tuple((int(start), int(stop)) for start, stop in spans)
+                for name, spans in content.get("left_out", {}).items()
+            },
         )
 
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the self-contained HTML report; see `gmwm.report`."""
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        recording: Recording | None = None,
+        *,
+        datasheet: str | os.PathLike[str] | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Write the self-contained HTML report; see `gmwm.report.write_report`."""
         # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_report(self, path)
+        written: Path = import_module("gmwm.report").write_report(
+            self, path, recording, datasheet=datasheet, provenance=provenance
+        )
         return written
 
 
@@ -181,7 +233,7 @@ def load(path: str | os.PathLike[str]) -> Any:
 
 
 def calibrate(
-    recording: Recording | Sequence[Recording],
+    recording: Recording | Sequence[Recording] | Any,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     screening: Collection[str] = SCREENING,
@@ -204,7 +256,9 @@ def calibrate(
     Parameters
     ----------
     recording : Recording or sequence of Recording
-        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`.
+        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`. A DataFrame or
+        an Arrow table is read with `gmwm.read`, which needs a column of time stamps and units in
+        the names of the others.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
@@ -226,9 +280,9 @@ def calibrate(
     InputError
         If no channel can be calibrated, or a mapping has no model for one.
     """
-    given = [recording] if isinstance(recording, Recording) else list(recording)
+    given = _recordings(recording)
     _check_together(given)
-    treated = [screened(each, screening) for each in given]
+    treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -251,16 +305,16 @@ def calibrate(
         if progress is not None:
             progress(len(finished), len(alive), name)
 
-    def one(name: str) -> tuple[Fit, tuple[Notice, ...]] | InputError:
+    def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
         try:
             parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
             if given_model is not None:
-                return with_departures(estimated(given_model, data), sources[name]), ()
+                return with_departures(estimated(given_model, data), sources[name]), None
             selection = select(data, extra=offered[name])
-            return with_departures(selection.fit, sources[name]), _ambiguity(name, selection)
+            return with_departures(selection.fit, sources[name]), selection
         except InputError as error:
             return error  # of this channel; the others go on
         finally:
@@ -274,20 +328,21 @@ def calibrate(
         for name, error in found.items()
         if isinstance(error, InputError)
     }
-    source = ", ".join(each.source for each in recordings)
+    source = ", ".join(each.source for each in given)
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
     issues = [issue for each in treated for issue in each.notices]
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
     fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
-    several = len(recordings) > 1
+    several = len(given) > 1
+    tied = {name: each for name, (_, each) in done.items() if each is not None and each.rivals}
     notices = with_outcomes(
-        [
+        _each_once(
             replace(notice, source=each.recording.source) if several else notice
             for each in treated
             for notice in each.notices
-        ],
+        ),
         {name: fitted.model for name, fitted in fits.items()},
         offered if model is None else {},
     )
@@ -295,10 +350,38 @@ def calibrate(
         fits=fits,
         skipped=skipped,
         source=source,
-        rate=recordings[0].rate,
-        n=sum(each.n for each in recordings),
-        notices=(*notices, *(notice for _, ties in done.values() for notice in ties)),
+        rate=given[0].rate,
+        n=sum(each.n for each in given),
+        notices=(*notices, *(_ambiguity(name, each) for name, each in tied.items())),
+        rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
+        left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
     )
+
+
+def _recordings(given: Any) -> list[Any]:
+    """What was given, as a list; frames are read."""
+    alone = isinstance(given, Recording) or is_frame(given)
+    return [read(each) if is_frame(each) else each for each in ([given] if alone else given)]
+
+
+def _each_once(notices: Iterable[Notice]) -> list[Notice]:
+    """Sensors with rates of their own share those of the reader."""
+    found: list[Notice] = []
+    for notice in notices:
+        if notice not in found:
+            found.append(notice)
+    return found
+
+
+def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tuple[int, int], ...]]:
+    """The samples that screening took from a recording, by channel."""
+    spans = {}
+    for before, after in zip(given.channels, screened_one.channels, strict=True):
+        gone = np.isnan(after.values) & ~np.isnan(before.values)
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False)).tolist()
+        if edges:
+            spans[before.name] = tuple(zip(edges[::2], edges[1::2], strict=True))
+    return spans
 
 
 def _check_together(recordings: Sequence[Recording]) -> None:
@@ -312,18 +395,20 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             )
     first = recordings[0]
     for other in recordings[1:]:
-        if abs(other.rate / first.rate - 1.0) > tuning.SAME_RATE:
-            raise InputError(
-                f"{other.source} has {other.rate:g} Hz and {first.source} {first.rate:g} Hz: "
-                "calibrate recordings of different rates one by one"
-            )
+        for channel in other.inertial:
+            known = first.get(channel.name, channel)
+            if abs(known.dt / channel.dt - 1.0) > tuning.SAME_RATE:
+                raise InputError(
+                    f"{other.source} has {1.0 / channel.dt:g} Hz and {first.source} "
+                    f"{1.0 / known.dt:g} Hz: calibrate recordings of different rates one by one"
+                )
 
 
 def _usable(
     treated: Sequence[Screened],
 ) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
     """Each channel in the recordings where it can be used, why others are skipped, and which."""
-    rate = treated[0].recording.rate
+    interval: dict[str, float] = {}
     alive: dict[str, list[Channel]] = {}
     sources: dict[str, list[str]] = {}
     dead: dict[str, Notice] = {}
@@ -333,7 +418,7 @@ def _usable(
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:
-                channel = replace(channel, dt=1.0 / rate)
+                channel = replace(channel, dt=interval.setdefault(channel.name, channel.dt))
                 repeated = each.repeated.get(channel.name)
                 own = thinned(channel, repeated) if repeated else channel
                 alive.setdefault(channel.name, []).append(own)
@@ -387,14 +472,12 @@ def _model_of(
     return model[name]
 
 
-def _ambiguity(name: str, selection: Selection) -> tuple[Notice, ...]:
+def _ambiguity(name: str, selection: Selection) -> Notice:
     """Which models tie, and the parameters of which that leaves less known."""
-    if not selection.rivals:
-        return ()
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
         text += f". If none of them is ruled out: {', '.join(wider)}"
     values = {"models": len(models)}
-    return (Notice(AMBIGUITY, "note", name, text, values, "the first is used"),)
+    return Notice(AMBIGUITY, "note", name, text, values, "the first is used")

@@ -133,25 +133,17 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
 
 
 def sentence(fitted: Fit) -> str:
-    """What the model means for who integrates this sensor, in one or two sentences."""
+    """What the model means for who averages this sensor, in the units of the field."""
     density, low = white_density(fitted), floor(fitted)
-    quantity = fitted.wv.quantity
-    if quantity == "gyro":
-        angle = np.degrees(density) * np.sqrt(60.0)
-        noise = (
-            "Integrated for a minute, the white noise alone gives an angle error of "
-            f"{angle:.2g} deg (1 sigma)"
-        )
-    elif quantity == "accel":
-        noise = (
-            "Integrated for a minute, the white noise alone gives a velocity error of "
-            f"{density * np.sqrt(60.0):.2g} m/s (1 sigma)"
-        )
-    else:
-        noise = f"White noise of {density:.3g} {fitted.wv.unit}/sqrt(Hz)"
-    unit = field_units("u", quantity)
-    floor_text = f"{low.deviation:.3g} {fitted.wv.unit}"
-    if unit:
-        floor_text = f"{low.deviation * unit[0].per_si:.3g} {unit[0].unit}"
+
+    def shown(value: float, unit: str) -> str:
+        known = field_units(unit, fitted.wv.quantity)
+        if known:
+            return f"{value * known[0].per_si:.3g} {known[0].unit}"
+        return f"{value:.3g} {unit.replace('u', fitted.wv.unit, 1)}"
+
+    noise = f"White noise of {shown(density, 'u/sqrt(Hz)')}" if density > 0.0 else "No white noise"
     end = "" if low.tau < fitted.wv.tau[-1] else " (still falling at the end of the record)"
-    return f"{noise}. Averaging helps up to {low.tau:.4g} s, down to {floor_text}{end}."
+    return (
+        f"{noise}; averaging helps up to {low.tau:.4g} s, down to {shown(low.deviation, 'u')}{end}."
+    )

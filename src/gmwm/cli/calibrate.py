@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable
+import shlex
+import sys
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
 
     from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration
+    from gmwm.readers import Recording
 
 _NONE_VALID = 1
 """Exit status."""
@@ -30,6 +34,15 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 
 _OF_RECORDING = ("not-static", "tilt", "rate-changes")
 """Codes of notices of a fit that are those of the whole recording."""
+
+
+_EXPORTED = {
+    "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
+    "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
+    "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m", "openvins": "kalibr_imu_chain.yaml",
+    "px4": "px4.params", "pyins": "pyins_imu.py", "state-space": "state-space.json",
+}  # fmt: skip
+"""Names of the files of programs that want something else than NAME.yaml."""
 
 
 def output_option(default: str) -> Callable[[Any], Any]:
@@ -59,6 +72,15 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="Leave events, lines, resonances, outliers or all as they are: samples of "
                    "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
+@click.option(
+    "--export",
+    "target",
+    metavar="NAME",
+    help="Also write the file of this program into the folder; see gmwm export --list.",
+)
+@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
+              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
+                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @printing_options
 def calibrate(
@@ -66,6 +88,8 @@ def calibrate(
     output: Path,
     models: tuple[str, ...],
     left: tuple[str, ...],
+    target: str | None,
+    datasheet: Path | None,
     jobs: int,
     as_json: bool,
     quiet: bool,
@@ -73,8 +97,10 @@ def calibrate(
 ) -> None:
     """Calibrate every channel of a static recording, or of several of one sensor.
 
-    FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY or NPZ.
-    Empty fields, NaN and rows that the time column jumps over are missing samples.
+    FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY, NPZ,
+    MAT, HDF5, Parquet or Feather; a bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), or a log of
+    PX4 (.ulg) or ArduPilot (.bin). Empty fields, NaN and rows that the time column jumps over are
+    missing samples.
     For each channel an error model is selected and estimated; the table shows it in the units of
     the field, the files hold everything in SI units. Several recordings of one sensor have one
     model, with a test whether they agree.
@@ -86,22 +112,36 @@ def calibrate(
     Examples:
       gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
+      gmwm calibrate static.bag --export kalibr -o out
     """
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, calibrate as run
+    from gmwm.report import read_datasheet
 
     given = written_models(models)
+    if target is not None:
+        from gmwm._core import checks
+        from gmwm.export import TARGETS
+
+        checks.choice("--export", target, tuple(TARGETS))
     with folder_to_fill(output) as folder:
         recordings = [read_recording(file, **reading) for file in files]
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
+        if datasheet is not None:  # what is wrong with it is known before the work
+            quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
+            read_datasheet(datasheet, quantities)
         with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
         # The files first: who pipes the table into head must not lose them.
-        written = write_files(result, folder)
+        origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
+        own = recordings[0] if len(recordings) == 1 else None
+        written = write_files(result, folder, own, datasheet, origin)
+    if target is not None:
+        written = f"{written}\n{export_into(folder, result, target)}"
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
@@ -171,7 +211,23 @@ def _table(result: Calibration) -> Table:
     return table
 
 
-def write_files(result: Calibration, folder: Path) -> str:
+def _command() -> str:
+    """The command line, as one would write it again."""
+    return shlex.join(["gmwm", *sys.argv[1:]])
+
+
+def _hash(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def write_files(
+    result: Calibration,
+    folder: Path,
+    recording: Recording | None = None,
+    datasheet: Path | None = None,
+    origin: Mapping[str, str] | None = None,
+) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
     from gmwm.export import export
@@ -183,7 +239,7 @@ def write_files(result: Calibration, folder: Path) -> str:
     lines = []
     with moved_together(folder) as new:
         result.save(new / names[0])
-        result.report(new / names[1])
+        result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
         if {"gyro", "accel"} <= quantities:
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
@@ -194,3 +250,12 @@ def write_files(result: Calibration, folder: Path) -> str:
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
     return "\n".join([f"wrote {folder / name}" for name in names] + lines)
+
+
+def export_into(folder: Path, result: Calibration, target: str) -> str:
+    """Write the file of a program; returns what to say of it."""
+    from gmwm.export import export
+
+    name = "imu.yaml" if target == "kalibr" else _EXPORTED.get(target, f"{target}.yaml")
+    export(result, target, path=folder / name)
+    return f"wrote {folder / name} for {target}"

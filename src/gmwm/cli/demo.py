@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def demo(output: Path, hours: float, seed: int) -> None:
     """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
 
-    The error models are those of Table VI of Stebler et al., IEEE/ION PLANS 2012.
+    Gyros have white noise and a Gauss-Markov process, accelerometers white noise and a random walk.
 
     \b
     Example:
@@ -41,7 +41,7 @@ def demo(output: Path, hours: float, seed: int) -> None:
             fitted = run(recording, forms, progress=bar)
         with progress_bar("selecting", "channels") as bar:
             selected = run(recording, progress=bar)
-        written = write_files(selected, folder)
+        written = write_files(selected, folder, recording)
     click.echo(f"{recording.source}: {duration_text(recording.duration)} at {recording.rate:g} Hz")
     click.echo("\nTruth and estimate, the form of each model known:\n")
     show_truth(fitted, truth)

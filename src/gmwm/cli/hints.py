@@ -20,11 +20,14 @@ HINTS = {
     "heading-unknown": "--heading DEG, or heading: in the file",
     "memory": "--channel gyro_x=COLUMN for each of some channels",
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
+    "no-stamps": "--clock log",
     "other-runs": "-o FOLDER",
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "time-unit": "--rate 100",
+    "topic": "--topic NAME",
+    "topics-apart": "--topic NAME or --clock log",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
 }
 

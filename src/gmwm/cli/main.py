@@ -41,6 +41,9 @@ for _command in (
 
 def main() -> None:
     """Entry point: bad input is one sentence and exit code 2, never a traceback."""
+    # Before numpy is loaded: matrices are small, and threads for each product cost more than they
+    # save.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     # None where who started us closed them: what is printed then goes nowhere.
     sys.stdout, sys.stderr = sys.stdout or StringIO(), sys.stderr or StringIO()
     for stream in (sys.stdout, sys.stderr):

@@ -13,6 +13,9 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from gmwm.readers import Recording
 
+CLOCKS = ("header", "log")
+"""As in `gmwm.read`, which would take long to import for a line of help."""
+
 _OPTIONS = (
     click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
     click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
@@ -26,6 +29,11 @@ _OPTIONS = (
 
 
 _PART = (
+    click.option("--topic", "topics", multiple=True, metavar="NAME",
+                 help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
+                      "for gyros and accelerometers in topics of their own."),
+    click.option("--clock", type=click.Choice(CLOCKS), default=CLOCKS[0], show_default=True,
+                 help="Stamps of messages: of their headers, or when they were recorded."),
     click.option("--channels", "only", metavar="NAME,...",
                  help="Only these channels: gyro_x,accel_z, or gyro for all of them."),
     click.option("--start", type=float, metavar="S", help="Leave out what is before, in seconds."),
@@ -44,7 +52,7 @@ def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def part_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Those of `read_recording` that choose channels and a stretch."""
+    """Those of `read_recording` that choose topics, channels and a stretch."""
     return _with(command, _PART)
 
 
@@ -66,6 +74,8 @@ def read_recording(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    topics: tuple[str, ...] = (),
+    clock: str = CLOCKS[0],
     only: str | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -86,6 +96,8 @@ def read_recording(
         units=units,
         channels=_chosen(roles(channels), only),
         time=time_reference(time_column),
+        topic=topics,
+        clock=clock,
     )
     return recording.part(0.0 if start is None else start, stop)
 

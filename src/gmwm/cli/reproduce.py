@@ -27,6 +27,7 @@ EXPERIMENTS = (
 
 
 NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
+ROTATED = ("fig8", "fig9")
 
 
 @click.command()
@@ -45,6 +46,9 @@ NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
               metavar="FILE",
               help="fig5 to fig9: a real static recording in place of a simulated one; the first "
                    "is calibrated, the others are navigated with; repeat.")  # fmt: skip
+@click.option("--rotate", is_flag=True,
+              help="fig8, fig9: calibrate every recording in turn and navigate with the others; "
+                   "further filters, intervals over recordings.")  # fmt: skip
 @reading_options
 def reproduce(
     experiment: str,
@@ -56,6 +60,7 @@ def reproduce(
     resume: bool,
     cluster: str | None,
     recordings: tuple[Path, ...],
+    rotate: bool,
     rate: float | None,
     gyro_unit: str | None,
     accel_unit: str | None,
@@ -78,21 +83,26 @@ def reproduce(
       gmwm reproduce table2 --runs 200 -o study
       gmwm reproduce fig2 --runs 200 -o study --resume
       gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
-        --gyro-unit deg/s --accel-unit g
+        --gyro-unit deg/s --accel-unit g --rotate
     """
     from gmwm._core.files import folder_to_fill
 
     processes = jobs or os.cpu_count() or 1
     if experiment in NAVIGATION:
-        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
+        _check_alone(experiment, {"--method": methods, "--cluster": cluster,
+                                  "--resume": resume and not rotate,
+                                  "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
         given = [
             read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
             for file in recordings
         ]
         with folder_to_fill(output) as folder:
-            _navigation(experiment, folder, runs, seed, processes, given)
+            if rotate:
+                _rotation(experiment, folder, runs, seed, processes, given, resume)
+            else:
+                _navigation(experiment, folder, runs, seed, processes, given)
         return
-    _check_alone(experiment, {"--recording": recordings})
+    _check_alone(experiment, {"--recording": recordings, "--rotate": rotate})
     if experiment in ("appendix-a", "selection"):
         _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
         with folder_to_fill(output) as folder:
@@ -183,5 +193,30 @@ def _navigation(
             experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
             progress=bar,
         )  # fmt: skip
+    click.echo(text)
+    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
+
+
+def _rotation(
+    experiment: str,
+    folder: Path,
+    runs: int | None,
+    seed: int,
+    jobs: int,
+    recordings: list[Recording],
+    resume: bool,
+) -> None:
+    """Figures 8 and 9 with every recording calibrated in turn."""
+    from gmwm.study import reproduce_rotation
+
+    try:
+        with progress_bar(experiment, "recordings") as bar:
+            text, paths = reproduce_rotation(
+                experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
+                resume=resume, progress=bar,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        click.echo(f"what is done is kept in {folder}: add --resume to go on", err=True)
+        raise
     click.echo(text)
     click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))

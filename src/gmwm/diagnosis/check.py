@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,6 +79,9 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
             f"{checks.shown(recording)} is not a recording: give what gmwm.read returns, or "
             "make one with Recording.from_arrays"
         )
+    parts = recording.by_rate()
+    if len(parts) > 1:
+        return _together(recording, [health(part, progress=progress) for part in parts])
     # What is missing is counted anew, channel by channel.
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
     motion = find_motion(recording)
@@ -104,6 +108,22 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     return Health(
         notices=tuple(notices),
         channels={name: one.facts for name, one in examined.items()},
+        source=recording.source,
+        rate=recording.rate,
+        n=recording.n,
+    )
+
+
+def _together(recording: Recording, found: Sequence[Health]) -> Health:
+    """Of sensors with rates of their own, each examined for itself."""
+    notices: list[Notice] = []
+    for one in found:
+        notices += [notice for notice in one.notices if notice not in notices]
+    whole = worst_first([notice for notice in notices if not notice.where])
+    facts = {name: channel for one in found for name, channel in one.channels.items()}
+    return Health(
+        notices=(*whole, *(notice for notice in notices if notice.where)),
+        channels={channel.name: facts[channel.name] for channel in recording.inertial},
         source=recording.source,
         rate=recording.rate,
         n=recording.n,

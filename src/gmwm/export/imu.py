@@ -245,7 +245,10 @@ def _triad(
     for source, numbers, together in holding:
         fits = source.fits if isinstance(source, Calibration) else {}
         for name, one in numbers.of(quantity).items():
-            axis = _axis(name, one, numbers.rate, fits.get(name))
+            rate = numbers.rate
+            if isinstance(source, Calibration) and not source.has_one_rate:
+                rate = 1.0 / source[name].wv.dt
+            axis = _axis(name, one, rate, fits.get(name))
             if together is not None and len(holding) == 1:
                 common = together[name]
                 axis = replace(axis, nees=dict(common.nees))

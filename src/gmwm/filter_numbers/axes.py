@@ -93,7 +93,8 @@ class Axes:
         if isinstance(source, Mapping) and len(source) > 0:
             axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
             if isinstance(source, Calibration):
-                return cls(axes, source.source, source.rate, source.duration, False)
+                rate = source.rate if source.has_one_rate else float("nan")
+                return cls(axes, source.source, rate, source.duration, False)
             return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
         raise InputError(
             f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, or "

@@ -14,6 +14,7 @@ from gmwm.plotting.deviation import (
     straight_lines,
     trace,
 )
+from gmwm.plotting.intervals import intervals
 from gmwm.plotting.navigation import (
     errors,
     growth,
@@ -37,6 +38,7 @@ __all__ = [
     "errors",
     "growth",
     "innovations",
+    "intervals",
     "literal",
     "measured_outage",
     "measured_track",

@@ -39,6 +39,7 @@ def deviation(
     upper: FloatArray,
     *,
     unit: str,
+    interval: str = "95 %",
     title: str = "",
     ax: Axes | None = None,
 ) -> Axes:
@@ -51,6 +52,8 @@ def deviation(
     value, lower, upper : (J,) ndarray
         Deviations and the ends of their intervals, in ``unit``.
     unit : str
+    interval : str, optional
+        Level of the intervals, for the legend.
     title : str, optional
     ax : matplotlib.axes.Axes, optional
 
@@ -65,7 +68,7 @@ def deviation(
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
     ax.errorbar(
         tau, value, yerr=bars, fmt="o", color=DATA_COLOUR, markersize=4.5, capsize=2.5,
-        elinewidth=1.0, label="data, 95 % interval", zorder=4,
+        elinewidth=1.0, label=f"data, {interval} interval", zorder=4,
     )  # fmt: skip
     ax.set_xscale("log")
     ax.set_yscale("log")

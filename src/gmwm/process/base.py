@@ -169,7 +169,7 @@ class Process:
     @property
     def shape_parameters(self) -> tuple[Parameter, ...]:
         """The parameters that enter the wavelet variance non-linearly."""
-        return tuple(parameter for parameter in self.parameters if parameter.role == "shape")
+        return tuple([parameter for parameter in self.parameters if parameter.role == "shape"])
 
     def at_unit(self, shape: Shape) -> Self:
         """A copy at another shape and unit amplitude."""

@@ -139,29 +139,38 @@ class Resonance(Process):
     ) -> None:
         super().__init__(sigma, frequency, damping)
 
-    def _exponential(self, dt: float) -> tuple[complex, complex]:
+    @staticmethod
+    def _exponential(shape: Shape, dt: float) -> tuple[complex, complex]:
         """Rate per sample and weight of one of the two conjugate exponentials."""
-        root = np.sqrt(1.0 - self.damping**2)
-        rate = 2.0 * np.pi * self.frequency * dt * complex(self.damping, -root)
-        return rate, complex(1.0, -self.damping / root)
+        frequency, damping = shape
+        root = math.sqrt(1.0 - damping**2)
+        rate = 2.0 * math.pi * frequency * dt * complex(damping, -root)
+        return rate, complex(1.0, -damping / root)
+
+    @property
+    def _shape(self) -> Shape:
+        return self.frequency, self.damping
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(dt)
+        rate, weight = self._exponential(self._shape, dt)
         return self.sigma**2 * np.real(weight * _exponential_psd(rate, f, dt))
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(dt)
+        return self.sigma**2 * self.unit_haar_variance(self._shape, tau, dt)
+
+    def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        rate, weight = self._exponential(shape, dt)
         m = np.asarray(tau, dtype=float) / dt
         direct = np.real(weight * _exponential_haar(rate, m))
-        return self.sigma**2 * np.where(m * abs(rate) < 1e-3, self._slow_haar(m, dt), direct)
+        return np.where(m * abs(rate) < 1e-3, self._slow_haar(rate, weight, m), direct)
 
-    def _slow_haar(self, m: FloatArray, dt: float) -> FloatArray:
+    @staticmethod
+    def _slow_haar(rate: complex, weight: complex, m: FloatArray) -> FloatArray:
         """Expansion for m |rate| << 1, where the linear terms of the conjugates cancel.
 
         With the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k, the wavelet variance is a polynomial
         in m by Faulhaber's sums.
         """
-        rate, weight = self._exponential(dt)
         v2, v3, v4 = (
             -2.0 * np.real(weight * (-rate) ** p) / factorial
             for p, factorial in ((2, 2.0), (3, 6.0), (4, 24.0))
@@ -171,7 +180,7 @@ class Resonance(Process):
         return np.asarray(v2 * m**2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(dt)
+        rate, weight = self._exponential(self._shape, dt)
         return self.sigma**2 * np.real(weight * np.exp(-rate * np.asarray(lag)))
 
     def state_space(self, dt: float) -> StateSpace:

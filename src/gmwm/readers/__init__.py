@@ -8,6 +8,7 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 from gmwm._core.units import AUXILIARY
 from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
 from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
@@ -24,6 +25,8 @@ __all__ = [
     "TurningGravity",
     "bare",
     "block_means",
+    "is_frame",
+    "is_text",
     "label",
     "meaning",
     "read",

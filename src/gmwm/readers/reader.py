@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.arrays import ArrayTable
 from gmwm.readers.at_rest import rest_notices
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
-from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.formats import (
+    Part,
+    has_sensors,
+    joined,
+    open_tables,
+    shares,
+    with_temperature,
+)
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
@@ -28,19 +32,24 @@ from gmwm.readers.table import Table, label
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Any,
     rate: float | None = None,
     units: Mapping[str, str] | None = None,
     channels: Mapping[str, Reference] | Collection[str] | None = None,
     time: Reference | Literal[False] | None = None,
+    *,
+    topic: str | Sequence[str] = (),
+    clock: str = "header",
 ) -> Recording:
     """Read a static recording of an inertial sensor.
 
     Parameters
     ----------
-    path : str or path
+    path : str, path, DataFrame or Arrow table
         Delimited text (comma, semicolon, tab or blanks; with or without a header; plain or gzip;
-        decimal commas where they do not part the columns), NPY or NPZ.
+        decimal commas where they do not part the columns), NPY or NPZ, a bag of ROS 1 or 2, a log
+        of PX4 (ULog) or ArduPilot (binary), MAT, HDF5, Parquet or Feather; or a table in memory of
+        pandas, polars or Arrow. What a file is shows in its first bytes.
     rate : float, optional
         Sampling rate, Hz. Not needed if the file has time stamps.
     units : mapping of str to str, optional
@@ -57,11 +66,17 @@ def read(
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
         header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
         as seconds, and for others ``rate`` is needed.
+    topic : str or sequence of str, optional
+        Of a bag or a flight log, the topic to read, or one of gyros and one of accelerometers;
+        needed where there are several.
+    clock : {"header", "log"}, optional
+        Stamps of messages: those of their headers, or the times at which they were recorded.
 
     Returns
     -------
     Recording
-        In rad/s and m/s^2. Samples are NaN where a field is empty (or NaN, NA, null), and where
+        In rad/s and m/s^2. Topics of different rates give channels of their own rates, cut to the
+        time that they share. Samples are NaN where a field is empty (or NaN, NA, null), and where
         the time stamps jump forward, as many as fit on the grid of the sampling interval. Columns
         of temperatures, voltages and further clocks are its auxiliary channels. Its
         ``notices`` report what was assumed, which columns were not used and what is missing.
@@ -76,8 +91,38 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    units = units or {}
-    table = _open(Path(path))
+    topics = (topic,) if isinstance(topic, str) else tuple(topic)
+    tables = open_tables(path, topics, clock)
+    return _read(tables, rate, units or {}, channels, time)
+
+
+def _read(
+    tables: Sequence[Table],
+    rate: float | None,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Recording:
+    """The recording of one table or of several."""
+    if len(tables) == 1:
+        return _part(tables[0], rate, units, channels, time).recording
+    own = [table for table in tables if has_sensors(table)]
+    chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
+    parts = [_part(table, rate, units, only, time) for table, only in chosen]
+    for table in tables:
+        if table not in own:
+            parts[0] = with_temperature(parts[0], table)
+    return joined(parts)
+
+
+def _part(
+    table: Table,
+    rate: float | None,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Part:
+    """The recording of a table, and when it begins."""
     stated = _stated_rate(table, rate)
     columns = Columns(table.source, table.names)
     roles = assign_roles(columns, table.tentative, units, channels, time)
@@ -94,6 +139,9 @@ def read(
     unit_of, unit_notices = channel_units(table, roles, units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
+    start = 0.0
+    if roles.time is not None:
+        start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
     _check_size(table, roles, arrays)
     used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
@@ -108,17 +156,13 @@ def read(
     )
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
-    return replace(
+    recording = replace(
         recording,
         channels=(*recording.channels, *further),
         notices=(*at_rest, *recording.notices),
         jitter=timing.jitter if timing is not None else None,
     )
-
-
-def _open(path: Path) -> Table:
-    kind = ArrayTable if path.suffix.lower() in (".npy", ".npz") else CsvTable
-    return kind.open(existing_file(path))
+    return Part(recording, start)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

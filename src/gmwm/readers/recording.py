@@ -1,4 +1,4 @@
-"""A static recording: named channels of equal rate."""
+"""A static recording: named channels, of equal rate or each at its own."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
-    | {"missing-samples", "part"}
+    | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
 )
 """Codes of the notices about how a file was read."""
 
@@ -107,7 +107,10 @@ class Channel:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Mapping[str, Channel]):
-    """Channels with one sampling rate: a mapping of their names to `Channel`.
+    """Channels that begin and end together: a mapping of their names to `Channel`.
+
+    Most often they have one sampling rate; in a log of sensors with clocks of their own each has
+    that of its ``dt``, and `rate`, `dt` and `n` are those of the fastest.
 
     Attributes
     ----------
@@ -178,7 +181,7 @@ class Recording(Mapping[str, Channel]):
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
             raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
-        return cls(tuple(channels), source, (*notices, *_notices_of_gaps(channels)))
+        return cls(tuple(channels), source, (*notices, *notices_of_gaps(channels)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -192,18 +195,59 @@ class Recording(Mapping[str, Channel]):
 
     @property
     def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.channels[0].dt
+        """Sampling interval, s, of the fastest channels."""
+        return self._fastest.dt
 
     @property
     def rate(self) -> float:
-        """Sampling rate, Hz."""
+        """Sampling rate, Hz, of the fastest channels."""
         return 1.0 / self.dt
 
     @property
     def n(self) -> int:
-        """Number of samples of each channel."""
-        return self.channels[0].n
+        """Number of samples of the fastest channels."""
+        return self._fastest.n
+
+    @property
+    def _fastest(self) -> Channel:
+        return max(self.inertial or self.channels, key=lambda channel: channel.n)
+
+    def by_rate(self) -> tuple[Recording, ...]:
+        """Recordings of one sampling rate each, of which this one is made; itself, most often.
+
+        The auxiliary channels, which explain the others, are in all of them.
+        """
+        kinds = dict.fromkeys((channel.dt, channel.n) for channel in self.inertial)
+        if len(kinds) < 2:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                channels=tuple(
+                    channel
+                    for channel in self.channels
+                    if channel.is_auxiliary or (channel.dt, channel.n) == kind
+                ),
+            )
+            for kind in kinds
+        )
+
+    def of_one_rate(self, what: str) -> Recording:
+        """The recording, if all channels of its sensors have one sampling rate.
+
+        Raises
+        ------
+        InputError
+            If they have several, which ``what`` does not work with.
+        """
+        parts = self.by_rate()
+        if len(parts) > 1:
+            rates = " and ".join(f"{part.rate:.6g}" for part in parts)
+            raise InputError(
+                f"{self.source or 'the recording'} has channels at {rates} Hz, and {what} needs "
+                "one rate: choose a topic that has all of them"
+            )
+        return self
 
     @property
     def duration(self) -> float:
@@ -242,13 +286,19 @@ class Recording(Mapping[str, Channel]):
                 f"{self.source or 'the recording'} lasts {self.duration:.6g} s and has fewer than "
                 f"{tuning.FEWEST_SAMPLES} samples from {start:g} to {end:g} s: give other times"
             )
-        first, last = round(start * self.rate), round(end * self.rate)
-        channels = tuple(replace(c, values=c.values[first:last]) for c in self.channels)
+        channels = tuple(
+            replace(c, values=c.values[round(start / c.dt) : round(end / c.dt)])
+            for c in self.channels
+        )
         text = f"the part from {start:.6g} to {end:.6g} s is used; times count from its start"
         part = Notice("part", "note", "", text, {"start": float(start), "stop": end})
         kept = [notice for notice in self.notices if notice.code != "missing-samples"]
-        notices = (*kept, part, *_notices_of_gaps(channels))
+        notices = (*kept, part, *notices_of_gaps(channels))
         return replace(self, channels=channels, notices=notices)
+
+    @property
+    def _rates(self) -> str:
+        return " and ".join(f"{part.rate:g}" for part in self.by_rate())
 
     def __getitem__(self, name: str) -> Channel:
         for channel in self.channels:
@@ -265,14 +315,14 @@ class Recording(Mapping[str, Channel]):
         return len(self.channels)
 
     def __repr__(self) -> str:
-        size = f"{self.rate:g} Hz, {self.duration:.6g} s"
+        size = f"{self._rates} Hz, {self.duration:.6g} s"
         return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
-        head = f"{self.source or 'recording'}: {self.rate:g} Hz, {self.duration:.6g} s"
+        head = f"{self.source or 'recording'}: {self._rates} Hz, {self.duration:.6g} s"
         return "\n".join(
             [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
         )
@@ -299,7 +349,7 @@ def _series(name: str, values: FloatArray) -> FloatArray:
     return series
 
 
-def _notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
+def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
     """One for all channels that miss equally many samples in equally many gaps."""
     alike: dict[tuple[int, int, int], list[Channel]] = {}
     for channel in channels:

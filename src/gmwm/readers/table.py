@@ -10,7 +10,10 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 
-FORMATS = "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ"
+FORMATS = (
+    "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ, ROS bags, PX4 and "
+    "ArduPilot logs, MAT, HDF5, Parquet and Feather"
+)
 """For messages about files of another kind."""
 
 

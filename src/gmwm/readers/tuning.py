@@ -46,6 +46,10 @@ BYTES_PER_SAMPLE = 20
 """Of memory while a file is read: a column as it is read, the same in SI units, and one of the
 others joined from its blocks."""
 
+THINNED = 20.0
+"""Hz: an inertial sensor is logged no slower unless most of its samples are left out; PX4 logs its
+raw topics at 1 Hz by default, and ArduPilot its IMU at 25 Hz at least."""
+
 # -- the clock ------------------------------------------------------------------------------------
 
 RATES_AGREE = 0.01

@@ -1,34 +1,62 @@
-"""The page: what is shown, and in which words."""
+"""The page: what is shown, in which order, and in which words."""
 
 from __future__ import annotations
 
 import os
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from html import escape
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import gmwm
 from gmwm._core.files import written
 from gmwm._core.units import field_units
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
+from gmwm.readers import Recording
+from gmwm.report.answer import answer, bias_instability, quantity_text, slow_terms, trust, verdict
 from gmwm.report.budget import navigation
-from gmwm.report.figure import deviation_figure, residual_figure
+from gmwm.report.datasheet import Datasheet, read_datasheet
+from gmwm.report.figure import (
+    density_figure,
+    deviation_figure,
+    overview_figure,
+    residual_figure,
+    series_figure,
+)
 from gmwm.report.health import ambiguity, health
-from gmwm.report.page import DRAW, rendered
+from gmwm.report.numbers import SHOWN, Certified, certified
+from gmwm.report.page import rendered, resource
+from gmwm.report.text import duration_text, needed, number, short
 
-_DAY, _YEAR = 86400.0, 365.25 * 86400.0
-_DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
 _AIM = 0.1  # relative standard error
-_MANY_YEARS = 100.0
 
 
-def write_report(calibration: Calibration, path: str | os.PathLike[str]) -> Path:
+def write_report(
+    calibration: Calibration,
+    path: str | os.PathLike[str],
+    recording: Recording | None = None,
+    *,
+    datasheet: str | os.PathLike[str] | None = None,
+    provenance: Mapping[str, str] | None = None,
+) -> Path:
     """Write the report of a calibration as one HTML file that needs no network.
 
     Parameters
     ----------
     calibration : Calibration
     path : path-like
+    recording : Recording, optional
+        What was calibrated: its time series and spectra are shown too.
+    datasheet : path-like, optional
+        YAML of N, B and K by sensor or channel, such as ``gyro: {N: 0.15 deg/sqrt(h)}``: drawn
+        over the curves.
+    provenance : mapping of str to str, optional
+        What else is known of where the numbers come from: commands, hashes of files.
 
     Returns
     -------
@@ -37,73 +65,158 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str]) -> Path
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written, or the data sheet not be read.
     """
-    text = page(calibration)
+    text = page(calibration, recording, datasheet=datasheet, provenance=provenance)
     with written(path) as stream:
         stream.write(text)
     return Path(path)
 
 
-def page(calibration: Calibration) -> str:
-    """The report as HTML text."""
+def page(
+    calibration: Calibration,
+    recording: Recording | None = None,
+    *,
+    datasheet: str | os.PathLike[str] | None = None,
+    provenance: Mapping[str, str] | None = None,
+) -> str:
+    """The report as HTML text; see `write_report`."""
     from plotly.offline import get_plotlyjs
 
+    quantities = {name: fit.wv.quantity or "" for name, fit in calibration.items()}
+    sheet = None if datasheet is None else read_datasheet(datasheet, quantities)
+    numbers = certified(calibration)
     return rendered(
         "template.html",
-        scripts=(get_plotlyjs(), DRAW),
+        scripts=(get_plotlyjs(), resource("report.js")),
+        style=resource("report.css"),
         calibration=calibration,
-        version=gmwm.__version__,
         length=duration_text(calibration.duration),
+        answer=answer(calibration, numbers),
+        overview=[
+            (f"{quantity or 'other channels'}", overview_figure(calibration, quantity))
+            for quantity in dict.fromkeys(fit.wv.quantity for fit in calibration.values())
+        ],
         health=health(calibration),
-        channels=[_channel(name, fit, calibration) for name, fit in calibration.fits.items()],
+        channels=[
+            _channel(name, calibration, numbers[SHOWN], recording, sheet) for name in calibration
+        ],
         navigation=navigation(calibration),
+        provenance=_provenance(calibration, provenance or {}, sheet),
     )
 
 
-def duration_text(seconds: float) -> str:
-    """A duration as people say it: ``40 s``, ``35 min``, ``2 h 46 min``, ``12 days``."""
-    if seconds >= _YEARS * _YEAR:
-        return f"{seconds / _YEAR:.2g} years"
-    if seconds >= _DAYS * _DAY:
-        return f"{seconds / _DAY:.3g} days"
-    if seconds < 120.0:
-        return f"{seconds:.3g} s"
-    minutes = round(seconds / 60.0)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+def fragment(calibration: Calibration) -> str:
+    """The answer axis by axis as a table for a notebook, without what a filter should believe."""
+    found = verdict(calibration)
+    head = "<tr><th>channel</th><th>model</th><th>N</th><th>B</th><th>slow terms</th><th></th></tr>"
+    rows = []
+    for name, fit in calibration.items():
+        is_valid, why = trust(name, fit, calibration)
+        cells = [
+            name,
+            fit.model.title(),
+            quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
+            bias_instability(fit)["field"],
+            "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
+            f"{'valid' if is_valid else 'not valid'}: {why}",
+        ]
+        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    title = (
+        f"{calibration.source or 'a recording'}: {duration_text(calibration.duration)} at "
+        f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
+    )
+    return f"<p>{escape(title)}</p><table>{head}{''.join(rows)}</table>"
 
 
-def number(value: float) -> str:
-    """Four significant digits, without an exponent where a person would write none."""
-    text = f"{value:.4g}"
-    return text if "e" not in text else f"{value:.3e}"
+def _provenance(
+    calibration: Calibration, given: Mapping[str, str], sheet: Datasheet | None
+) -> dict[str, str]:
+    known = {"recording": calibration.source or "not named", **given}
+    if sheet is not None:
+        known["data sheet"] = sheet.name
+    return known | {
+        "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
+        f"Python {platform.python_version()}",
+        "report of": datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),
+    }
 
 
-def _in_field_unit(value: float, parameter_unit: str, fit: Fit) -> str:
-    units = field_units(parameter_unit, fit.wv.quantity)
-    if not units:
-        return f"{number(value)} {fit.wv.unit}"
-    return f"{number(value * units[0].per_si)} {units[0].unit}"
-
-
-def _channel(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
-    low = floor(fit)
+def _channel(
+    name: str,
+    calibration: Calibration,
+    numbers: Certified,
+    recording: Recording | None,
+    sheet: Datasheet | None,
+) -> dict[str, Any]:
+    fit = calibration[name]
     lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
+    own = numbers.axes.get(name)
+    believed = (own.N, own.K) if own is not None else None
+    spans = calibration.left_out.get(name, ())
+    channel = recording[name] if recording is not None and name in recording else None
+    is_valid, why = trust(name, fit, calibration)
     return {
         "name": name,
         "fit": fit,
         "model": fit.model.title(),
-        "density": _in_field_unit(white_density(fit), "u/sqrt(Hz)", fit),
-        "floor": _in_field_unit(low.deviation, "u", fit),
-        "floor_tau": number(low.tau),
+        "valid": is_valid,
+        "why": why,
         "sentence": sentence(fit),
         "ambiguity": ambiguity(calibration, name),
+        "stated": _stated(name, fit, sheet),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
-        "figure": deviation_figure(fit),
+        "figure": deviation_figure(
+            fit,
+            filter_numbers=believed,
+            rivals=calibration.rivals.get(name, ()),
+            sheet=sheet,
+        ),
+        "sliders": _sliders(fit, believed),
         "residuals": residual_figure(fit),
+        "density": None if channel is None else density_figure(fit, channel, spans),
+        "series": None if channel is None else series_figure(fit, channel, spans),
+        "left_out": sum(stop - start for start, stop in spans),
         "fitness": _fitness(fit),
     }
+
+
+def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, str]]:
+    """Where the sliders of N and K stand at first, and what the page needs to write their value."""
+    if numbers is None:
+        return []
+    shown = []
+    for letter, value, unit in zip("NK", numbers, ("u/sqrt(Hz)", "u/s/sqrt(Hz)"), strict=True):
+        text = quantity_text(1.0, unit, fit)
+        shown.append({"letter": letter, "value": f"{value:.6e}", **{
+            key: each.split(" ", 1)[1] for key, each in text.items()
+        }, "per_si": f"{_per_si(unit, fit):.9e}"})  # fmt: skip
+    return shown
+
+
+def _per_si(unit: str, fit: Fit) -> float:
+    found = field_units(unit, fit.wv.quantity)
+    return found[0].per_si if found else 1.0
+
+
+def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
+    """The data sheet's numbers beside what was measured."""
+    values = sheet.of(name, fit.wv.quantity) if sheet is not None else {}
+    if not values:
+        return ""
+    units = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
+    measured = {
+        "N": white_density(fit),
+        "B": floor(fit).bias_instability,
+        "K": 0.0 if "K" in fit.upper_bounds else fit.params.get("K", 0.0),
+    }
+    parts = []
+    for key, value in values.items():
+        text = f"{key} {quantity_text(value, units[key], fit)['field']}"
+        if measured[key] > 0.0:
+            text += f" (measured {short(measured[key] / value)} times that)"
+        parts.append(text)
+    return f"Data sheet: {', '.join(parts)}."
 
 
 def _fitness(fit: Fit) -> str:
@@ -115,19 +228,6 @@ def _fitness(fit: Fit) -> str:
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
-
-
-def needed(seconds: float | None, duration: float) -> str:
-    """Length of record that a parameter needs, in words; empty if it was not estimated."""
-    if seconds is None:
-        return ""
-    if seconds <= duration:
-        return "long enough"
-    if seconds == float("inf"):
-        return "not identified"
-    if seconds > _MANY_YEARS * _YEAR:
-        return "centuries"
-    return f"needs {duration_text(seconds)}"
 
 
 def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str, Any]:
@@ -142,7 +242,7 @@ def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str,
         return {"value": number(value), "interval": estimate.kind, "unit": unit}
 
     si = (estimate.value, estimate.lower, estimate.upper, estimate.unit)
-    cells = [cell(*si), *(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field)]
+    cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
     error = ""
     if estimate.kind == "estimated" and estimate.value and estimate.stderr is not None:
         error = f"{100.0 * estimate.stderr / abs(estimate.value):.2g} %"

@@ -1,181 +1,288 @@
-"""Interactive plots, as the JSON that plotly.js draws."""
+"""Interactive plots, as the JSON that plotly.js draws and ``report.js`` changes.
+
+Beside ``data``, ``layout`` and ``config`` a figure has ``units``: titles of the y axis in the
+field's unit and in SI with the factor from the first; ``toggles``: the traces that a reader may
+hide; and ``whatif``: N and K of the curve that sliders move, with the sampling interval.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import field_units
+from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
-from gmwm.estimate.result import Fit
-from gmwm.plotting import (
-    COMPONENT_COLOURS,
-    DATA_COLOUR,
-    LINEAR_RESIDUAL,
-    SUM_COLOUR,
-    deviation_range,
-)
+from gmwm.calibration import Calibration, floor
+from gmwm.estimate import Fit
+from gmwm.estimate.result import dense_curves
+from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
+from gmwm.process import Model, Process
+from gmwm.readers import Channel
+from gmwm.report.datasheet import Datasheet
+from gmwm.report.samples import Spans, density, series
 
-_GRID = "#dddddd"
+Figure = dict[str, Any]
+
+WHATIF = "filter: N and K"
+"""Name of the curve that sliders move."""
+
+_GRID = "#dddddd"  # the page's style sheet gives it another shade on dark screens
 _BESIDE = 1.7  # ratio of averaging times that is left free at both ends
-_LAYOUT: dict[str, Any] = {
-    "margin": {"l": 75, "r": 15, "t": 36, "b": 50},
-    "height": 420,
-    "plot_bgcolor": "#ffffff",
-    "paper_bgcolor": "#ffffff",
+_SHEET = "#9a5b00"
+_BELOW = 8.0  # how far below the curves a mark may lie that the axis is stretched for
+_SHARE = 60.0  # per cent: residuals beyond are drawn at the edge
+_LAYOUT: Figure = {
+    "margin": {"l": 62, "r": 12, "t": 12, "b": 44},
+    "height": 360,
+    "plot_bgcolor": "rgba(0,0,0,0)",
+    "paper_bgcolor": "rgba(0,0,0,0)",
     "hovermode": "closest",
-    "font": {"family": "system-ui, sans-serif", "size": 13},
+    "showlegend": False,
+    "font": {"family": "system-ui, sans-serif", "size": 12, "color": SUM_COLOUR},
 }
-_CONFIG = {
-    "displaylogo": False,
-    "responsive": True,
-    "modeBarButtonsToRemove": ["lasso2d", "select2d"],
-}
+_CONFIG = {"displayModeBar": False, "responsive": True}
 
 
-def deviation_figure(fitted: Fit) -> dict[str, Any]:
-    """Allan deviation with error bars, model and components, in SI with the field's unit on hover.
+def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
+    """The fitted curves of the axes of a sensor over their data."""
+    fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
+    traces: list[Figure] = []
+    first = next(iter(fits.values()))
+    units = _units("Allan deviation", "u", first)
+    factor = _factor("u", first)
+    seen: list[FloatArray] = []
+    for (name, fit), colour in zip(fits.items(), _colours(len(fits)), strict=True):
+        tau, components = dense_curves(fit)
+        total = factor * root_sum(list(components.values()))
+        value = factor * fit.wv.allan_deviation
+        traces.append(_line(tau, total, name, colour, "solid", 1.8))
+        points = _points(fit.wv.tau, value, f"{name}, data", colour, 4)
+        traces.append({**points, "legendgroup": name})
+        seen += [total, value]
+    low, high = deviation_range(np.concatenate(seen))
+    ends = np.concatenate([fit.wv.tau for fit in fits.values()])
+    return _figure(
+        traces,
+        {
+            "height": 300,
+            "xaxis": _times(np.sort(ends)),
+            "yaxis": {**_axis(units[0][0]), "range": [np.log10(2.0 * low), np.log10(high)]},
+        },
+        units=units,
+        toggles=range(0, len(traces), 2),
+    )
 
-    Returns
-    -------
-    dict
-        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
+
+def deviation_figure(
+    fitted: Fit,
+    *,
+    filter_numbers: tuple[float, float] | None = None,
+    rivals: Sequence[Model] = (),
+    sheet: Datasheet | None = None,
+) -> Figure:
+    """Allan deviation of the data with intervals, model, terms, and what a filter believes.
+
+    Parameters
+    ----------
+    fitted : Fit
+    filter_numbers : (float, float), optional
+        N and K of the curve that the sliders move, SI.
+    rivals : sequence of Model, optional
+        That describe the data as well: drawn faintly.
+    sheet : Datasheet, optional
     """
-    wv = fitted.wv
-    unit, factor = wv.unit, 1.0
-    field = field_units("u", wv.quantity)
-    if field:
-        unit, factor = field[0].unit, field[0].per_si
-    tau = wv.tau.tolist()
-    value = wv.allan_deviation * factor
-    lower, upper = np.sqrt(2.0 * wv.lower) * factor, np.sqrt(2.0 * wv.upper) * factor
-    total = np.sqrt(2.0 * fitted.implied) * factor
+    wv, factor = fitted.wv, _factor("u", fitted.wv)
+    tau, components = dense_curves(fitted)
+    total = root_sum(list(components.values()))
     traces = [
-        _line(tau, np.sqrt(2.0 * curve) * factor, label, colour, "dash", 1.5)
-        for (label, curve), colour in zip(
-            fitted.components.items(), _colours(len(fitted.components)), strict=True
-        )
-        if np.any(curve > 0.0)
-    ]
-    traces.append(_line(tau, total, "model", SUM_COLOUR, "solid", 2.2))
+        {**_line(*_deviation_of(fitted, rival, factor), "models that tie", "#999999", "solid", 1.0),
+         "opacity": 0.6, "legendgroup": "ties"}
+        for rival in rivals
+    ]  # fmt: skip
+    toggles = [0] if traces else []
+    for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
+        if np.any(curve > 0.0):
+            toggles.append(len(traces))
+            traces.append(_line(tau, factor * curve, label, colour, "dash", 1.5))
+    stated = sheet.deviation(wv.name, wv.quantity, tau, wv.dt) if sheet else None
+    if stated is not None:
+        toggles.append(len(traces))
+        traces.append(_line(tau, factor * stated, "data sheet", _SHEET, "longdashdot", 2.0))
+    toggles.append(len(traces))
+    traces.append(_line(tau, factor * total, "model", SUM_COLOUR, "solid", 2.2))
+    value = factor * wv.allan_deviation
+    toggles.append(len(traces))
     traces.append(
         {
-            "type": "scatter",
-            "mode": "markers",
-            "name": "data, 95 % interval",
-            "x": tau,
-            "y": value.tolist(),
-            "marker": {"color": DATA_COLOUR, "size": 6},
-            "error_y": {
-                "type": "data",
-                "symmetric": False,
-                "array": (upper - value).tolist(),
-                "arrayminus": (value - lower).tolist(),
-                "color": DATA_COLOUR,
-                "thickness": 1.2,
-                "width": 3,
-            },
+            **_points(wv.tau, value, f"data, {100.0 * wv.confidence:g} % interval", DATA_COLOUR, 6),
+            "error_y": _bars(value, factor * np.sqrt(2.0 * wv.lower),
+                             factor * np.sqrt(2.0 * wv.upper), DATA_COLOUR),
         }
-    )
-    low, high = deviation_range(np.concatenate([total, value]))
+    )  # fmt: skip
+    more: Figure = {}
+    if filter_numbers is not None:
+        more["whatif"] = {"curve": WHATIF, "factor": factor}
+        toggles.append(len(traces))
+        traces.append(_whatif(tau, filter_numbers, factor))
+    traces.append(_marks(fitted, filter_numbers, factor))
+    low, high = deviation_range(np.concatenate([factor * total, value]))
+    marks = [y for y in traces[-1]["y"] if y > low / _BELOW]
+    units = _units("Allan deviation", "u", fitted)
     layout = {
-        **_LAYOUT,
         "xaxis": _times(wv.tau),
         "yaxis": {
-            **_axis(f"Allan deviation [{unit}]"),
-            "range": [float(np.log10(low)), float(np.log10(high))],
+            **_axis(units[0][0]),
+            "range": [np.log10(min([low, *(0.7 * y for y in marks)])), np.log10(high)],
         },
-        "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 1, "xanchor": "right", "y": 1},
     }
-    return {"data": traces, "layout": layout, "config": _CONFIG}
+    return _figure(traces, layout, units=units, toggles=toggles, **more)
 
 
-def residual_figure(fitted: Fit) -> dict[str, Any]:
-    """Standardised residuals by averaging time, with the misfit of the deviation on hover.
+def _deviation_of(fitted: Fit, model: Model, factor: float) -> tuple[FloatArray, FloatArray]:
+    tau, components = dense_curves(fitted, model)
+    return tau, factor * root_sum(list(components.values()))
 
-    Returns
-    -------
-    dict
-        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
-    """
-    at = fitted.goodness
+
+def _whatif(tau: FloatArray, numbers: tuple[float, float], factor: float) -> Figure:
+    N, K = numbers
+    value = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
+    return _line(tau, value, WHATIF, "#b8860b", "dot", 2.4)
+
+
+def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
+    """N where its line passes 1 s, K where its line passes 3 s, B at the lowest point."""
+    low = floor(fitted)
+    places = [("B", low.tau, low.deviation)]
+    if numbers is not None:
+        places += [("N", 1.0, numbers[0]), ("K", 3.0, numbers[1])]
+    shown = [(label, tau, y * factor) for label, tau, y in places if y > 0.0]
+    return {
+        "type": "scatter",
+        "mode": "markers+text",
+        "name": "N at 1 s, B at the floor, K at 3 s",
+        "x": [each[1] for each in shown],
+        "y": [float(f"{each[2]:.5g}") for each in shown],
+        "text": [each[0] for each in shown],
+        "textposition": ["top right" if each[0] != "K" else "top left" for each in shown],
+        "textfont": {"size": 14, "color": SUM_COLOUR},
+        "marker": {"symbol": "diamond", "size": 10, "color": "#b8860b"},
+        "hovertemplate": "%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
+    }
+
+
+def residual_figure(fitted: Fit) -> Figure:
+    """Data over model in per cent of the deviation, with the data's interval."""
+    at, wv = fitted.goodness, fitted.wv
     shown = np.flatnonzero(np.isfinite(at.residual) & np.isfinite(at.misfit))
-    residual = at.residual[shown]
-    tau, height = at.tau[shown].tolist(), _compressed(residual).tolist()
-    stems: dict[str, list[float | None]] = {"x": [], "y": []}
-    for time, value in zip(tau, height, strict=True):
-        stems["x"] += [time, time, None]
-        stems["y"] += [0.0, value, None]
-    colour = COMPONENT_COLOURS[0]
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            **stems,
-            "line": {"color": colour, "width": 2},
-            "hoverinfo": "skip",
-        },
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "x": tau,
-            "y": height,
-            "marker": {"color": colour, "size": 7},
-            "customdata": [
-                [100.0 * misfit, dof, value]
-                for misfit, dof, value in zip(
-                    at.misfit[shown], at.dof[shown], residual, strict=True
-                )
-            ],
-            "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
-            "%{customdata[2]:+.2f} standard errors, %{customdata[1]:.3g} degrees of freedom"
-            "<extra></extra>",
-        },
+    misfit = 100.0 * at.misfit[shown]
+    # The interval of the data, about the misfit.
+    share = np.sqrt(np.stack([wv.lower, wv.upper]) / np.maximum(wv.variance, np.finfo(float).tiny))
+    low, high = (100.0 + misfit) * share[:, shown] - 100.0
+    well = np.maximum(np.abs(low), np.abs(high))[at.dof[shown] > 30.0]
+    reach = float(np.clip(1.3 * np.max([5.0, *well]), 5.0, _SHARE))
+    inside = np.abs(misfit) <= reach
+    points = {
+        **_points(at.tau[shown], np.clip(misfit, -0.96 * reach, 0.96 * reach), "data over model",
+                  COMPONENT_COLOURS[0], 7),
+        "error_y": _bars(misfit, low, high, COMPONENT_COLOURS[0]),
+        "customdata": [
+            [float(f"{value:.4g}") for value in row]
+            for row in zip(misfit, at.residual[shown], at.dof[shown], strict=True)
+        ],
+        "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
+        "%{customdata[1]:+.2f} standard errors, %{customdata[2]:.3g} degrees of freedom"
+        "<extra></extra>",
+    }  # fmt: skip
+    points["marker"]["symbol"] = [
+        "circle" if ok else "triangle-up" if value > 0.0 else "triangle-down"
+        for ok, value in zip(inside, misfit, strict=True)
     ]
-    band = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": -2, "y1": 2}
-    largest = max([2.5, *map(abs, height)])
-    ticks = np.array([-100.0, -10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 100.0])
     layout = {
-        **_LAYOUT,
-        "margin": {"l": 75, "r": 15, "t": 30, "b": 42},  # the toolbar is above the points
-        "height": 212,
-        "showlegend": False,
-        "shapes": [{**band, "fillcolor": "#e8eef4", "line": {"width": 0}, "layer": "below"}],
+        "height": 190,
         "xaxis": _times(at.tau),
         "yaxis": {
-            "title": {"text": "residual [sigma]"},
-            "range": [-1.15 * largest, 1.15 * largest],
-            "tickvals": _compressed(ticks).tolist(),
-            "ticktext": [f"{value:g}" for value in ticks],
-            "gridcolor": _GRID,
-            "linecolor": "#888888",
-            "mirror": True,
+            **_linear("data less model [%]"),
+            "range": [-reach, reach],
+            "zeroline": True,
             "zerolinecolor": SUM_COLOUR,
         },
     }
-    return {"data": traces, "layout": layout, "config": _CONFIG}
+    return _figure([points], layout)
 
 
-def _compressed(residual: FloatArray) -> FloatArray:
-    """Heights of residuals: linear near zero, logarithmic beyond, so that one flattens no other."""
-    size = np.abs(residual)
-    beyond = LINEAR_RESIDUAL * (1.0 + np.log10(np.maximum(size, LINEAR_RESIDUAL) / LINEAR_RESIDUAL))
-    return np.asarray(np.sign(residual) * np.where(size > LINEAR_RESIDUAL, beyond, size))
+def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
+    """Root of the spectral density of the samples, with that of the model and of its terms."""
+    factor = _factor("u/sqrt(Hz)", fitted.wv)
+    frequency, root = density(channel, spans)
+    traces = [_line(frequency, factor * root, "data", "#7f8c99", "solid", 1.2)]
+    toggles = [0]
+    grid = np.geomspace(frequency[0], frequency[-1], 160)
+    terms = zip(fitted.model.term_labels(), fitted.model.terms, strict=True)
+    found: dict[str, FloatArray] = {
+        label: _root_density(term, grid, channel.dt)
+        for label, term in terms
+        if term.has_spectrum() and not term.is_line and not term.is_drift
+    }
+    colours = dict(zip(fitted.model.term_labels(), _colours(len(fitted.model.terms)), strict=True))
+    for label, curve in found.items():
+        if np.any(curve > 0.0):
+            toggles.append(len(traces))
+            traces.append(_line(grid, factor * curve, label, colours[label], "dash", 1.3))
+    if found:
+        toggles.append(len(traces))
+        total = root_sum(list(found.values()))
+        traces.append(_line(grid, factor * total, "model", SUM_COLOUR, "solid", 2.0))
+    units = _units("density", "u/sqrt(Hz)", fitted)
+    known = root[root > 0.0]
+    layout = {
+        "height": 300,
+        "xaxis": _axis("frequency [Hz]"),
+        "yaxis": {
+            **_axis(units[0][0]),
+            "range": [np.log10(0.4 * factor * known.min()), np.log10(2.5 * factor * known.max())],
+        },
+    }
+    return _figure(traces, layout, units=units, toggles=toggles)
 
 
-def growth_figure(
-    known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str
-) -> dict[str, Any]:
-    """Growth of an error with coasting time: its parts, their total, and that of unknown starts.
+def _root_density(term: Process, frequency: FloatArray, dt: float) -> FloatArray:
+    return np.sqrt(np.maximum(np.asarray(term.psd(frequency, dt), dtype=float), 0.0))
 
-    Returns
-    -------
-    dict
-        ``data``, ``layout`` and ``config`` for ``Plotly.newPlot``.
-    """
-    unit, times = FIELD_UNITS[quantity], list(known.grid)
+
+def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
+    """The time series in bins, less its mean, with what was left out of it."""
+    found, factor = series(channel, spans), _factor("u", fitted.wv)
+    end = channel.n * channel.dt
+    unit, scale = ("h", 3600.0) if end > 7200.0 else ("min", 60.0) if end > 600.0 else ("s", 1.0)
+    time = found.time / scale
+    edge = {"type": "scatter", "mode": "lines", "x": _plain(time), "hoverinfo": "skip"}
+    traces: list[Figure] = [
+        {**edge, "name": "smallest", "y": _plain(factor * found.low), "line": {"width": 0}},
+        {**edge, "name": "largest", "y": _plain(factor * found.high), "line": {"width": 0},
+         "fill": "tonexty", "fillcolor": "rgba(0,114,178,0.35)"},
+        {**_line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2),
+         "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
+    ]  # fmt: skip
+    units = _units("less the mean", "u", fitted)
+    layout = {
+        "height": 220,
+        "xaxis": _linear(f"time [{unit}]"),
+        "yaxis": _linear(units[0][0]),
+        "shapes": [
+            {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": first / scale,
+             "x1": last / scale, "fillcolor": "rgba(213,94,0,0.55)", "line": {"width": 0}}
+            for first, last in found.left_out[:500]
+        ],
+    }  # fmt: skip
+    return _figure(traces, layout, units=units)
+
+
+def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str) -> Figure:
+    """Growth of an error with coasting time: its parts, their total, and that of unknown starts."""
+    unit, times = FIELD_UNITS[quantity], np.array(known.grid)
     curves = known.curves(of, quantity)
     traces = [
         _line(times, curve, label, colour, "dash", 1.5)
@@ -188,52 +295,114 @@ def growth_figure(
         parts = list(budget.curves(of, quantity).values())
         if parts:
             traces.append(_line(times, root_sum(parts), label, SUM_COLOUR, dash, width))
-    title = f"{of} {quantity} error, 1 sigma [{unit}]"
+    title = f"{of} {quantity} [{unit}]"
     layout = {
-        **_LAYOUT,
+        "height": 280,
         "xaxis": _axis("coasting time [s]"),
         "yaxis": _axis(title[0].upper() + title[1:]),
-        "legend": {"bgcolor": "rgba(255,255,255,0.85)", "x": 0, "y": 1},
     }
-    return {"data": traces, "layout": layout, "config": _CONFIG}
+    return _figure(traces, layout, toggles=range(len(traces)))
 
 
-def _line(
-    tau: list[float],
-    value: FloatArray,
-    label: str,
-    colour: str,
-    dash: str,
-    width: float,
-) -> dict[str, Any]:
+def _figure(
+    traces: Sequence[Figure],
+    layout: Mapping[str, Any],
+    *,
+    units: Sequence[tuple[str, float]] = (),
+    toggles: Iterable[int] = (),
+    **more: Any,
+) -> Figure:
+    return {
+        "data": list(traces),
+        "layout": {**_LAYOUT, **layout},
+        "config": _CONFIG,
+        "units": list(units),
+        "toggles": list(toggles),
+        **more,
+    }
+
+
+def _units(title: str, unit: str, fitted: Fit) -> list[tuple[str, float]]:
+    """Title of the axis and factor from the unit drawn first, for the field's unit and SI."""
+    quantity = fitted.wv.quantity
+    si = si_parameter_unit(unit, quantity)
+    if quantity is None:
+        si = unit.replace("u", fitted.wv.unit or "u", 1)
+    found = field_units(unit, quantity)
+    field = [(f"{title} [{found[0].unit}]", 1.0)] if found else []
+    return [*field, (f"{title} [{si}]", 1.0 / found[0].per_si if found else 1.0)]
+
+
+def _factor(unit: str, of: Any) -> float:
+    found = field_units(unit, of.quantity if hasattr(of, "quantity") else of.wv.quantity)
+    return found[0].per_si if found else 1.0
+
+
+def _points(x: FloatArray, y: FloatArray, label: str, colour: str, size: int) -> Figure:
     return {
         "type": "scatter",
-        "mode": "lines",
+        "mode": "markers",
         "name": label,
-        "x": tau,
-        "y": value.tolist(),
-        "line": {"color": colour, "dash": dash, "width": width},
+        "x": _plain(x),
+        "y": _plain(y),
+        "marker": {"color": colour, "size": size},
         "hovertemplate": "%{y:.4g} at %{x:.4g} s",
     }
 
 
-def _times(tau: FloatArray) -> dict[str, Any]:
+def _bars(value: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> Figure:
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": _plain(np.maximum(high - value, 0.0)),
+        "arrayminus": _plain(np.maximum(value - low, 0.0)),
+        "color": colour,
+        "thickness": 1.2,
+        "width": 3,
+    }
+
+
+def _line(x: FloatArray, y: FloatArray, label: str, colour: str, dash: str, width: float) -> Figure:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": label,
+        "x": _plain(x),
+        "y": _plain(y),
+        "line": {"color": colour, "dash": dash, "width": width},
+        "hovertemplate": "%{y:.4g} at %{x:.4g}",
+    }
+
+
+def _plain(values: FloatArray) -> list[float | None]:
+    """Five digits are more than a screen shows, and JSON has no infinity."""
+    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values).tolist()]
+
+
+def _times(tau: FloatArray) -> Figure:
     """The axis of averaging times, the same for all figures of a channel."""
     ends = np.log10([tau[0] / _BESIDE, tau[-1] * _BESIDE])
     return {**_axis("averaging time [s]"), "range": ends.tolist()}
 
 
-def _axis(title: str) -> dict[str, Any]:
+def _axis(title: str) -> Figure:
     return {
+        **_linear(title),
         "type": "log",
-        "title": {"text": title},
         "exponentformat": "power",
         "dtick": 1,
+        "ticks": "outside",
+        "minor": {"ticks": "outside", "ticklen": 3},
+    }
+
+
+def _linear(title: str) -> Figure:
+    return {
+        "title": {"text": title, "standoff": 6},
         "gridcolor": _GRID,
         "linecolor": "#888888",
         "mirror": True,
-        "ticks": "outside",
-        "minor": {"ticks": "outside", "ticklen": 3},
+        "zeroline": False,
     }
 
 

@@ -13,7 +13,7 @@ _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
-    """Content of the section: notices by channel, worst first, and the good ones apart."""
+    """Content of the section: notices, worst first, and the good ones apart."""
     examined = calibration.is_examined
     notices = [
         notice
@@ -24,8 +24,8 @@ def health(calibration: Calibration) -> dict[str, Any]:
         "examined": examined,
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(notices),
-        "groups": _groups([notice for notice in notices if notice.severity != "good"]),
-        "good": _groups([notice for notice in notices if notice.severity == "good"]),
+        "rows": _rows([notice for notice in notices if notice.severity != "good"]),
+        "good": _rows([notice for notice in notices if notice.severity == "good"]),
     }
 
 
@@ -38,27 +38,16 @@ def ambiguity(calibration: Calibration, channel: str) -> list[str]:
     ]
 
 
-def _groups(notices: list[Notice]) -> list[dict[str, Any]]:
-    """Notices by recording and channel, those of the whole recording first."""
-    by_place: dict[tuple[str, str], list[Notice]] = {}
-    for notice in sorted(notices, key=lambda notice: bool(notice.where)):
-        by_place.setdefault((notice.where, notice.source), []).append(notice)
-    order = list(dict.fromkeys(where for where, _ in by_place))
+def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
+    """Worst first; of equal ones, those of the whole recording before those of a channel."""
     return [
         {
-            "name": ", ".join(part for part in (where or "whole recording", source) if part),
-            "rows": [
-                {
-                    "severity": notice.severity,
-                    "text": _begun(notice.text),
-                    "action": _begun(notice.action),
-                }
-                for notice in worst_first(group)
-            ],
+            "severity": notice.severity,
+            "where": ", ".join(part for part in (notice.where, notice.source) if part),
+            "text": _begun(notice.text),
+            "action": _begun(notice.action),
         }
-        for (where, source), group in sorted(
-            by_place.items(), key=lambda item: order.index(item[0][0])
-        )
+        for notice in worst_first(sorted(notices, key=lambda notice: bool(notice.where)))
     ]
 
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from hashlib import sha256
+from importlib.resources import files
 from typing import Any
 
-DRAW = """
-document.querySelectorAll("script[data-plot]").forEach(function (each) {
-  var figure = JSON.parse(each.textContent);
-  Plotly.newPlot(each.dataset.plot, figure.data, figure.layout, figure.config);
-});
-"""
-"""Draws the figures of a page: JSON in elements of the type application/json, which do not run."""
+
+def resource(name: str) -> str:
+    """The text of a file in this folder."""
+    return files("gmwm.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
@@ -34,7 +32,7 @@ def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     environment = Environment(
         loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
     )
-    environment.policies["json.dumps_kwargs"] = {"allow_nan": False}
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return environment.get_template(template).render(
         policy=_policy(scripts), scripts=scripts, **values
     )

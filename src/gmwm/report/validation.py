@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 _CONTRADICTED = 0.01  # probability below which a filter is reported to misjudge itself
 _WIDEST_BAND = 2.0  # width of a band of NEES beyond which it decides nothing
-_GROUPS = ("position", "velocity", "attitude", "sensors")
+_GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensors")
+_COVERED = ("horizontal", "vertical")
 
 
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
@@ -54,6 +55,7 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         growth=svg(validation.plot_growth()) if outages else "",
         outages=outages,
         groups=_GROUPS,
+        covered=_COVERED,
         gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
         models=[(name, models.models) for name, models in experiment.filters.items()],
@@ -88,7 +90,10 @@ def _outage(validation: Validation, index: int) -> dict[str, Any]:
         "errors": svg(validation.plot_errors(index)),
         "rows": rows,
         "nees": [(name, _cells(each)) for name, each in found.items()],
-        "coverage": [(name, each.coverage["position"]) for name, each in found.items()],
+        "coverage": [
+            (name, [c for part in _COVERED for c in each.coverage[part]])
+            for name, each in found.items()
+        ],
     }
 
 

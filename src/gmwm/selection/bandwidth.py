@@ -127,7 +127,7 @@ class _Beside:
         return float(residual @ residual)
 
     def residual(self, process: Process, shape: Shape) -> FloatArray:
-        column = self.root @ self.scales.unit_curve(process, shape)
+        column = self.root @ self.scales.unit_curves(process)(shape)
         return solve_nonnegative(np.column_stack([self.matrix, column]), self.target)[1]
 
     def best(self, free: Process) -> tuple[Bandwidth, float]:

@@ -6,6 +6,7 @@ from gmwm.study.demo import compare, simulated_imu
 from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
+from gmwm.study.rotation import reproduce_rotation
 from gmwm.study.runs import run_study
 from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
@@ -23,6 +24,7 @@ __all__ = [
     "convergence_table",
     "emulated_log",
     "reproduce_figure",
+    "reproduce_rotation",
     "run_study",
     "sensors",
     "simulated_imu",

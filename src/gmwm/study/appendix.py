@@ -25,8 +25,9 @@ TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 NAMES = ("sigma2_WN", "sigma2_RW")
 _TRUE = np.array([0.04, 4e-4])
-_WHITE_SCALES = np.array([1.0, 2.0, 4.0, 8.0])
-_WALK_SCALES = np.array([16.0, 32.0, 64.0, 128.0])
+_SCALES = np.array([2.0**j for j in range(8)])
+_FIRST = 4
+"""Scales that white noise is read from; the others are the random walk's."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +54,22 @@ class Convergence:
     gmwm_error: FloatArray
 
 
-def allan_least_squares(tau: FloatArray, allan_variance: FloatArray) -> FloatArray:
-    """Least-squares lines through the first and the last scales, (2,).
+def allan_least_squares(tau: FloatArray, allan_variance: FloatArray, k: int = _FIRST) -> FloatArray:
+    """Least-squares lines through the first k scales and the others to 128 s, (2,).
 
     Parameters
     ----------
     tau : (J,) ndarray
         Averaging times 1, 2, 4, ... s, at least to 128 s.
     allan_variance : (J,) ndarray
+    k : int, optional
+        From 1 to 7.
     """
+    white, walk = _SCALES[:k], _SCALES[k:]
     return np.array(
         [
-            _line(tau, allan_variance, _WHITE_SCALES, 1.0 / _WHITE_SCALES),
-            _line(tau, allan_variance, _WALK_SCALES, _WALK_SCALES / 3.0),
+            _line(tau, allan_variance, white, 1.0 / white),
+            _line(tau, allan_variance, walk, walk / 3.0),
         ]
     )
 
@@ -75,10 +79,9 @@ def _line(tau: FloatArray, values: FloatArray, scales: FloatArray, shape: FloatA
     return float(shape @ values[chosen] / (shape @ shape))
 
 
-def expectation() -> FloatArray:
+def expectation(k: int = _FIRST) -> FloatArray:
     """Expected value of `allan_least_squares` under `TRUTH`, whatever the length, (2,)."""
-    tau = np.concatenate([_WHITE_SCALES, _WALK_SCALES])
-    return allan_least_squares(tau, 2.0 * TRUTH.haar_variance(tau, 1.0))
+    return allan_least_squares(_SCALES, 2.0 * TRUTH.haar_variance(_SCALES, 1.0), k)
 
 
 def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
@@ -118,4 +121,12 @@ def convergence_table(rows: list[Convergence]) -> str:
             allan = f"{row.allan[k]:.5g} +- {row.allan_error[k]:.2g}"
             gmwm = f"{row.gmwm[k]:.5g} +- {row.gmwm_error[k]:.2g}"
             lines.append(f"{row.n:>11,}{row.expected[k]:>18.5g}{allan:>24}{gmwm:>24}")
+    lines += [
+        "",
+        "Expected over true value, by the first k scales that white noise is read from",
+        f"{'k':>11}{NAMES[0]:>18}{NAMES[1]:>18}",
+    ]
+    for k in range(1, _SCALES.size):
+        white, walk = expectation(k) / _TRUE
+        lines.append(f"{k:>11}{white:>18.4g}{walk:>18.4g}")
     return "\n".join(lines)

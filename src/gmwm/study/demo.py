@@ -1,4 +1,4 @@
-"""A demonstration on simulated data: the MEMS IMU of the PLANS 2012 paper, Table VI."""
+"""A demonstration on simulated data: a tactical MEMS IMU."""
 
 from __future__ import annotations
 
@@ -8,15 +8,28 @@ import numpy as np
 
 from gmwm._core.units import SI_UNIT, field_units
 from gmwm.estimate.result import Fit
+from gmwm.ins import SensorModels
+from gmwm.ins.spec import sensor_models
 from gmwm.process import Model
 from gmwm.readers import Channel, Recording
-from gmwm.study.sensor_tables import TABLE_6
 
 RATE = 100.0
 """Hz."""
 
 
-def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model]]:
+DEMO = sensor_models(
+    {
+        "gyro": {"N": "12 deg/h/sqrt(Hz)", "GM": [["25 deg/h", 20.0]]},
+        "accel": {"N": "80 ug/sqrt(Hz)", "K": "120 ug/sqrt(h)"},
+    },
+    "demo",
+)
+"""Of the order of a good MEMS IMU: an hour determines every parameter."""
+
+
+def simulated_imu(
+    seconds: float, seed: int, sensors: SensorModels = DEMO
+) -> tuple[Recording, dict[str, Model]]:
     """A six-axis static recording and the model of each of its channels.
 
     Parameters
@@ -24,6 +37,7 @@ def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model
     seconds : float
         Length.
     seed : int
+    sensors : SensorModels, optional
 
     Returns
     -------
@@ -33,7 +47,7 @@ def simulated_imu(seconds: float, seed: int) -> tuple[Recording, dict[str, Model
     """
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE)
-    truth = TABLE_6.models
+    truth = sensors.models
     channels = []
     for name, model in truth.items():
         quantity = name.split("_")[0]

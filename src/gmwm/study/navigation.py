@@ -8,7 +8,7 @@ paper's Table VI, or taken from real recordings: one is calibrated, the others a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ from gmwm._core.files import moved_into_place, written
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
-from gmwm.estimate import fit
+from gmwm.estimate import AllanLines, estimate
 from gmwm.estimate.result import Fit
 from gmwm.ins import tuning
 from gmwm.ins.filter import Outage, gnss
@@ -29,6 +29,7 @@ from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6
+from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ _OF_ONE_GYRO = ("fig5", "fig6")
 _HOURS, _RATE = 4.5, 100.0
 _SHOWN = "gyro_x"  # of the Allan plots
 _RUNS = 100
-_TEN = 10.0  # the folk rule
+TEN = 10.0  # the folk rule
 _HELICOPTER = (Outage(600.0, 60.0), Outage(1100.0, 60.0), Outage(1500.0, 60.0))
 _CAR = (Outage(500.0, 60.0), Outage(900.0, 60.0))
 
@@ -61,10 +62,14 @@ class Calibrated:
     @classmethod
     def of(cls, recording: Recording, progress: Progress | None = None) -> Calibrated:
         """Calibrate a recording both ways."""
-        calibration = calibrate(recording, progress=progress)
+        return cls.by_lines_too(calibrate(recording, progress=progress))
+
+    @classmethod
+    def by_lines_too(cls, calibration: Calibration) -> Calibrated:
+        """A calibration by GMWM, and lines in its Allan plots."""
         kind = WhiteNoise() + BiasInstability() + RandomWalk()
         lines = {
-            axis: fit(kind, calibration[axis].wv, method="allan")
+            axis: estimate(kind, calibration[axis].wv, method=AllanLines())
             for axis in AXES
             if axis in calibration.fits
         }
@@ -74,24 +79,51 @@ class Calibrated:
         """What lines in the Allan plot give a filter: white noise, and what slow error they show.
 
         A random walk where there is a line of slope +1/2; otherwise a Gauss-Markov process as high
-        as the floor and in its place, where there is one.
+        as the floor and in its place; and where there is neither, as high as the lowest point of
+        the plot, which is what is commonly read as bias instability. Every axis has a slow state.
         """
         return SensorModels.of({axis: _from_lines(each) for axis, each in self.lines.items()})
+
+    def lineless(self) -> tuple[str, ...]:
+        """Axes whose slow error lines do not show; see `line_models`."""
+        return tuple(
+            axis
+            for axis, each in self.lines.items()
+            if not {region.key for region in each.regions} & {"K", "B"}
+        )
+
+    def curve_models(self, horizon: float) -> SensorModels:
+        """Two numbers off each Allan curve: N at 1 s, and K from its height at a horizon (s).
+
+        K is that of the line of slope +1/2 through the deviation there.
+        """
+        models: dict[str, Model] = {}
+        for axis, each in self.lines.items():
+            walk = _at(each.wv, horizon) * np.sqrt(3.0 / horizon)
+            models[axis] = WhiteNoise(_at(each.wv, tuning.WHITE_AT)) + RandomWalk(walk)
+        return SensorModels.of(models)
+
+
+def _at(wv: WaveletVariance, time: float) -> float:
+    """Allan deviation at an averaging time, s."""
+    return float(np.exp(np.interp(np.log(time), np.log(wv.tau), np.log(wv.allan_deviation))))
 
 
 def _from_lines(fitted: Fit) -> Model:
     regions = {region.key: region for region in fitted.regions}
     wv = fitted.wv
-    at_one = float(np.exp(np.interp(0.0, np.log(wv.tau), np.log(wv.allan_deviation))))
     # Without a line of slope -1/2, N is what the plot shows at 1 s.
-    terms: list[Process] = [WhiteNoise(fitted.params["N"] if "N" in regions else at_one)]
+    white = fitted.params["N"] if "N" in regions else _at(wv, tuning.WHITE_AT)
+    slow: Process
     if "K" in regions:
-        terms.append(RandomWalk(fitted.params["K"]))
+        slow = RandomWalk(fitted.params["K"])
     elif "B" in regions:
         floor = regions["B"]
-        centre = float(np.sqrt(floor.tau_min * floor.tau_max))
-        terms.append(GaussMarkov.of_peak(floor.coefficient, centre))
-    return Model(tuple(terms))
+        slow = GaussMarkov.of_peak(floor.coefficient, float(np.sqrt(floor.tau_min * floor.tau_max)))
+    else:
+        lowest = int(np.argmin(wv.allan_deviation))
+        slow = GaussMarkov.of_peak(float(wv.allan_deviation[lowest]), float(wv.tau[lowest]))
+    return Model((WhiteNoise(white), slow))
 
 
 def static_recording(seed: int) -> Recording:
@@ -117,21 +149,17 @@ def experiment(
     calibrated : Calibrated
     runs, seed : int
     recordings : sequence of Recording, optional
-        Whose errors are navigated with; by default those of Table VI are drawn.
+        The one that was calibrated, and those whose errors are navigated with; by default errors
+        of Table VI are drawn.
     """
-    trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
-    outages = _HELICOPTER if vehicle == "helicopter" else _CAR
-    scenario = Scenario(trajectory, gnss(trajectory, velocity_sd=tuning.VELOCITY_SD), outages)
+    scenario = scenario_of(vehicle)
     lines = calibrated.line_models()
     filters = {"GMWM": SensorModels.of(calibrated.gmwm), "AV": lines}
     if recordings:
-        source = Recorded.of(recordings, trajectory.duration)
-        filters["AV x 10"] = _times(lines, _TEN)
-        # A recording that is entered anywhere has a slow error from the first sample on.
-        filters = {
-            name: SensorModels(models.models, _bias(models, source))
-            for name, models in filters.items()
-        }
+        source = Recorded.of(recordings[1:], scenario.trajectory.duration)
+        filters["AV x 10"] = times(lines, TEN)
+        start = Recorded.of(recordings[0], tuning.BIAS_WINDOW).bias_sd
+        filters = {name: aligned(models, start) for name, models in filters.items()}
         title = f"{vehicle}, errors of {source.source}"
         return Experiment(scenario, source, filters, None, runs, seed, title)
     filters |= {"KF-tuned": TABLE_5, "truth": TABLE_6}
@@ -139,15 +167,40 @@ def experiment(
     return Experiment(scenario, Simulated(TABLE_6), filters, TABLE_6, runs, seed, title)
 
 
-def _bias(models: SensorModels, source: Recorded) -> dict[str, float]:
-    """Standard deviation of a constant, where the model has no stationary slow term."""
-    walks = {
-        axis: any(term.is_walk for term in model.terms) for axis, model in models.models.items()
-    }
-    return {axis: source.bias_sd[axis] if walks[axis] else 0.0 for axis in AXES}
+def scenario_of(vehicle: str) -> Scenario:
+    """The mission of a vehicle, with its outages."""
+    trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
+    outages = _HELICOPTER if vehicle == "helicopter" else _CAR
+    return Scenario(trajectory, gnss(trajectory, velocity_sd=tuning.VELOCITY_SD), outages)
 
 
-def _times(models: SensorModels, factor: float) -> SensorModels:
+def aligned(models: SensorModels, start: Mapping[str, float]) -> SensorModels:
+    """Models of filters that are switched on at any time, when the slow error is not zero.
+
+    Parameters
+    ----------
+    models : SensorModels
+    start : mapping of str to float
+        Axis -> scatter of the means over a minute of the recording that was calibrated. What a
+        model's stationary terms do not explain of it is the standard deviation of a constant, or
+        of the start of a random walk.
+    """
+    bias = {}
+    for axis, model in models.models.items():
+        markov = [term for term in model.terms if isinstance(term, GaussMarkov)]
+        own = model.white_density() / tuning.BIAS_WINDOW + sum(map(_of_means, markov))
+        bias[axis] = float(np.sqrt(max(start[axis] ** 2 - own, 0.0)))
+    return SensorModels(models.models, bias)
+
+
+def _of_means(term: GaussMarkov) -> float:
+    """Variance of means over a minute."""
+    share = float(term.tau or 0.0) / tuning.BIAS_WINDOW
+    within = 2.0 * share * (1.0 - share * -np.expm1(-1.0 / share))
+    return float(term.sigma or 0.0) ** 2 * float(within)
+
+
+def times(models: SensorModels, factor: float) -> SensorModels:
     """All amplitudes times a factor."""
     return SensorModels(
         {
@@ -209,10 +262,10 @@ def reproduce_figure(
         shown = calibrated.lines[_SHOWN] if figure == "fig5" else calibrated.gmwm[_SHOWN]
         drawn, axes = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
         shown.plot(axes)
-        return str(shown), _saved(drawn, folder / figure)
+        return str(shown), saved(drawn, folder / figure)
     vehicle = "car" if figure == "fig9" else "helicopter"
     validation = Validation.of(
-        experiment(vehicle, calibrated, runs or _RUNS, seed, recordings[1:]),
+        experiment(vehicle, calibrated, runs or _RUNS, seed, recordings),
         jobs=jobs,
         progress=progress,
     )
@@ -225,10 +278,10 @@ def reproduce_figure(
     target = folder / f"{figure}.txt"
     with written(target) as stream:
         stream.write(text + "\n")
-    return text, [target, *_saved(draw[figure](), folder / figure)]
+    return text, [target, *saved(draw[figure](), folder / figure)]
 
 
-def _saved(figure: Figure, stem: Path) -> list[Path]:
+def saved(figure: Figure, stem: Path) -> list[Path]:
     import matplotlib.pyplot as plt
 
     paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]

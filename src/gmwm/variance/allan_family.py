@@ -18,6 +18,7 @@ from scipy.stats import chi2
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
@@ -137,7 +138,7 @@ class Deviations:
             },
         }
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """All kinds against averaging time, into new axes or those of another deviation plotting.
 
         Parameters
@@ -145,17 +146,24 @@ class Deviations:
         ax : matplotlib.axes.Axes, optional
             E.g. what ``wavelet_variance(...).plot()`` returns; that has the overlapping Allan
             deviation already.
+        units : {"field", "si"}, optional
+            deg/h and ug, or SI.
         """
         from gmwm import plotting
+
+        unit, factor = shown_unit(self.quantity, self.unit, units)
 
         return plotting.deviations(
             {
                 _KINDS[kind].label: (
-                    self.tau[kind], self.deviation[kind], self.lower[kind], self.upper[kind]
+                    self.tau[kind],
+                    factor * self.deviation[kind],
+                    factor * self.lower[kind],
+                    factor * self.upper[kind],
                 )
                 for kind in self.kinds
             },
-            unit=self.unit,
+            unit=unit,
             places=[list(_KINDS).index(kind) for kind in self.kinds],
             interval=f"{100 * self.confidence:g} %",
             title=self.name,

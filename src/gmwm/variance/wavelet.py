@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import shown_unit
 from gmwm.process import PSD
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
 from gmwm.variance.gaps import GapEffects
@@ -344,11 +345,18 @@ class WaveletVariance:
         rows = (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
         return frame(rows, names)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Allan deviation with error bars against averaging time; returns the axes."""
+    def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
+        """Allan deviation with error bars against averaging time; returns the axes.
+
+        In the units of the field (deg/h, ug), or in SI if ``units`` is "si".
+        """
         from gmwm import plotting
 
-        low, high = np.sqrt(2.0 * self.lower), np.sqrt(2.0 * self.upper)
-        return plotting.deviation(
-            self.tau, self.allan_deviation, low, high, unit=self.unit, title=self.name, ax=ax
+        unit, factor = shown_unit(self.quantity, self.unit, units)
+        values = (
+            factor * np.sqrt(2.0 * curve) for curve in (self.variance, self.lower, self.upper)
         )
+        return plotting.deviation(
+            self.tau, *values, unit=unit, interval=f"{100 * self.confidence:g} %",
+            title=self.name, ax=ax,
+        )  # fmt: skip

@@ -1,6 +1,7 @@
 """The main job, its file format, and what happens to bad channels and bad files."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -101,6 +102,28 @@ def test_dead_channel_is_named_and_skipped(calibration):
     with pytest.raises(InputError, match=r"'gyro_y': constant at 0\.25 rad/s"):
         calibration["gyro_y"]
     assert "gyro_y" not in calibration
+
+
+def test_print_is_short_and_html_escapes(calibration):
+    text = str(calibration)
+    assert text.startswith("bench.csv: 100 s at 100 Hz, 10,000 samples a channel\n")
+    assert len(text.splitlines()) <= 3 * (len(calibration) + 2)
+    assert max(map(len, text.splitlines())) <= 80
+    for name, fit in calibration.items():
+        assert re.search(rf"^{name} +{'valid' if fit.valid else 'NOT VALID'} ", text, re.M)
+    shown = replace(calibration, source="<b>x</b>")._repr_html_()
+    assert "&lt;b&gt;x" in shown
+    assert shown.count("<tr>") == 1 + len(calibration)
+
+
+def test_files_keep_rivals_and_what_was_left_out(calibration, tmp_path):
+    rival = WhiteNoise(1e-3) + RandomWalk(1e-4)
+    changed = replace(
+        calibration, rivals={"gyro_x": (rival,)}, left_out={"gyro_x": ((10, 20), (40, 41))}
+    )
+    again = gmwm.load(changed.save(tmp_path / "a.json"))
+    assert again.rivals == {"gyro_x": (rival,)}
+    assert again.left_out == changed.left_out
 
 
 def test_unknown_channel_lists_those_there_are(calibration):

@@ -137,23 +137,23 @@ def test_the_bound_does_not_depend_on_whether_a_walk_of_zero_was_fitted():
 
 
 def test_sentence_for_a_gyro():
-    # 3e-4 rad/s/sqrt(Hz) over a minute: 3e-4 sqrt(60) rad = 0.133 deg.
+    # 3e-4 rad/s/sqrt(Hz) = 3e-4 * 180/pi * 60 deg/sqrt(h).
     fit = fitted(WhiteNoise(3e-4) + RandomWalk(3e-4), scale=1e-12)
     low = floor(fit)
     text = sentence(fit)
-    assert "angle error of 0.13 deg (1 sigma)" in text
+    assert text.startswith("White noise of 1.03 deg/sqrt(h); ")
     assert f"up to {low.tau:.3g} s" in text
     assert f"down to {np.degrees(low.deviation) * 3600.0:.3g} deg/h." in text
     assert "still falling" not in text
 
 
 def test_sentence_for_an_accelerometer():
-    # 1e-3 m/s^2/sqrt(Hz) over a minute: 1e-3 sqrt(60) m/s = 0.0077 m/s.
     fit = fitted(WhiteNoise(1e-3), "accel")
     text = sentence(fit)
-    assert "velocity error of 0.0077 m/s (1 sigma)" in text
+    assert text.startswith("White noise of 102 ug/sqrt(Hz); ")
     assert f"{floor(fit).deviation / 9.80665e-6:.3g} ug" in text
     assert text.endswith("(still falling at the end of the record).")
+    assert sentence(fitted(RandomWalk(1e-3))).startswith("No white noise; ")
 
 
 def test_sentence_for_anything_else_keeps_its_unit():

@@ -71,7 +71,7 @@ def test_results_draw_into_given_axes(fit):
     _, (first, second) = plt.subplots(1, 2)
     assert fit.plot(ax=first) is first
     assert fit.wv.plot(ax=second) is second
-    assert first.get_ylabel() == second.get_ylabel() == "Allan deviation [rad/s]"
+    assert first.get_ylabel() == second.get_ylabel() == "Allan deviation [deg/h]"
     assert first.get_title() == second.get_title() == "gyro_x"
 
 
@@ -80,15 +80,30 @@ def test_legend_names_data_model_and_components(fit):
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
     assert sorted(texts) == sorted(["data, 95 % interval", "white noise", "random walk", "model"])
     lines = {line.get_label(): line for line in axes.lines}
-    np.testing.assert_allclose(lines["model"].get_ydata(), np.sqrt(2.0 * fit.implied))
+    tau = lines["white noise"].get_xdata()
+    assert tau.size > 4 * fit.wv.tau.size  # between octaves too
+    per_si = 180.0 / np.pi * 3600.0
+    shown = dict(zip(tau.tolist(), lines["model"].get_ydata(), strict=True))
+    at_octaves = [shown[float(each)] for each in fit.wv.tau]
+    np.testing.assert_allclose(at_octaves, per_si * np.sqrt(2.0 * fit.implied))
     np.testing.assert_allclose(
-        lines["white noise"].get_ydata(), fit.params["N"] / np.sqrt(fit.wv.tau)
+        lines["white noise"].get_ydata(), per_si * fit.params["N"] / np.sqrt(tau)
     )
     # Components add up to the model in variance, and each is told apart by its colour.
     parts = [lines[label].get_ydata() ** 2 for label in ("white noise", "random walk")]
     np.testing.assert_allclose(sum(parts), lines["model"].get_ydata() ** 2)
     curves = ("white noise", "random walk", "model")
     assert len({lines[label].get_color() for label in curves}) == 3
+
+
+def test_units_of_the_field_or_si(fit):
+    field, si = fit.plot(), fit.plot(units="si")
+    assert si.get_ylabel() == "Allan deviation [rad/s]"
+    ratio = field.containers[0].lines[0].get_ydata() / si.containers[0].lines[0].get_ydata()
+    np.testing.assert_allclose(ratio, 180.0 / np.pi * 3600.0)
+    for result in (fit, fit.wv):
+        with pytest.raises(gmwm.InputError, match="'imperial': give 'field' or 'si'"):
+            result.plot(units="imperial")
 
 
 def test_components_of_zero_are_left_out(fit):

@@ -6,7 +6,7 @@ from scipy import signal
 
 import gmwm
 from gmwm import AveragedNoise, LowPassNoise, WhiteNoise
-from gmwm.process import BUTTERWORTH
+from gmwm.process import BUTTERWORTH, spectral
 
 F = np.linspace(0.001, 0.499, 200)
 
@@ -60,3 +60,12 @@ def test_the_exact_likelihood_refuses_it():
     x = np.random.default_rng(0).normal(size=500)
     with pytest.raises(gmwm.InputError, match='take method = "gmwm" or "whittle"'):
         gmwm.fit(LowPassNoise(order=2.0, damping=0.7), x, dt=1.0, method="mle")
+
+
+@pytest.mark.parametrize("order", [0.91, 2.0, 6.0, 15.9])
+@pytest.mark.parametrize("damping", [0.21, BUTTERWORTH, 1.99])
+def test_the_wavelet_variance_is_the_integral_of_the_spectrum_however_sharp(order, damping):
+    process = LowPassNoise(1.0, 0.05, order, damping)
+    tau = 2.0 ** np.arange(19)
+    integral = spectral.haar_variance(process.psd, tau, 1.0)
+    np.testing.assert_allclose(process.haar_variance(tau, 1.0), integral, rtol=1e-9)

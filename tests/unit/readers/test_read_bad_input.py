@@ -336,7 +336,7 @@ def test_damaged_gzip(write, samples):
     assert "static.csv.gz is a damaged gzip file" in problem(path)
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.mat", "a.xlsx", "a.csv.gz"])
+@pytest.mark.parametrize("name", ["a.csv", "a.dat", "a.xlsx", "a.csv.gz"])
 def test_binary(tmp_path, name):
     path = tmp_path / name
     data = bytes(range(256)) * 8

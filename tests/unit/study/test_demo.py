@@ -36,7 +36,7 @@ def test_gyro_white_noise_in_numbers():
 
 
 def test_simulated_recording():
-    recording, truth = simulated_imu(100.0, seed=3)
+    recording, truth = simulated_imu(100.0, seed=3, sensors=TABLE_6)
     names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     assert recording.names == names
     assert tuple(truth) == names
@@ -66,10 +66,22 @@ def test_the_seed_decides():
 
 def test_a_ramp_is_tried_on_three_minutes_of_it():
     # The coarsest level is two averages of the whole record; without its slope little is left.
-    gyro = simulated_imu(180.0, seed=1)[0]["gyro_x"]
+    gyro = simulated_imu(180.0, seed=1, sensors=TABLE_6)[0]["gyro_x"]
     fit = gmwm.fit(WhiteNoise() + GaussMarkov() + RateRamp(), gyro)
     assert np.all(np.isfinite(list(fit.params.values())))
     assert np.all(np.diag(fit.covariance) > 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_hour_determines_nearly_every_parameter(seed):
+    recording, truth = simulated_imu(3600.0, seed)
+    fits = gmwm.calibrate(recording, {name: model.opened() for name, model in truth.items()})
+    rows = [row for name in fits for row in compare(fits[name], truth[name])]
+    assert len(rows) == 15
+    assert sum(row.determined for row in rows) >= 14
+    # Of 15 intervals of 95 %, fewer than 12 hold in one run of 1800.
+    assert sum(row.covered for row in rows) >= 12
 
 
 # -- truth beside estimate ------------------------------------------------------------------------

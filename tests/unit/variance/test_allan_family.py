@@ -220,7 +220,8 @@ def test_plot_has_every_kind_under_its_name(gyro):
     found = gmwm.deviations(gyro)
     axes = found.plot()
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_ylabel() == "deviation [rad/s]"
+    assert axes.get_ylabel() == "deviation [deg/h]"
+    per_si = 180.0 / np.pi * 3600.0
     assert axes.get_title() == "gyro_x"
     assert axes.get_legend().get_title().get_text() == "bars: 95 % intervals"
     drawn = {line.get_label(): line for line in axes.get_lines()}
@@ -228,8 +229,9 @@ def test_plot_has_every_kind_under_its_name(gyro):
     low, high = axes.get_ylim()
     for kind, line in zip(KINDS, drawn.values(), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), found.tau[kind])
-        np.testing.assert_array_equal(line.get_ydata(), found.deviation[kind])
-        assert np.all((low < found.deviation[kind]) & (found.deviation[kind] < high))
+        shown = per_si * found.deviation[kind]
+        np.testing.assert_allclose(line.get_ydata(), shown)
+        assert np.all((low < shown) & (shown < high))
     axes.figure.canvas.draw()
 
 

@@ -18,7 +18,7 @@ from gmwm.process import Model, Shape
 def limit_notices(design: Design, shapes: Sequence[Shape], x: FloatArray) -> list[Notice]:
     """Shapes at the limit of what the search allows."""
     z = design.pack(shapes)
-    low, high = design.bounds()
+    low, high = design.bounds
     amplitudes = design.amplitudes(x)
     at_limit = (z <= low + tuning.SEARCH_MARGIN) | (z >= high - tuning.SEARCH_MARGIN)
     return [

@@ -8,7 +8,8 @@ take no part: they are deterministic, see `gmwm.estimate.problem.ramp`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class Design:
     Attributes
     ----------
     coordinates : Coordinates
+    terms : tuple of Term
+        The noise terms.
     linear : tuple of int
         Noise terms of free amplitude.
     shaped : tuple of int
@@ -47,6 +50,7 @@ class Design:
 
     def __init__(self, model: Model, scales: Scales) -> None:
         self.coordinates, self.scales = Coordinates(model), scales
+        self.terms = self.coordinates.terms
         for term in self.terms:
             if 0 < term.n_shapes < term.free_shape.size and not term.process.separable_shape:
                 raise InputError(
@@ -54,13 +58,10 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
+        self._curve_of = tuple(self._curve_at(term) for term in self.terms)
         self._grids: dict[int, list[Shape]] = {}
         self._curves: dict[int, FloatArray] = {}
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The noise terms."""
-        return self.coordinates.terms
+        self._parts: dict[tuple[int, ...], Design] = {}
 
     @property
     def model(self) -> Model:
@@ -76,7 +77,9 @@ class Design:
 
     def at_shape(self, i: int, shape: Shape) -> Process:
         """Term ``i`` at a shape, with unit amplitude where that is free."""
-        term = self.terms[i]
+        return self._with_shape(self.terms[i], shape)
+
+    def _with_shape(self, term: Term, shape: Shape) -> Process:
         names = [p.name for p in term.process.shape_parameters]
         values: dict[str, float | None] = dict(zip(names, shape, strict=True))
         if term.free_scale:
@@ -85,9 +88,13 @@ class Design:
 
     def curve(self, i: int, shape: Shape) -> FloatArray:
         """Wavelet variance of `at_shape`, (J,)."""
-        if self.terms[i].free_scale:
-            return self.scales.unit_curve(self.terms[i].process, shape)
-        return self.scales.curve(self.at_shape(i, shape))
+        return self._curve_of[i](shape)
+
+    def _curve_at(self, term: Term) -> Callable[[Shape], FloatArray]:
+        """The function of `curve` for one term: what every step of a fit asks for."""
+        if term.free_scale:
+            return self.scales.unit_curves(term.process)
+        return lambda shape: self.scales.curve(self._with_shape(term, shape))
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``; terms that are alike share one list."""
@@ -143,8 +150,9 @@ class Design:
             start += count
         return shapes
 
+    @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """How far z may go: `_REACH` beyond the grids."""
+        """How far z may go: `SEARCH_REACH` beyond the grids."""
         low, high = [], []
         for i in self.shaped:
             term = self.terms[i]
@@ -154,6 +162,13 @@ class Design:
         if not low:
             return np.zeros(0), np.zeros(0)
         return np.concatenate(low), np.concatenate(high)
+
+    def part(self, present: Sequence[int]) -> Design:
+        """The design of some of the terms."""
+        key = tuple(present)
+        if key not in self._parts:
+            self._parts[key] = Design(Model(tuple(self.terms[i].process for i in key)), self.scales)
+        return self._parts[key]
 
     # -- curves -----------------------------------------------------------------------------------
 

@@ -83,11 +83,12 @@ class Profile:
         z0 = design.pack(start.shapes)
         if z0.size == 0:
             return self.at(start.shapes)
-        low, high = design.bounds()
+        low, high = design.bounds
         template = start.shapes
         owners = design.owners()
 
         visited: list[_Place] = []
+        slopes: list[FloatArray] = []
 
         def at(z: FloatArray) -> _Place:
             # The Jacobian is asked for where the residuals were.
@@ -101,6 +102,12 @@ class Profile:
             return -at(z).residual
 
         def jacobian(z: FloatArray) -> FloatArray:
+            # The first is asked for twice.
+            if not slopes or not np.array_equal(slopes[0], z):
+                slopes[:] = [z.copy(), slope_at(z)]
+            return slopes[1]
+
+        def slope_at(z: FloatArray) -> FloatArray:
             _, shapes, curves, x, _ = at(z)
             weighted = self.root @ curves[:, list(design.linear)][:, x > 0.0]
             slope = self.root @ design.shape_derivatives(shapes)

@@ -112,8 +112,7 @@ def _refine_present(profile: Profile, point: Point) -> Point:
     if all(shape is not None for shape in point.shapes):
         return profile.refine(point)
     present = [i for i, shape in enumerate(point.shapes) if shape is not None]
-    part = Model(tuple(design.terms[i].process for i in present))
-    reduced = Profile(Design(part, design.scales), profile.target, profile.root)
+    reduced = Profile(design.part(present), profile.target, profile.root)
     found = reduced.refine(reduced.at([point.shapes[i] for i in present]))
     shapes = list(point.shapes)
     for i, shape in zip(present, found.shapes, strict=True):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -47,12 +48,12 @@ class Term:
         shape = [values[p.name] is None for p in process.shape_parameters]
         return cls(process, place, free_scale, np.array(shape, dtype=bool))
 
-    @property
+    @cached_property
     def linear(self) -> Parameter:
         """The linear parameter, which every term of free scale has."""
         return next(p for p in self.process.parameters if p.linear)
 
-    @property
+    @cached_property
     def n_shapes(self) -> int:
         """Number of free shape parameters."""
         return int(np.sum(self.free_shape))
@@ -68,6 +69,8 @@ class Term:
         """A shape with its free part at other coordinates, fixed parameters exactly as they are."""
         if not free.size:
             return shape
+        if free.size == self.free_shape.size:
+            return self.process.shape_from_free(free)
         point = self.process.shape_to_free(shape)
         point[self.free_shape] = free
         found = self.process.shape_from_free(point)

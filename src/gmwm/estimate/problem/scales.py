@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,7 +42,6 @@ class Scales:
     wavelet: str = "haar"
     simulation: Simulation = _USUAL
     simulate_all: bool = False
-    _steady: dict[Process, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, wv: WaveletVariance) -> Scales:
@@ -55,16 +55,16 @@ class Scales:
             return self.simulation.curve(model, self.tau, self.n, self.dt, self.wavelet)
         return np.asarray(model.wavelet_variance(self.tau, self.dt, self.wavelet), dtype=float)
 
-    def unit_curve(self, process: Process, shape: Shape) -> FloatArray:
-        """That of a process at another shape and unit amplitude, u^2, (J,)."""
+    def unit_curves(self, process: Process) -> Callable[[Shape], FloatArray]:
+        """Wavelet variance of a process at unit amplitude as a function of its shape, u^2, (J,)."""
         if self.is_simulated(process):
-            return self.curve(process.at_unit(shape))
-        if shape:
-            return process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
-        if process not in self._steady:
-            found = process.unit_wavelet_variance(shape, self.tau, self.dt, self.wavelet)
-            self._steady[process] = frozen(found)
-        return self._steady[process]
+            return lambda shape: self.curve(process.at_unit(shape))
+        if process.shape_parameters:
+            return lambda shape: process.unit_wavelet_variance(
+                shape, self.tau, self.dt, self.wavelet
+            )
+        found = frozen(process.unit_wavelet_variance((), self.tau, self.dt, self.wavelet))
+        return lambda _: found
 
     def is_simulated(self, process: Process) -> bool:
         """Whether its curve is found by simulation."""

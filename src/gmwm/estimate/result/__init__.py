@@ -2,6 +2,7 @@
 
 from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.conclusion import Comparison, Estimates, conclude
+from gmwm.estimate.result.curves import dense_curves
 from gmwm.estimate.result.estimate import Estimate, InUnit
 from gmwm.estimate.result.fit import METHOD_NAMES, Fit
 from gmwm.estimate.result.goodness import Goodness
@@ -21,6 +22,7 @@ __all__ = [
     "JointFit",
     "Region",
     "conclude",
+    "dense_curves",
     "fit_joint",
     "no_test_notice",
     "plain",

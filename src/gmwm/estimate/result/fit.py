@@ -18,6 +18,7 @@ from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key
 from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
@@ -349,41 +350,37 @@ class Fit(Document):
             return f"{name}, {self.weights} weights"
         return f"{name}, {len(self.trace)} iterations" if self.trace else name
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars, fitted curve and components; returns the axes.
 
-        For ``method="allan"`` the lines and the regions that they were read from take the place of
-        the components.
+        In the units of the field (deg/h, ug), or in SI if ``units`` is "si". For
+        ``method="allan"`` the lines and the regions that they were read from take the place of the
+        components.
         """
         from gmwm import plotting
+        from gmwm.estimate.result.curves import dense_curves
 
-        wv = self.wv
-        axes = plotting.deviation(
-            wv.tau,
-            wv.allan_deviation,
-            np.sqrt(2.0 * wv.lower),
-            np.sqrt(2.0 * wv.upper),
-            unit=wv.unit,
-            title=wv.name,
-            ax=ax,
-        )
-        total = np.sqrt(2.0 * self.implied)
+        factor = shown_unit(self.wv.quantity, self.wv.unit, units)[1]
+        axes = self.wv.plot(ax, units=units)
+        tau, curves = dense_curves(self)
+        components = {label: factor * curve for label, curve in curves.items() if np.any(curve)}
+        total = np.sqrt(factor**2 * np.sum([c**2 for c in curves.values()], axis=0))
+        shown = {} if self.regions else components
+        plotting.curves(axes, tau, total, shown, factor * self.wv.allan_deviation)
         if self.regions:
-            plotting.curves(axes, wv.tau, total, {}, wv.allan_deviation)
-            plotting.straight_lines(axes, self._lines())
-            return axes
-        components = {k: np.sqrt(2.0 * v) for k, v in self.components.items() if np.any(v > 0.0)}
-        plotting.curves(axes, wv.tau, total, components, wv.allan_deviation)
+            plotting.straight_lines(axes, self._lines(factor))
         return axes
 
-    def _lines(self) -> dict[str, tuple[float, float, float, float]]:
+    def _lines(self, factor: float) -> dict[str, tuple[float, float, float, float]]:
         """Lines of the Allan plot as `gmwm.plotting.straight_lines` takes them."""
         lines = {}
         for region in self.regions:
             found = self[region.key]
             slope = slope_name(region.slope)
             label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
-            lines[label] = (region.slope, region.coefficient, region.tau_min, region.tau_max)
+            lines[label] = (
+                region.slope, factor * region.coefficient, region.tau_min, region.tau_max
+            )  # fmt: skip
         return lines
 
     def plot_trace(self, ax: Axes | None = None) -> Axes:

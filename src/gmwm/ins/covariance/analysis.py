@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.covariance.analysis_kernels import run_both
 from gmwm.ins.filter import (
     NAVIGATION,
@@ -39,6 +42,8 @@ class Analysis:
         own, and the true one.
     sensor_predicted, sensor_actual : (K, 6, 6) ndarray
         Of the estimated errors of the sensors, rad/s and m/s^2.
+    notices : tuple of Notice
+        Outages that end with errors larger than can be predicted without runs.
     """
 
     time: FloatArray
@@ -47,6 +52,7 @@ class Analysis:
     actual: FloatArray
     sensor_predicted: FloatArray
     sensor_actual: FloatArray
+    notices: tuple[Notice, ...] = ()
 
     @property
     def sd(self) -> FloatArray:
@@ -177,7 +183,7 @@ class Course:
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
         believed_sum, joint_sum = _sums(table), _sums(joint)
-        return Analysis(
+        found = Analysis(
             time=self.outputs.time(dt),
             before=self.outputs.before == 1,
             predicted=unmodified(out_P[:, nine, nine], velocity),
@@ -185,6 +191,8 @@ class Course:
             sensor_predicted=believed_sum @ out_P[:, NAVIGATION:, NAVIGATION:] @ believed_sum.T,
             sensor_actual=joint_sum @ out_J[:, NAVIGATION:, NAVIGATION:] @ joint_sum.T,
         )
+        ends = [outage.end for outage in scenario.outages]
+        return replace(found, notices=tuple(_too_large(found, ends)))
 
 
 def covariance_analysis(
@@ -204,12 +212,29 @@ def covariance_analysis(
 
     Notes
     -----
-    Exact for small errors: the filter is linearised along the true trajectory. Where a filter that
+    Exact for small errors: the filter is linearised along the true trajectory, and a notice reports
+    where attitude errors are too large for that (code "outside-linearity"). Where a filter that
     expects 30 m is 120 m off, products of errors reach the vertical at the first fixes after the
     outage, and its error is up to 1.7 times that given here for half a minute. A known mean of the
     true errors that the filter does not know, such as a ramp, counts as error.
     """
     return Course.of(scenario).analyse(truth, believed)
+
+
+def _too_large(found: Analysis, ends: Sequence[float]) -> Iterator[Notice]:
+    """Ends of outages at which the true attitude error is beyond where predictions were checked."""
+    for end in ends:
+        tilt_north, tilt_east, heading = found.sd[found.index(end), 6:]
+        tilt = float(max(tilt_north, tilt_east))
+        if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
+            yield Notice(
+                "outside-linearity", "warning", "",
+                f"at {end:g} s the attitude is off by {np.degrees(tilt):.2g} deg in tilt and "
+                f"{np.degrees(heading):.2g} deg in heading (1 sigma): products of errors count, "
+                "and NEES and errors predicted there are too small",
+                {"time": end, "tilt": tilt, "heading": float(heading)},
+                "check them by runs, as gmwm navigate does",
+            )  # fmt: skip
 
 
 def _steps(asked: IntArray, n: int, stride: int) -> IntArray:

@@ -128,10 +128,9 @@ def run_both(
                   j_noise[count], j_noise_off[count], j_cross[count], j_integral[count],
                   j_S, j_T, U, j_row)  # fmt: skip
             if second_order:
-                # The mean is subtracted, and that of the filter is nearly the true one.
                 g = gravity(mid_lla[s, 0], mid_lla[s, 2])
-                gathered = tilt_squared(P, g, count * dt, gathered)[1]
-                j_gathered = tilt_squared(J, g, count * dt, j_gathered)[1]
+                gathered = tilt_squared(P, g, count * dt, gathered)
+                j_gathered = tilt_squared(J, g, count * dt, j_gathered)
         while out < out_epoch.size and out_epoch[out] == epoch[s] and out_before[out] == 1:
             out_P[out], out_J[out] = P, J
             out += 1

@@ -10,6 +10,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
@@ -18,7 +20,7 @@ from gmwm.ins.covariance.analysis import Analysis, Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.ins.montecarlo import Scenario
-from gmwm.ins.trajectory import fixed_wing_loiter
+from gmwm.ins.trajectory import Trajectory, fixed_wing_loiter
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "tau")}
@@ -28,6 +30,11 @@ _KINDS = ("gyro", "accel")
 _JUDGED = slice(0, 6)  # position and velocity
 _DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
 _STEPS = 60
+_LOITER = Notice(
+    "judged-on-loiter", "note", "",
+    "judged on the loiter of a fixed-wing aircraft", {},
+    "give the motion that it is for, trajectory= or scenario=",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -72,12 +79,16 @@ class Reduction:
         tau from the height and place of its maximum beyond 1 s.
     errors : tuple of ReducedError
         One for each outage length.
+    notices : tuple of Notice
+        Where the errors are larger than a linear analysis can predict, and what motion they were
+        judged on.
     """
 
     form: str
     models: SensorModels
     inflation: dict[str, float]
     errors: tuple[ReducedError, ...]
+    notices: tuple[Notice, ...] = ()
 
     def __str__(self) -> str:
         factors = ", ".join(f"{name} x {value:.3g}" for name, value in self.inflation.items())
@@ -94,7 +105,9 @@ class Reduction:
                 f"{row.read_off:>10.4g} ({row.read_off_predicted:>8.4g}) "
                 f"{row.reduced:>10.4g} ({row.reduced_predicted:>8.4g}) {row.nees:>9.3g}"
             )
-        return "\n".join(lines)
+        return "\n".join(
+            [*lines, *(line for each in self.notices for line in wrapped(str(each), "- ", 2))]
+        )
 
 
 def reduce(
@@ -103,6 +116,7 @@ def reduce(
     outages: Sequence[float] = (10.0, 30.0, 60.0),
     *,
     scenario: Scenario | None = None,
+    trajectory: Trajectory | None = None,
     dt: float = 0.01,
 ) -> Reduction:
     """The reduced model that makes a small filter consistent, and as accurate as it can be.
@@ -116,8 +130,10 @@ def reduce(
     outages : sequence of float, optional
         Lengths for which it shall be good, s.
     scenario : Scenario, optional
-        Where; its outages in place of ``outages``. By default a loiter with one GNSS position a
-        second of 1 m (vertical 1.5 m).
+        Where; its outages in place of ``outages``.
+    trajectory : Trajectory, optional
+        The motion that it is for, with the outages two minutes apart and one GNSS position a second
+        of 1 m (vertical 1.5 m). By default a loiter, which a notice reports.
     dt : float, optional
         Sampling interval of the IMU in the default scenario, s.
 
@@ -128,7 +144,7 @@ def reduce(
     Raises
     ------
     InputError
-        If the form is unknown, or there is no outage.
+        If the form is unknown, there is no outage, or the trajectory is too short for them.
 
     Notes
     -----
@@ -139,7 +155,9 @@ def reduce(
     """
     checks.choice("form", form, list(FORMS))
     truth = SensorModels.of(models)
-    scenario = loiter_with_outages(outages, dt) if scenario is None else scenario
+    assumed = scenario is None and trajectory is None
+    if scenario is None:
+        scenario = with_outages(outages, trajectory, dt)
     if not scenario.outages:
         raise InputError("outages: give one length at least, s")
     course = Course.of(scenario)
@@ -169,6 +187,7 @@ def reduce(
         models=best,
         inflation=dict(zip(names, map(float, np.exp(found.x)), strict=True)),
         errors=tuple(_errors(outage, *analyses) for outage in scenario.outages),
+        notices=(*analyses[2].notices, *((_LOITER,) if assumed else ())),
     )
 
 
@@ -215,19 +234,28 @@ def _initial_sd(models: SensorModels, axis: str, dt: float) -> float:
 
 
 def loiter_with_outages(lengths: Sequence[float], dt: float = 0.01) -> Scenario:
-    """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
+    """A loiter with outages; see `with_outages`."""
+    return with_outages(lengths, None, dt)
+
+
+def with_outages(
+    lengths: Sequence[float], trajectory: Trajectory | None = None, dt: float = 0.01
+) -> Scenario:
+    """A motion with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
     Parameters
     ----------
     lengths : sequence of float
         Of the outages, s, with two minutes before each.
+    trajectory : Trajectory, optional
+        By default a loiter of a fixed-wing aircraft.
     dt : float, optional
-        Sampling interval of the IMU, s.
+        Sampling interval of the IMU of the loiter, s.
 
     Raises
     ------
     InputError
-        If a length is not positive, or not a multiple of ``dt``.
+        If a length is not positive, or not a multiple of ``dt``, or the trajectory is too short.
     """
     outages = []
     start = tuning.SETTLING
@@ -235,7 +263,14 @@ def loiter_with_outages(lengths: Sequence[float], dt: float = 0.01) -> Scenario:
         outages.append(Outage(start, checks.positive("outage length", length)))
         # Ends at a fix: those of one second.
         start = float(np.ceil(start + length + tuning.SETTLING))
-    trajectory = fixed_wing_loiter(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
+    end = outages[-1].end if outages else 0.0
+    if trajectory is None:
+        trajectory = fixed_wing_loiter(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
+    elif trajectory.duration < end:
+        raise InputError(
+            f"trajectory: it has {trajectory.duration:g} s, and outages of these lengths two "
+            f"minutes apart need {end:g} s: give a longer one, or fewer outages"
+        )
     return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=tuning.SETTLING)
 
 

@@ -17,7 +17,7 @@ from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
-from gmwm.readers import Recording, bare, read
+from gmwm.readers import Recording, bare, is_text, read
 
 Columns = Mapping[str, str | int] | None
 
@@ -90,7 +90,7 @@ def read_imu_log(
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
     columns, turned = _signs(channels)
-    recording = read(path, rate, units, columns, time)
+    recording = read(path, rate, units, columns, time).of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
@@ -174,7 +174,7 @@ def _clock(
     none: tuple[float, tuple[Notice, ...]] = 0.0, (Notice("no-time-stamps", "note", "", text),)
     if start is not None:
         none = start - recording.dt, ()
-    if time is False or path.suffix.lower() in (".npy", ".npz"):
+    if time is False or not is_text(path):
         return none
     table = open_log(path)
     found = [i for i, name in enumerate(table.names) if is_time(name)]

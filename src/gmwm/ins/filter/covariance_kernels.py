@@ -234,15 +234,19 @@ def propagate(
 
 
 @compiled()
-def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple[float, float]:
+def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float:
     """Allow for the square of the tilt error over a step, which a linear filter does not know.
 
     Specific force that is resolved with a tilt error phi falls short of gravity by ``g phi^2 / 2``.
     Where gyros are poor and accelerometers good, that is more than the vertical error that a linear
-    filter expects. Mean and variance of the square follow from the covariance of the tilt, as in
-    the Gaussian second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*,
-    sec. 9.3). The tilt hardly changes from step to step, so standard deviations add up, not
-    variances, until a fix corrects it; heights and standstills do not show it.
+    filter expects. The filter linearises about its estimate, which contains the tilt error: given
+    the horizontal errors, its linear terms predict ``g phi^2``, twice the shortfall and of its
+    sign. What is left is ``-g phi^2 / 2`` given them, and ``+g phi^2 / 2`` if nothing is given, so
+    that no mean is subtracted: the one would be made worse by what mends the other. Its mean square
+    is the same in both cases and follows from the covariance of the tilt, as in the Gaussian
+    second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*, sec. 9.3). The
+    tilt hardly changes from step to step, so root mean squares add up, not squares, until a fix
+    corrects it; heights and standstills do not show it.
 
     Parameters
     ----------
@@ -253,20 +257,18 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> tuple
     step : float
         s.
     gathered : float
-        Standard deviation of the velocity error of this kind since the last GNSS fix, m/s.
+        Root mean square of the velocity error of this kind since the last GNSS fix, m/s.
 
     Returns
     -------
-    mean : float
-        Downward velocity error that the step makes on average, m/s.
     gathered : float
         After the step.
     """
     north, east, both = P[6, 6], P[7, 7], P[6, 7]
-    spread = g * math.sqrt(0.5 * (north * north + east * east) + both * both)
-    after = gathered + spread * step
+    fourth = (north + east) ** 2 + 2.0 * (north * north + east * east) + 4.0 * both * both
+    after = gathered + 0.5 * g * math.sqrt(fourth) * step
     P[5, 5] += after * after - gathered * gathered
-    return 0.5 * g * (north + east) * step, after
+    return after
 
 
 @compiled()

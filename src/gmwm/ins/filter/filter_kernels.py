@@ -415,8 +415,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
               noise[samples], noise_off[samples], cross[samples], integral[samples],
               S, T, U, row)  # fmt: skip
         if second_order:
-            mean, gathered = tilt_squared(P, gravity(lla[0], lla[2]), samples * dt, gathered)
-            v[2] -= mean
+            gathered = tilt_squared(P, gravity(lla[0], lla[2]), samples * dt, gathered)
         steps += 1
         if steps % _CLEAN_EVERY == 0:
             orthonormalise(C)

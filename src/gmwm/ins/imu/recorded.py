@@ -58,6 +58,7 @@ class Recorded:
         stretches: list[FloatArray] = []
         slow: list[FloatArray] = []
         for recording in given:
+            recording.of_one_rate("noise as it was recorded")
             if abs(recording.dt / given[0].dt - 1.0) > _RATE_TOLERANCE:
                 raise InputError(
                     f"{recording.source} has {recording.rate:g} Hz and {given[0].source} "

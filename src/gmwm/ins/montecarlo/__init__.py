@@ -8,15 +8,18 @@ from gmwm.ins.montecarlo.consistency import (
     mean_ratio,
 )
 from gmwm.ins.montecarlo.experiment import Experiment
+from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 from gmwm.ins.montecarlo.outage_errors import QUANTITIES
 from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
 from gmwm.ins.montecarlo.validation import Validation
 
 __all__ = [
+    "GROUPS",
     "QUANTITIES",
     "Consistency",
     "ErrorSource",
     "Experiment",
+    "FilterErrors",
     "InnovationTest",
     "Ratio",
     "Scenario",

@@ -17,8 +17,11 @@ GROUPS = {
     "velocity": slice(3, 6),
     "attitude": slice(6, 9),
     "navigation": slice(0, 9),
+    "horizontal": slice(0, 2),
+    "vertical": slice(2, 3),
 }
-"""Navigation errors that are judged together."""
+"""Navigation errors that are judged together, and the position by its two parts: what is right of
+both apart can be wrong of them together, where the filter misjudges how they go together."""
 
 PER_RUN = ("error", "sd", "nees", "log_det", "sensor_error", "sensor_sd", "sensor_nees", "nis",
             "whiteness")  # fmt: skip
@@ -40,9 +43,9 @@ class FilterErrors:
     error, sd : (R, K, 9) ndarray
         Estimate less truth of position (m), velocity (m/s) and attitude (rad), and the standard
         deviation that the filter predicted; NaN from where a filter diverged.
-    nees : (R, K, 4) ndarray
+    nees : (R, K, 6) ndarray
         Normalised error squared of the `GROUPS`.
-    log_det : (R, K, 4) ndarray
+    log_det : (R, K, 6) ndarray
         Logarithm of the determinant of the predicted covariance of the `GROUPS`.
     sensor_error, sensor_sd : (R, K, 6) ndarray
         Estimate less truth of the sensors' errors, without their white noise; NaN where the truth

@@ -39,7 +39,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MARGIN = 30.0  # s shown before and after an outage
-_GROUPS = ("position", "velocity", "attitude", "sensors")
+_GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensors")
+_SHORT = {"horizontal": "hor.", "vertical": "vert."}
+_COVERED = ("horizontal", "vertical")
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ class Validation:
         blocks.append(["NEES per degree of freedom: 1 if the filter is consistent, * out of "
                        "band", *self._nees_rows(width)])  # fmt: skip
         if self.study.outages:
-            blocks.append(["Position errors within predicted intervals, %",
+            blocks.append(["Position errors within predicted intervals, %, horizontal and vertical",
                            *self._coverage_rows(width)])  # fmt: skip
         blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
                        *self._innovation_rows(width)])  # fmt: skip
@@ -195,25 +197,31 @@ class Validation:
         ]
 
     def _nees_rows(self, width: int) -> list[str]:
-        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{g:>12}" for g in _GROUPS)]
+        heads = [_SHORT.get(group, group) for group in _GROUPS]
+        rows = [f"{'filter':{width}} {'':10}" + "".join(f"{head:>9}" for head in heads)]
         for name in self.names:
             for label, consistency in self._judgements(name):
                 cells = [_starred(consistency, group) for group in _GROUPS]
-                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
+                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>9}" for c in cells))
         return rows
 
     def _coverage_rows(self, width: int) -> list[str]:
-        heads = [f"{100.0 * level:g} %" for level in LEVELS]
-        rows = [f"{'filter':{width}} {'':12}" + "".join(f"{head + ' ':>12}" for head in heads)]
+        heads = [f"{100.0 * level:g} % " for level in LEVELS] * len(_COVERED)
+        parts = "".join(f"{part:>{7 * len(LEVELS)}}" for part in _COVERED)
+        rows = [
+            f"{'':{width}} {'':10}{parts}",
+            f"{'filter':{width}} {'':10}" + "".join(f"{head:>7}" for head in heads),
+        ]
         for name in self.names:
             for label, found in self._judgements(name):
                 cells = [
                     "- "
                     if np.isnan(c.fraction)
                     else f"{100.0 * c.fraction:.1f}" + " *"[not c.within]
-                    for c in found.coverage["position"]
+                    for part in _COVERED
+                    for c in found.coverage[part]
                 ]
-                rows.append(f"{name:{width}} {label:12}" + "".join(f"{c:>12}" for c in cells))
+                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>7}" for c in cells))
         return rows
 
     def _innovation_rows(self, width: int) -> list[str]:

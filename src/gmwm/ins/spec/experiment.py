@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 
 from gmwm._core import checks
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.covariance import reduce
 from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
 from gmwm.ins.imu import Recorded, SensorModels, emulate
@@ -178,8 +179,7 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
     scenario = Scenario(trajectory, aiding, outages, InitialSd(**spec.initial_sd.given))
     _check_fixes(aiding, outages)
     source, truth = _source(spec.truth, trajectory, folder)
-    lengths = [outage.duration for outage in outages]
-    believed = _Believed(truth, source, lengths, trajectory.dt, folder)
+    believed = _Believed(truth, source, _about_outages(spec, scenario), folder)
     return Experiment(
         scenario=scenario,
         source=source,
@@ -260,6 +260,22 @@ def _check_fixes(aiding: Aiding, outages: Sequence[Outage]) -> None:
             )
 
 
+def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
+    """The outages of a scenario and two minutes before the first: what a reduced model is for."""
+    outages, whole = scenario.outages, scenario.trajectory
+    if not outages:
+        return scenario
+    start = round(int(max(outages[0].start - tuning.SETTLING, 0.0)) / whole.dt) * whole.dt
+    part = whole.segment(start, outages[-1].end)
+    return Scenario(
+        part,
+        _aiding(spec.gnss, part),
+        tuple(Outage(outage.start - start, outage.duration) for outage in outages),
+        scenario.initial_sd,
+        interval=tuning.SETTLING,
+    )
+
+
 def _source(
     given: str | RecordingsSpec | ModelsSpec, trajectory: Trajectory, folder: Path
 ) -> tuple[ErrorSource, SensorModels | None]:
@@ -287,14 +303,13 @@ class _Believed:
 
     truth: SensorModels | None
     source: ErrorSource
-    lengths: Sequence[float]
-    dt: float
+    judged: Scenario
     folder: Path
 
     def models(self, where: str, given: str | ReducedSpec | ModelsSpec) -> SensorModels:
         models = self._given(where, given)
         try:
-            SensorStates.of(models, self.dt, 1)
+            SensorStates.of(models, self.judged.trajectory.dt, 1)
         except InputError as error:
             raise InputError(f"{where}, {error}") from None
         return models
@@ -313,11 +328,9 @@ class _Believed:
         full = self.truth if given.of == "truth" else read_models(where, given.of, self.folder)
         if full is None:
             raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
-        lengths = {round(length / self.dt) * self.dt for length in self.lengths}
+        judged = self.judged if self.judged.outages else None
         try:
-            return reduce(
-                full, given.reduce, sorted(lengths) or (10.0, 30.0, 60.0), dt=self.dt
-            ).models
+            return reduce(full, given.reduce, scenario=judged, dt=self.judged.trajectory.dt).models
         except InputError as error:
             raise InputError(f"{where}, {error}") from None
 

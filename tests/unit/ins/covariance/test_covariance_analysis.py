@@ -362,3 +362,20 @@ def test_a_model_of_too_many_states():
     for pair in ((long, FULL), (FULL, long)):
         with pytest.raises(InputError, match="more than two"):
             covariance_analysis(PLAIN, *pair)
+
+
+# ---- Where it does not hold ----
+
+
+@pytest.mark.parametrize(
+    ("tilt", "heading", "reported"), [(1.0, 10.0, 0), (8.0, 10.0, 1), (1.0, 40.0, 1)]
+)
+def test_attitude_errors_beyond_linearity_are_reported(tilt, heading, reported):
+    start = InitialSd(tilt=np.radians(tilt), heading=np.radians(heading))
+    scenario = Scenario(TRUTH, Aiding(()), (Outage(10.0, 20.0),), start, interval=10.0)
+    found = covariance_analysis(scenario, FULL, FULL)
+    assert [each.code for each in found.notices] == ["outside-linearity"] * reported
+    for each in found.notices:
+        sd = found.sd[found.index(30.0), 6:]
+        assert each.values["tilt"] == pytest.approx(max(sd[:2]))
+        assert each.values["heading"] == pytest.approx(sd[2])

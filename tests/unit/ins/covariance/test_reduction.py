@@ -6,13 +6,21 @@ from scipy.optimize import minimize
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
+from gmwm.ins.covariance import reduction
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
-from gmwm.ins.covariance.reduction import FORMS, ReducedError, Reduction, read_off, reduce
+from gmwm.ins.covariance.reduction import (
+    FORMS,
+    ReducedError,
+    Reduction,
+    read_off,
+    reduce,
+    with_outages,
+)
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.montecarlo.scenario import Scenario, Simulated
 from gmwm.ins.montecarlo.trials import monte_carlo
-from gmwm.ins.trajectory.missions import fixed_wing_loiter
+from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
 
 DT = 0.1
 TRUTH = fixed_wing_loiter(duration=150.0, dt=DT)
@@ -141,6 +149,23 @@ def test_a_model_that_has_the_form_already_comes_back():
         assert row.reduced == pytest.approx(row.full, rel=1e-3)
 
 
+def test_the_motion_that_it_is_judged_on_is_reported_or_given(monkeypatch):
+    monkeypatch.setattr(reduction, "_STEPS", 0)  # where it searches, not what it finds
+    assumed = reduce(WALK, "N+K", (5.0,), dt=DT)
+    assert [each.code for each in assumed.notices] == ["judged-on-loiter"]
+    assert str(assumed.notices[0]) in " ".join(str(assumed).split())
+    drive = car_drive(duration=130.0, dt=DT)
+    given = reduce(WALK, "N+K", (5.0,), trajectory=drive)
+    own = with_outages((5.0,), drive)
+    assert own.trajectory is drive
+    assert given.notices == ()
+    full = covariance_analysis(own, WALK, WALK)
+    at = full.index(own.outages[0].end)
+    assert given.errors[0].full == pytest.approx(np.hypot(*full.sd[at, :2]))
+    with pytest.raises(InputError, match=r"it has 130 s, and outages .* need 260 s"):
+        reduce(WALK, "N+K", (5.0, 15.0), trajectory=drive)
+
+
 # ---- What is read off an Allan plot ----
 
 
@@ -193,7 +218,7 @@ def test_white_noise_alone_can_be_reduced():
 
 
 def test_text():
-    reduction = Reduction(
+    found = Reduction(
         form="N+K",
         models=WALK,
         inflation={"gyro N": 1.4712, "gyro K": 0.59, "accel N": 12.0, "accel K": 0.01351},
@@ -202,7 +227,7 @@ def test_text():
             ReducedError(60.0, 157.91, 162.5, 137.2, 161.4, 162.2, 1.03),
         ),
     )
-    assert str(reduction) == (
+    assert str(found) == (
         "Reduced model N+K, factors on what an Allan plot shows:\n"
         "  gyro N x 1.47, gyro K x 0.59, accel N x 12, accel K x 0.0135\n"
         "\n"

@@ -25,7 +25,7 @@ from gmwm.ins.montecarlo.consistency import (
 )
 from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 
-SIZES = {"position": 3, "velocity": 3, "attitude": 3, "navigation": 9, "sensors": 6}
+SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}
 
 
 def covariances(rng, size):
@@ -200,7 +200,7 @@ def test_score_is_least_at_the_true_covariance(less, more):
         scaled = replace(
             runs,
             nees=runs.nees / factor,
-            log_det=runs.log_det + np.log(factor) * np.array([3, 3, 3, 9]),
+            log_det=runs.log_det + np.log(factor) * np.array(list(SIZES.values())[:-1]),
         )
         return at_epoch(scaled, 0).score
 

@@ -1,4 +1,5 @@
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,7 +7,9 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.ins import read_experiment
 from gmwm.ins.field.measured import MeasuredSpec
-from gmwm.ins.imu.sensors import AXES
+from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.montecarlo.scenario import Scenario
+from gmwm.ins.spec import experiment
 from gmwm.ins.spec.document import read_document
 from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec, experiment_from
 from gmwm.process import RandomWalk
@@ -86,6 +89,27 @@ def test_a_filter_may_be_a_reduction_of_the_truth() -> None:
     for axis in AXES:
         terms = found.filters["small"].models[axis].terms
         assert [type(term).__name__ for term in terms] == ["WhiteNoise", "RandomWalk"]
+
+
+def test_a_reduction_is_judged_on_the_motion_of_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Scenario] = []
+
+    def reduced(full: SensorModels, form: str, scenario: Scenario, dt: float) -> SimpleNamespace:
+        asked.append(scenario)
+        return SimpleNamespace(models=full)
+
+    monkeypatch.setattr(experiment, "reduce", reduced)
+    truth = {"gyro": {"N": 1e-3}, "accel": {"N": 1e-2}}
+    content = LEAST | {"truth": truth, "filters": {"small": {"reduce": "N+K"}}, "duration": 200}
+    outages = [[140.5, 10], [170, 20]]
+    whole = experiment_from(content | {"outages": outages}).scenario
+    (judged,) = asked
+    assert [(each.start, each.duration) for each in judged.outages] == [(120.5, 10), (150, 20)]
+    dt = whole.trajectory.dt
+    first = round(20.0 / dt)
+    np.testing.assert_array_equal(judged.trajectory.lla[0], whole.trajectory.lla[first])
+    assert judged.trajectory.duration == pytest.approx(170.0)
+    assert judged.aiding.fixes[0].sd[0].tolist() == whole.aiding.fixes[0].sd[0].tolist()
 
 
 def test_a_random_walk_in_real_errors_starts_anywhere(tmp_path: Path) -> None:

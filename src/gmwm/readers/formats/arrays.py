@@ -1,21 +1,18 @@
-"""Arrays saved by numpy: NPY and NPZ.
+"""Columns of arrays that are not read yet, whatever file they are in.
 
 A two-dimensional array has its samples along the rows. The fields of a structured array and the
-one-dimensional arrays of an NPZ file are columns with names; an ``(n, 3)`` array under a sensor's
+one-dimensional arrays of a file are columns with names; an ``(n, 3)`` array under a sensor's
 name (``gyro``) is its three axes. A single number named ``rate`` or ``dt`` gives the sampling
 rate.
 """
 
 from __future__ import annotations
 
-import math
+import re
 import warnings
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,20 +23,15 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.names import AXES, CANONICAL, meaning
+from gmwm.readers.names import AXES, CANONICAL, bare, meaning
 from gmwm.readers.table import LARGEST, label, usable
 
-_AnyArray = npt.NDArray[Any]
+AnyArray = npt.NDArray[Any]
 
-_NPY_MAGIC = b"\x93NUMPY"
-_ZIP_MAGIC = b"PK"
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
+_LAST_PART = re.compile(r"[./]")
 
-_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0}
-
-# Stands for an entry of an NPZ file that is not a plain array: it does no harm unless it is wanted.
-_OBJECTS = np.empty(0, dtype=object)
 _KINDS = {
     "O": "Python objects",
     "c": "complex numbers",
@@ -52,7 +44,7 @@ _KINDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Array:
+class Array:
     """An array, or a part of one, that is not read yet.
 
     Attributes
@@ -63,14 +55,18 @@ class _Array:
         Gives the array itself.
     """
 
-    like: _AnyArray
-    read: Callable[[], _AnyArray]
+    like: AnyArray
+    read: Callable[[], AnyArray]
 
-    def __getitem__(self, part: Any) -> _Array:
-        return _Array(self.like[part], lambda: self.read()[part])
+    def __getitem__(self, part: Any) -> Array:
+        return Array(self.like[part], lambda: self.read()[part])
+
+    def map(self, view: Callable[[AnyArray], AnyArray]) -> Array:
+        """The array in another shape."""
+        return Array(view(self.like), lambda: view(self.read()))
 
 
-_Column = tuple[str, _Array]
+_Column = tuple[str, Array]
 
 
 @dataclass(frozen=True)
@@ -79,30 +75,48 @@ class ArrayTable:
 
     source: str
     names: tuple[str, ...]
-    arrays: tuple[_Array, ...]
+    arrays: tuple[Array, ...]
     rate: float | None = None
     tentative: bool = False
     notices: tuple[Notice, ...] = ()
 
     @classmethod
-    def open(cls, path: Path) -> ArrayTable:
-        """Open an NPY or NPZ file.
+    def of_entries(
+        cls, source: str, entries: Mapping[str, Array], notices: Sequence[Notice] = ()
+    ) -> ArrayTable:
+        """Columns of the arrays of a file by their names.
 
         Raises
         ------
         InputError
-            If it is damaged, or its arrays are not columns.
+            If there are none, or a sampling rate among them is not positive.
         """
-        source, rate = path.name, None
-        if path.suffix.lower() == ".npz":
-            entries = _load_npz(path)
-            rate = _stated_rate(source, entries)
-            columns = _columns_of_entries(source, entries)
-        else:
-            columns = _columns_of_array(source, _load_npy(path))
+        rate = _stated_rate(source, entries)
+        return cls._of(source, _columns_of_entries(source, entries), rate, notices)
+
+    @classmethod
+    def of_array(cls, source: str, array: Array) -> ArrayTable:
+        """Columns of a single array.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        return cls._of(source, _columns_of_array(source, array), None, ())
+
+    @classmethod
+    def _of(
+        cls,
+        source: str,
+        columns: Sequence[_Column],
+        rate: float | None,
+        notices: Sequence[Notice],
+    ) -> ArrayTable:
         if not columns:
             raise InputError(f"{source} holds no columns: save arrays of samples in it")
-        return cls(source, tuple(name for name, _ in columns), tuple(a for _, a in columns), rate)
+        names, arrays = tuple(name for name, _ in columns), tuple(a for _, a in columns)
+        return cls(source, names, arrays, rate, notices=tuple(notices))
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns.
@@ -147,23 +161,46 @@ class ArrayTable:
             raise InputError(f"{place} holds {kind}: save real numbers")
         if like.ndim != 1:
             raise InputError(f"{place} has shape {like.shape}: save one axis as one column")
-        with _damage_named(self.source):
+        with damage_named(self.source):
             array = self.arrays[index].read()
         with np.errstate(all="ignore"):  # what leaves the range of float64 is refused below
             values = np.array(array, dtype=np.float64)
-        if not usable(values):
-            rows = np.flatnonzero(np.abs(values) >= LARGEST)
-            others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
-            raise InputError(
-                f"{place}, {self.where(int(rows[0]))}: {array[rows[0]]} is not a usable "
-                f"number{others}: cut the array before that row, or save NaN if the sample is "
-                "missing"
-            )
+        check_usable(place, values, self.where)
         return values
 
 
+def check_usable(place: str, values: FloatArray, where: Callable[[int], str]) -> None:
+    """Refuse infinite values and those too large for use.
+
+    Raises
+    ------
+    InputError
+        At the first of them.
+    """
+    if not usable(values):
+        rows = np.flatnonzero(np.abs(values) >= LARGEST)
+        others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
+        raise InputError(
+            f"{place}, {where(int(rows[0]))}: {values[rows[0]]} is not a usable number{others}: "
+            "cut the array before that row, or save NaN if the sample is missing"
+        )
+
+
+def _damage(error: Exception) -> str:
+    return "is damaged or cut off: save it again"
+
+
 @contextmanager
-def _damage_named(source: str) -> Iterator[None]:
+def damage_named(source: str, say: Callable[[Exception], str] = _damage) -> Iterator[None]:
+    """Say what is wrong with a file in a sentence, whatever its library raises.
+
+    Parameters
+    ----------
+    source : str
+        Name of the file.
+    say : callable, optional
+        What its library raised -> the end of the sentence.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about headers of old versions
@@ -174,88 +211,41 @@ def _damage_named(source: str) -> Iterator[None]:
         raise InputError(f"{source}: {memory.OUT_OF_MEMORY}", "memory") from error
     except PermissionError as error:
         raise InputError(f"{source} cannot be read: check its permissions") from error
-    except Exception as error:  # numpy, zipfile and zlib raise a dozen types for damaged bytes
+    except Exception as error:  # libraries raise a dozen types for damaged bytes
         if _is_about_objects(error):
             raise InputError(
                 f"{source} holds Python objects, which are not loaded: save arrays of numbers"
             ) from error
-        raise InputError(f"{source} is damaged or cut off: save it again") from error
+        raise InputError(f"{source} {say(error)}") from error
 
 
 def _is_about_objects(error: Exception) -> bool:
     return isinstance(error, ValueError) and "object" in str(error).lower()
 
 
-def _load_npy(path: Path) -> _Array:
-    with _damage_named(path.name):
-        with path.open("rb") as stream:
-            magic = stream.read(len(_NPY_MAGIC))
-        if magic == _NPY_MAGIC:
-            # Mapped: a header that promises more than there is asks for no memory.
-            array: _AnyArray = np.load(path, mmap_mode="r", allow_pickle=False)
-            return _array_of(array)
-    raise InputError(f"{path.name} is not an NPY file: write it with numpy.save")
+def array_of(array: AnyArray) -> Array:
+    """An array that is in memory."""
+    return Array(array, lambda: array)
 
 
-def _load_npz(path: Path) -> dict[str, _Array]:
-    with _damage_named(path.name):
-        with path.open("rb") as stream:
-            magic = stream.read(len(_ZIP_MAGIC))
-        if magic == _ZIP_MAGIC and zipfile.is_zipfile(path):
-            # The columns of an entry are asked for one after another.
-            read = lru_cache(maxsize=1)(partial(_read_entry, path))
-            with zipfile.ZipFile(path) as archive:
-                return {
-                    info.filename.removesuffix(".npy"): _entry(archive, info, read)
-                    for info in archive.infolist()
-                }
-    raise InputError(f"{path.name} is not an NPZ file: write it with numpy.savez")
-
-
-def _entry(
-    archive: zipfile.ZipFile, info: zipfile.ZipInfo, read: Callable[[str], _AnyArray]
-) -> _Array:
-    """An entry of which the header is read."""
-    with archive.open(info) as stream:
-        if stream.read(len(_NPY_MAGIC)) != _NPY_MAGIC:
-            return _array_of(_OBJECTS)
-    with archive.open(info) as stream:
-        version = np.lib.format.read_magic(stream)
-        header = _HEADERS.get(version, np.lib.format.read_array_header_2_0)(stream)
-    shape, _, dtype = header
-    if dtype.hasobject:
-        return _array_of(_OBJECTS)
-    if math.prod(shape) * dtype.itemsize > info.file_size:
-        raise ValueError("a header that promises more than there is")
-    return _Array(np.broadcast_to(np.empty((), dtype), shape), lambda: read(info.filename))
-
-
-def _read_entry(path: Path, name: str) -> _AnyArray:
-    with zipfile.ZipFile(path) as archive:
-        memory.require(archive.getinfo(name).file_size, path.name)
-        with archive.open(name) as stream:
-            array: _AnyArray = np.lib.format.read_array(stream, allow_pickle=False)
-    return array
-
-
-def _array_of(array: _AnyArray) -> _Array:
-    return _Array(array, lambda: array)
-
-
-def _stated_rate(source: str, entries: Mapping[str, _Array]) -> float | None:
+def _stated_rate(source: str, entries: Mapping[str, Array]) -> float | None:
+    """The rate that a single number states; that of a group or a structure too."""
+    rates: dict[str, float] = {}
     for name, array in entries.items():
-        key, like = name.lower(), array.like
+        key, like = _LAST_PART.split(bare(name).lower())[-1], array.like
         if key not in (*_RATES, *_INTERVALS) or like.size != 1 or like.dtype.kind not in "iuf":
             continue
-        with _damage_named(source):
+        with damage_named(source):
             value = float(array.read().reshape(-1)[0])
         if not 0.0 < value < LARGEST:
             raise InputError(f"{source}: {name} = {value} is not positive: correct it")
-        return value if key in _RATES else 1.0 / value
-    return None
+        rates[name] = value if key in _RATES else 1.0 / value
+    if len({round(rate, 9) for rate in rates.values()}) > 1:
+        raise InputError(f"{source} states several rates, {', '.join(rates)}: keep one of them")
+    return next(iter(rates.values()), None)
 
 
-def _columns_of_array(source: str, array: _Array) -> list[_Column]:
+def _columns_of_array(source: str, array: Array) -> list[_Column]:
     if array.like.dtype.names and array.like.ndim == 1:
         return _columns_of_fields(array)
     if array.like.ndim == 1:
@@ -268,13 +258,13 @@ def _columns_of_array(source: str, array: _Array) -> list[_Column]:
     )
 
 
-def _columns_of_fields(array: _Array) -> list[_Column]:
+def _columns_of_fields(array: Array) -> list[_Column]:
     return [
         pair for name in array.like.dtype.names or () for pair in _axes_or_itself(name, array[name])
     ]
 
 
-def _columns_of_entries(source: str, entries: Mapping[str, _Array]) -> list[_Column]:
+def _columns_of_entries(source: str, entries: Mapping[str, Array]) -> list[_Column]:
     """Columns of all arrays with more than one value; those without a name first."""
     named: list[_Column] = []
     matrices: list[_Column] = []
@@ -290,7 +280,7 @@ def _columns_of_entries(source: str, entries: Mapping[str, _Array]) -> list[_Col
     return named + matrices
 
 
-def _unnamed(source: str, array: _Array) -> list[_Column]:
+def _unnamed(source: str, array: Array) -> list[_Column]:
     rows, width = array.like.shape
     if width > rows and width >= tuning.FEWEST_SAMPLES:
         raise InputError(
@@ -299,14 +289,23 @@ def _unnamed(source: str, array: _Array) -> list[_Column]:
     return [("", array[:, i]) for i in range(width)]
 
 
-def _is_triad(name: str, array: _Array) -> bool:
+def is_sensor(name: str) -> bool:
+    """Whether the name of an array is that of a gyro or an accelerometer without its axis."""
+    return meaning(_of_axis(name, AXES[0])).role in CANONICAL
+
+
+def _of_axis(name: str, axis: str) -> str:
+    """The name with an axis before its unit."""
+    unit = name[len(bare(name)) :].strip()
+    return f"{bare(name)}_{axis} {unit}".rstrip()
+
+
+def _is_triad(name: str, array: Array) -> bool:
     """Whether an array holds the three axes of a sensor, by its name."""
-    return (
-        array.like.ndim == 2 and array.like.shape[1] == 3 and meaning(f"{name}_x").role in CANONICAL
-    )
+    return array.like.ndim == 2 and array.like.shape[1] == 3 and is_sensor(name)
 
 
-def _axes_or_itself(name: str, array: _Array) -> list[_Column]:
+def _axes_or_itself(name: str, array: Array) -> list[_Column]:
     if _is_triad(name, array):
-        return [(f"{name}_{axis}", array[:, i]) for i, axis in enumerate(AXES)]
+        return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]

@@ -1,0 +1,188 @@
+"""One recording of the parts of a log that have clocks of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.names import CANONICAL, bare, meaning
+from gmwm.readers.recording import Channel, Recording, notices_of_gaps
+from gmwm.readers.table import Table
+
+_SAMPLE = 0.5
+"""Samples by which two clocks may part over a recording and count as one."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """The sensors of one topic.
+
+    Attributes
+    ----------
+    recording : Recording
+    start : float
+        Stamp of its first sample, s.
+    """
+
+    recording: Recording
+    start: float = 0.0
+
+    @property
+    def stop(self) -> float:
+        return self.start + self.recording.duration
+
+
+def has_sensors(table: Table) -> bool:
+    """Whether a table has columns of gyros or accelerometers, or might."""
+    roles = {meaning(name).role for name in table.names}
+    return not roles.isdisjoint(CANONICAL) or "temperature" not in roles
+
+
+def shares(tables: Sequence[Table], channels: object) -> list[tuple[Table, Collection[str] | None]]:
+    """Which of the channels that the caller names are in which table; those without any go.
+
+    Raises
+    ------
+    InputError
+        If columns are assigned, which needs one table, or a channel is in none.
+    """
+    source = tables[0].source
+    if channels is None:
+        return [(table, None) for table in tables]
+    if isinstance(channels, Mapping):
+        raise InputError(
+            f"{source}: columns are given for channels, and {len(tables)} topics are read: name "
+            'the channels alone, e.g. channels=["gyro"], or choose one topic'
+        )
+    wanted = [channels] if isinstance(channels, str) else list(channels)  # type: ignore[call-overload]
+    found: list[tuple[Table, Collection[str] | None]] = []
+    for table in tables:
+        roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
+        sensors = {str(role).partition("_")[0] for role in roles}
+        own = [name for name in wanted if name in roles | sensors]
+        if own:
+            found.append((table, own))
+    known = {name for _, own in found for name in own or ()}
+    for name in wanted:
+        if name not in known:
+            raise InputError(f"{source} has no channel {name!r} in what is read", "channel-unknown")
+    return found
+
+
+def joined(parts: Sequence[Part]) -> Recording:
+    """Parts cut to the time that they have in common.
+
+    Raises
+    ------
+    InputError
+        If they have no such time, or hold the same channel.
+    """
+    first = parts[0].recording
+    if len(parts) == 1:
+        return first
+    start, stop = max(part.start for part in parts), min(part.stop for part in parts)
+    if not stop > start:
+        raise InputError(
+            f'{first.source}: its topics have no time in common: choose one, or clock="log"',
+            "topics-apart",
+        )
+    channels: list[Channel] = []
+    for part in parts:
+        channels += _cut(part, start, stop)
+    names = [channel.name for channel in channels]
+    if len(set(names)) < len(names):
+        raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
+    channels = _aligned(channels)
+    notices: list[Notice] = []
+    for part in parts:
+        notices += [
+            notice
+            for notice in part.recording.notices
+            if notice.code != "missing-samples" and notice not in notices
+        ]
+    different = len({channel.dt for channel in channels if not channel.is_auxiliary})
+    lost = max(part.recording.duration for part in parts) - (stop - start)
+    rates = ", ".join(f"{part.recording.rate:.6g} Hz" for part in parts)
+    text = f"{len(parts)} topics at {rates}: the {stop - start:.6g} s that they share are used"
+    values = {"duration": stop - start, "lost": lost, "rates": different}
+    notices.append(Notice("topics-joined", "note", "", text, values))
+    jitter = [part.recording.jitter for part in parts if part.recording.jitter is not None]
+    return replace(
+        first,
+        channels=tuple(channels),
+        notices=(*notices, *notices_of_gaps(channels)),
+        jitter=max(jitter, default=None),
+    )
+
+
+def _cut(part: Part, start: float, stop: float) -> list[Channel]:
+    recording = part.recording
+    rows = slice(
+        round((start - part.start) * recording.rate), round((stop - part.start) * recording.rate)
+    )
+    if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
+        raise InputError(
+            f"{recording.source}: its topics have {stop - start:.3g} s in common, fewer than "
+            f"{tuning.FEWEST_SAMPLES} samples: choose one, or record longer",
+            "topics-apart",
+        )
+    return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
+
+
+def _aligned(channels: Sequence[Channel]) -> list[Channel]:
+    """Channels of clocks that are the same within half a sample get one rate and length."""
+    first = channels[0]
+    result = []
+    for channel in channels:
+        apart = abs(channel.dt / first.dt - 1.0) * channel.n
+        if apart < _SAMPLE and abs(channel.n - first.n) <= 1:
+            channel = replace(channel, dt=first.dt, values=channel.values[: first.n])
+        result.append(channel)
+    shortest = min(channel.n for channel in result if channel.dt == first.dt)
+    return [
+        replace(channel, values=channel.values[:shortest]) if channel.dt == first.dt else channel
+        for channel in result
+    ]
+
+
+def with_temperature(part: Part, table: Table) -> Part:
+    """A thermometer beside the sensors, at their rate.
+
+    Between its stamps it is interpolated; before the first and after the last it is missing.
+    """
+    columns = range(len(table.names))
+    time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
+    try:
+        arrays = table.load(columns)
+    except InputError as error:
+        left_out = Notice("columns-unreadable", "note", "", f"temperature left out: {error}")
+        return _noted(part, left_out)
+    if time is None:
+        return part
+    stamps = arrays[time] * (meaning(table.names[time]).seconds or 1.0)
+    order = np.argsort(stamps, kind="stable")
+    recording = part.recording
+    grid = part.start + recording.dt * np.arange(recording.n)
+    channels = []
+    for column in columns:
+        if column != time:
+            values = np.interp(
+                grid, stamps[order], arrays[column][order], left=np.nan, right=np.nan
+            )
+            name, unit = bare(table.names[column]), "degC"
+            channels.append(Channel(name, values, recording.dt, "temperature", unit))
+    names = ", ".join(channel.name for channel in channels)
+    text = f"{names}: {stamps.size:,} values, interpolated to the samples of {recording.names[0]}"
+    notice = Notice("temperature-interpolated", "note", "", text, {"count": stamps.size})
+    wider = replace(recording, channels=(*recording.channels, *channels))
+    return _noted(replace(part, recording=wider), notice)
+
+
+def _noted(part: Part, notice: Notice) -> Part:
+    recording = replace(part.recording, notices=(*part.recording.notices, notice))
+    return replace(part, recording=recording)

@@ -1,0 +1,303 @@
+"""ROS bags by `rosbags`, without a ROS installation: ROS 1, ROS 2 in SQLite or MCAP.
+
+Read in blocks of messages, so that memory holds no more than the columns that are asked for.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gmwm._core import memory
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.formats.arrays import check_usable, damage_named
+from gmwm.readers.formats.extras import library
+from gmwm.readers.formats.ros_messages import (
+    CDR,
+    COVARIANCE_OF,
+    IMU,
+    ROS1,
+    TEMPERATURE,
+    Message,
+    Serialization,
+    decode,
+)
+from gmwm.readers.formats.topics import Topic, choose
+from gmwm.readers.table import label
+
+_BLOCK = 4096  # messages: 1.3 MB of sensor_msgs/Imu
+_SEEN = 64  # messages from which it is judged what a topic holds
+
+_ROS1, _MCAP, _SQLITE = b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"
+
+_TYPES = {"sensor_msgs/msg/Imu": IMU, "sensor_msgs/msg/Temperature": TEMPERATURE}
+_STAMPS = "time [ns]"
+
+_Record = tuple[Any, int, bytes]
+
+
+@dataclass(frozen=True)
+class _Bag:
+    """A bag: a file, or a folder of ROS 2."""
+
+    path: Path
+    is_ros1: bool
+
+    @property
+    def serialization(self) -> Serialization:
+        return ROS1 if self.is_ros1 else CDR
+
+    @contextmanager
+    def opened(self) -> Iterator[Any]:
+        """The reader of `rosbags`; what it raises is one sentence."""
+        with damage_named(self.path.name, self._damage):
+            yield self._reader
+
+    @cached_property
+    def _reader(self) -> Any:
+        """Open until the bag is dropped: its index may take as long to read as its messages."""
+        kind = "rosbag1" if self.is_ros1 else "rosbag2"
+        reader = library(f"rosbags.{kind}", "ros", self.path.name).Reader(self.path)
+        reader.open()
+        weakref.finalize(self, reader.close)
+        return reader
+
+    def _damage(self, error: Exception) -> str:
+        text = str(error).replace(str(self.path), self.path.name).rstrip(".")
+        tools = "rosbag reindex or decompress" if self.is_ros1 else "ros2 bag reindex or convert"
+        return (
+            f"is damaged or of an unknown kind{f' ({text})' if text else ''}: get a whole copy, "
+            f"or try {tools}"
+        )
+
+
+@dataclass(frozen=True)
+class BagTable:
+    """A topic of a bag: one message a row.
+
+    Attributes
+    ----------
+    bag : _Bag
+    topic : Topic
+    message : Message
+    names : tuple of str
+        Of the columns: the stamp, then numbers of the message.
+    log : bool
+        Whether the stamps are the times at which the messages were recorded.
+    origin : int
+        Stamp that is written as zero, ns.
+    """
+
+    bag: _Bag
+    topic: Topic
+    message: Message
+    names: tuple[str, ...]
+    log: bool
+    origin: int
+    notices: tuple[Notice, ...] = ()
+    tentative: bool = False
+    rate: float | None = None
+
+    @property
+    def source(self) -> str:
+        """Name of the bag."""
+        return self.bag.path.name
+
+    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Read some columns; see `Table`.
+
+        Raises
+        ------
+        InputError
+            If the bag or a message is damaged, a number is infinite, no message has a stamp, or
+            there is not enough memory.
+        """
+        memory.require(tuning.BYTES_PER_SAMPLE * self.topic.count * len(columns), self.source)
+        wanted = [column for column in columns if column > 0]
+        numbers = [self.message.columns[self.names[column]] for column in wanted]
+        parts: dict[int, list[FloatArray]] = {column: [] for column in columns}
+        row = 0
+        with self.bag.opened() as reader:
+            for block in _blocks(reader, self.topic.name):
+                _, times, raw = zip(*block, strict=True)
+                where = partial(self._place, row)
+                stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
+                if self.log:
+                    stamps = np.array(times, np.int64)
+                if 0 in parts:
+                    parts[0].append((stamps - self.origin).astype(float))
+                for column, values in zip(wanted, found, strict=True):
+                    parts[column].append(values)
+                row += len(block)
+        # One column at a time lets the blocks go before the next one is joined.
+        result = {column: np.concatenate(parts.pop(column)) for column in columns}
+        for column, values in result.items():
+            check_usable(f"{self.source}, column {label(self.names, column)}", values, self.where)
+        if 0 in result and row > 1 and not np.any(np.diff(result[0])):
+            raise InputError(
+                f"{self.source}, topic {self.topic.name}: every header has the same stamp",
+                "no-stamps",
+                'use the time of recording, clock="log"',
+            )
+        return result
+
+    def where(self, row: int) -> str:
+        """Say which message."""
+        return f"message {row} of {self.topic.name} (counted from 0)"
+
+    def _place(self, first: int, row: int) -> str:
+        return f"{self.source}, {self.where(first + row)}"
+
+
+def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, ...]:
+    """Open a bag.
+
+    Parameters
+    ----------
+    path : path
+        A file, or the folder of a bag of ROS 2.
+    topics : sequence of str
+        Those to read; by default the only one of `sensor_msgs/Imu`, or two of which one has gyros
+        and the other accelerometers.
+    clock : {"header", "log"}
+
+    Returns
+    -------
+    tuple of BagTable
+        One for each topic, those of thermometers last.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, holds no IMU, or topics have to be chosen.
+    """
+    is_folder = path.is_dir()
+    if is_folder and not (path / "metadata.yaml").is_file():
+        raise InputError(
+            f"{path.name} has no metadata.yaml: name the .db3 or .mcap file in it, or write one "
+            "with ros2 bag reindex"
+        )
+    bag = _Bag(path, not is_folder and _is_ros1(path))
+    with bag.opened() as reader:
+        counts, others = _counts(reader)
+        if not counts["sensor_msgs/msg/Imu"]:
+            listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
+            raise InputError(
+                f"{path.name} has no messages of sensor_msgs/Imu: "
+                + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
+            )
+        found = {
+            topic: Topic(topic, count, _sensors(reader, topic, bag))
+            for topic, count in counts["sensor_msgs/msg/Imu"].items()
+        }
+        chosen = choose(path.name, list(found.values()), topics)
+        warmth = counts["sensor_msgs/msg/Temperature"]
+        is_log = clock == "log"
+        origin = _first_stamp(reader, chosen[0].name, bag, is_log)
+    tables = [_table(bag, topic, is_log, origin, found) for topic in chosen]
+    tables += [
+        BagTable(bag, Topic(name, count), _thermometer(name, len(warmth)),
+                 (_STAMPS, _temperature(name, len(warmth))), is_log, origin)
+        for name, count in warmth.items()
+    ]  # fmt: skip
+    return tuple(tables)
+
+
+def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]) -> BagTable:
+    sensors = topic.sensors or frozenset(SI_UNIT)
+    names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
+    notices = []
+    if len(found) > 1 or len(sensors) < len(SI_UNIT):
+        text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
+        notices.append(Notice("topic", "note", "", text, {"topic": topic.name}))
+    return BagTable(bag, topic, IMU, (_STAMPS, *names), is_log, origin, tuple(notices))
+
+
+def _temperature(topic: str, thermometers: int) -> str:
+    """Name of the column, by the topic if there are several."""
+    prefix = "" if thermometers == 1 else topic.strip("/").replace("/", "_") + "_"
+    return f"{prefix}temperature [degC]"
+
+
+def _thermometer(topic: str, thermometers: int) -> Message:
+    return Message(TEMPERATURE.count, {_temperature(topic, thermometers): 0})
+
+
+def _is_ros1(path: Path) -> bool:
+    with damage_named(path.name), path.open("rb") as stream:
+        head = stream.read(16)
+    for magic, suffix in ((_ROS1, ".bag"), (_MCAP, ".mcap"), (_SQLITE, ".db3")):
+        if head.startswith(magic):
+            if path.suffix.lower() != suffix and magic != _ROS1:
+                raise InputError(f"{path.name} is a bag of ROS 2: name it {path.stem}{suffix}")
+            return magic == _ROS1
+    what = "is not a ROS bag" if head else "is empty"
+    raise InputError(f"{path.name} {what}: check that it is the right file, and a whole one")
+
+
+def _counts(reader: Any) -> tuple[dict[str, dict[str, int]], list[str]]:
+    """Messages of the topics of each type that is read, and all topics with their types."""
+    counts: dict[str, dict[str, int]] = {kind: {} for kind in _TYPES}
+    others = []
+    for each in reader.connections:
+        if each.msgcount:
+            others.append(f"{each.topic} ({each.msgtype.replace('/msg/', '/')})")
+            if each.msgtype in counts:
+                of_type = counts[each.msgtype]
+                of_type[each.topic] = of_type.get(each.topic, 0) + each.msgcount
+    return counts, sorted(set(others))
+
+
+def _blocks(reader: Any, topic: str) -> Iterator[list[_Record]]:
+    records = _messages(reader, topic)
+    while block := list(islice(records, _BLOCK)):
+        yield block
+
+
+def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Record]:
+    connections = [
+        each for each in reader.connections if each.topic == topic and each.msgtype in _TYPES
+    ]
+    return iter(reader.messages(connections, start=start))
+
+
+def _sensors(reader: Any, topic: str, bag: _Bag) -> frozenset[str]:
+    """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
+    first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
+    found: set[str] = set()
+    middle = (reader.start_time + reader.end_time) // 2
+    for start in (None, middle):
+        raw = [message for _, _, message in islice(_messages(reader, topic, start), _SEEN)]
+        for sensor, index in first.items() if raw else ():
+            wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
+            where = partial(_somewhere, bag, topic)
+            _, (*axes, covariance) = decode(raw, IMU, wanted, bag.serialization, where)
+            if np.any(np.array(axes)) and not np.all(covariance == -1.0):
+                found.add(sensor)
+        if len(found) == len(first):
+            break
+    return frozenset(found)
+
+
+def _somewhere(bag: _Bag, topic: str, row: int) -> str:
+    return f"{bag.path.name}, a message of {topic}"
+
+
+def _first_stamp(reader: Any, topic: str, bag: _Bag, is_log: bool) -> int:
+    _, time, message = next(_messages(reader, topic))
+    if is_log:
+        return int(time)
+    stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: bag.path.name)
+    return int(stamps[0])

@@ -1,0 +1,177 @@
+"""Flight logs of PX4 (ULog) by pyulog.
+
+`sensor_combined` holds every sample that the estimator gets, the FIFO topics every sample of the
+sensor; `sensor_gyro` and `sensor_accel` are thinned to about 1 Hz unless one asks for more
+(docs.px4.io, Logging; msg/SensorCombined.msg, SensorGyroFifo.msg, SensorAccelFifo.msg).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
+from gmwm.readers.formats.extras import library
+from gmwm.readers.formats.topics import Topic, choose_first, left_out
+from gmwm.readers.names import AXES
+
+_COMBINED = "sensor_combined"
+_FIFO = {"sensor_gyro_fifo": "gyro", "sensor_accel_fifo": "accel"}
+_SINGLE = {"sensor_gyro": "gyro", "sensor_accel": "accel"}
+_UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+_TIME = "time [us]"
+_NO_TIME = 2**31 - 1
+"""RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg."""
+
+_MEND = (
+    "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics (bits 8 and "
+    "9 of SDLOG_PROFILE)"
+)
+
+_Columns = dict[str, AnyArray]
+
+
+def open_ulog(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable, ...]:
+    """Open a ULog.
+
+    Parameters
+    ----------
+    path : path
+    topics : sequence of str
+        Those to read, e.g. ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO
+        topics.
+    clock : str
+        Not used: messages have one stamp.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, holds no IMU at its own rate, or topics have to be chosen.
+    """
+    sets, notices = _data_sets(path)
+    ranks = [
+        [_topic(each, frozenset(_UNITS)) for each in sets if each.name == _COMBINED],
+        [_topic(each, frozenset((_FIFO[each.name],))) for each in sets if each.name in _FIFO],
+        [_topic(each, frozenset((_SINGLE[each.name],))) for each in sets if each.name in _SINGLE],
+    ]
+    if not any(ranks):
+        raise InputError(f"{path.name} has no samples of an IMU: {_MEND}")
+    chosen = choose_first(path.name, ranks, topics)
+    notices += left_out(ranks[:2], chosen)
+    by_name = {_name(each): each for each in sets}
+    tables: list[_Columns] = []
+    for topic in chosen:
+        data = by_name[topic.name].data
+        if topic.name.startswith(_COMBINED):
+            tables += _combined(data)
+        elif by_name[topic.name].name in _FIFO:
+            tables.append(_from_fifo(data, _FIFO[by_name[topic.name].name]))
+        else:
+            sensor = _SINGLE[by_name[topic.name].name]
+            _check_not_thinned(path.name, topic, data)
+            tables.append(_columns(data["timestamp"], sensor, [data[axis] for axis in AXES]))
+    tables += _thermometers(sets)
+    return tuple(
+        ArrayTable.of_entries(
+            path.name,
+            {name: array_of(values) for name, values in columns.items()},
+            notices if i == 0 else (),
+        )
+        for i, columns in enumerate(tables)
+    )
+
+
+def _data_sets(path: Path) -> tuple[list[Any], tuple[Notice, ...]]:
+    """Topics about an IMU, and what was noticed."""
+    wanted = [_COMBINED, *_FIFO, *_SINGLE]
+    reader = library("pyulog", "px4", path.name).ULog
+    # pyulog prints what is damaged.
+    quiet = redirect_stdout(io.StringIO())
+    with damage_named(path.name, _damage), quiet, path.open("rb") as stream:
+        log = reader(stream, wanted)
+    notices = []
+    if log.file_corruption:
+        text = "the log is damaged in places, which were passed over"
+        notices.append(Notice("log-damaged", "warning", "", text))
+    lost = sum(dropout.duration for dropout in log.dropouts) / 1e3
+    if lost > 0.0:
+        text = f"the logger dropped {len(log.dropouts)} stretches, {lost:.3g} s in all"
+        notices.append(Notice("log-dropouts", "note", "", text, {"duration": lost}))
+    return [each for each in log.data_list if each.data["timestamp"].size], tuple(notices)
+
+
+def _damage(error: Exception) -> str:
+    return "is no ULog, or is damaged or cut off: get a whole copy"
+
+
+def _name(data_set: Any) -> str:
+    if data_set.name == _COMBINED and data_set.multi_id == 0:
+        return _COMBINED
+    return f"{data_set.name}[{data_set.multi_id}]"
+
+
+def _topic(data_set: Any, sensors: frozenset[str]) -> Topic:
+    return Topic(_name(data_set), int(data_set.data["timestamp"].size), sensors)
+
+
+def _columns(stamps: AnyArray, sensor: str, axes: Sequence[AnyArray]) -> _Columns:
+    named = {
+        f"{sensor}_{axis} [{_UNITS[sensor]}]": values
+        for axis, values in zip(AXES, axes, strict=True)
+    }
+    return {_TIME: stamps, **named}
+
+
+def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:
+    """Gyros, and accelerometers by their own stamps if these do not advance with each row."""
+    gyro = _columns(data["timestamp"], "gyro", [data[f"gyro_rad[{i}]"] for i in range(3)])
+    axes = [data[f"accelerometer_m_s2[{i}]"] for i in range(3)]
+    offset = data["accelerometer_timestamp_relative"].astype(np.int64)
+    stamps = data["timestamp"].astype(np.int64) + offset
+    valid = offset != _NO_TIME
+    is_new = valid & np.append(True, np.diff(stamps) != 0)
+    if np.all(is_new) or np.count_nonzero(is_new) < tuning.FEWEST_SAMPLES:
+        return [gyro | _columns(data["timestamp"], "accel", axes)]
+    return [gyro, _columns(stamps[is_new], "accel", [axis[is_new] for axis in axes])]
+
+
+def _from_fifo(data: Mapping[str, AnyArray], sensor: str) -> _Columns:
+    """Samples of messages of some each, of which the last has the stamp."""
+    count = data["samples"].astype(np.int64)
+    most = sum(name.startswith("x[") for name in data)
+    index = np.arange(most)
+    there = index < count[:, None]
+    ago = (count[:, None] - 1 - index) * data["dt"].astype(float)[:, None]
+    stamps = (data["timestamp_sample"].astype(float)[:, None] - ago)[there]
+    scale = np.repeat(data["scale"].astype(float), np.count_nonzero(there, axis=1))
+    axes = [
+        np.column_stack([data[f"{axis}[{i}]"] for i in range(most)])[there] * scale for axis in AXES
+    ]
+    return _columns(stamps, sensor, axes)
+
+
+def _check_not_thinned(source: str, topic: Topic, data: Mapping[str, AnyArray]) -> None:
+    step = float(np.median(np.diff(data["timestamp"].astype(float)))) if topic.count > 1 else 1e6
+    if not 0.0 < step * 1e-6 * tuning.THINNED < 1.0:
+        rate = 1e6 / step if step > 0.0 else 0.0
+        raise InputError(
+            f"{source}: {topic.name} is logged at {rate:.3g} Hz, thinned from hundreds, so that "
+            f"its noise is not that of the sensor: {_MEND}"
+        )
+
+
+def _thermometers(sets: Sequence[Any]) -> list[_Columns]:
+    found = []
+    for each in sets:
+        if each.name in _SINGLE and each.multi_id == 0 and "temperature" in each.data:
+            name = f"{each.name}_temperature [degC]"
+            found.append({_TIME: each.data["timestamp"], name: each.data["temperature"]})
+    return found

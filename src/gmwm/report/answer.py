@@ -1,0 +1,228 @@
+"""The first screen: what an engineer came for, axis by axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.units import field_units, si_parameter_unit
+from gmwm.calibration import AMBIGUITY, Calibration, floor
+from gmwm.estimate import Fit
+from gmwm.report.numbers import SHOWN, Certified
+from gmwm.report.text import duration_text, short
+
+_WHY = {
+    "misfit": "the model misses the data",
+    "level-missed": "the model misses one level",
+    "amplitude-bound": "a term was not found",
+    "search-limit": "a correlation time beyond reach",
+    "redundant-term": "a term is not needed",
+    "undetermined": "record too short for model",
+    "indistinct-terms": "two terms look alike",
+    "confounded": "terms cannot be separated",
+    "too-few-levels": "record too short",
+    "not-converged": "the search did not converge",
+    "no-curvature": "the search did not converge",
+    "drift-in-state": "the drift is no ramp",
+    "no-region": "no straight region found",
+    "wrong-slope": "slopes contradict the model",
+    "recordings-differ": "the recordings disagree",
+    "not-static": "the sensor moved",
+    "tilt": "the sensor tilted",
+    "rate-changes": "the sampling rate changed",
+    "step": "the bias stepped",
+    "transient": "a transient at the start",
+    "drift-at-start": "drift after switching on",
+    "slow-period": "a slow period stands out",
+}
+"""Code of a notice that makes a fit invalid -> why, in about five words."""
+
+_AIM = 0.1  # relative standard error of the deviation that is well enough known
+
+
+def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict[str, Any]:
+    """Content of the first screen."""
+    certified = numbers[SHOWN]
+    return {
+        "health": verdict(calibration),
+        "horizon": f"{SHOWN:g} s",
+        "rows": [_row(name, fit, calibration, certified) for name, fit in calibration.items()],
+        "length": length_sentence(calibration, SHOWN),
+        "boxes": [_box(each, calibration) for each in numbers.values()],
+    }
+
+
+def verdict(calibration: Calibration) -> dict[str, str]:
+    """The health of sensor and recording in one line."""
+    severe = [n for n in calibration.notices if n.severity == "bad"]
+    warnings = [n for n in calibration.notices if n.severity == "warning"]
+    invalid = [name for name, fit in calibration.items() if not fit.valid]
+    out = [*invalid, *calibration.skipped]
+    parts = [f"{', '.join(invalid)} not valid"] if invalid else []
+    parts += [f"{', '.join(calibration.skipped)} without a model"] if calibration.skipped else []
+    if severe:
+        parts.append(_counted(severe, "severe issue"))
+    if warnings:
+        parts.append(_counted(warnings, "warning"))
+    if severe or out:
+        all_out = not any(fit.valid for fit in calibration.values())
+        state, word = ("bad", "Not healthy") if all_out or severe else ("care", "Usable in part")
+        return {"state": state, "word": word, "text": "; ".join(parts)}
+    if not calibration.is_examined:
+        return {"state": "care", "word": "Not examined", "text": "the fits are valid"}
+    if warnings:
+        return {"state": "care", "word": "Healthy, with care", "text": "; ".join(parts)}
+    text = "nothing was found that spoils the estimates"
+    return {"state": "good", "word": "Healthy", "text": text}
+
+
+def _counted(notices: list[Notice], word: str) -> str:
+    where = ", ".join(dict.fromkeys(notice.where for notice in notices if notice.where))
+    count = f"{len(notices)} {word}{'s' if len(notices) > 1 else ''}"
+    return f"{count} ({where})" if where else count
+
+
+def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
+    """Whether the numbers of a channel can be used, and why, in about five words."""
+    for notice in fit.notices:
+        if notice.severity == "bad":
+            return False, _WHY.get(notice.code, notice.code.replace("-", " "))
+    worst = fit.goodness.worst
+    fits = f"fits within {100.0 * abs(worst[0]):.2g} %" if worst else "fits the data"
+    tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
+    return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
+
+
+def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
+    """A value in the field's first unit and in SI."""
+    si = si_parameter_unit(unit, fit.wv.quantity)
+    if fit.wv.quantity is None and fit.wv.unit:
+        si = unit.replace("u", fit.wv.unit, 1)
+    found = field_units(unit, fit.wv.quantity)
+    own = (found[0].per_si, found[0].unit) if found else (1.0, si)
+    return {"field": f"{short(value * own[0])} {own[1]}", "si": f"{value:.3g} {si}"}
+
+
+def bias_instability(fit: Fit) -> dict[str, str]:
+    """B from the lowest point of the curve; an upper bound where it falls to the end."""
+    low = floor(fit)
+    sign = "" if low.tau < fit.wv.tau[-1] else "≤ "
+    text = quantity_text(low.bias_instability, "u", fit)
+    return {key: sign + each for key, each in text.items()}
+
+
+def slow_terms(fit: Fit) -> list[dict[str, str]]:
+    """The terms that do not average out within a second, in words."""
+    shown = []
+    params = {(item.term, item.parameter.name): item for item in fit.model.parameters}
+    for place, term in enumerate(fit.model.terms):
+        size = term.linear_parameter
+        times = [v for k, v in term.values.items() if k == "tau" and v is not None]
+        is_slow = term.is_walk or term.is_drift or any(tau > 1.0 for tau in times)
+        if not is_slow or size is None:
+            continue
+        item = params[place, size.name]
+        bounds = fit.upper_bounds
+        sign = "< " if item.key in bounds else ""
+        value = bounds.get(item.key, item.value or 0.0)
+        text = quantity_text(value, size.unit, fit)
+        tail = f", {duration_text(times[0])}" if times and not sign else ""
+        word = "ramp" if term.is_drift else "walk" if term.is_walk else "GM"
+        shown.append({key: f"{word} {sign}{each}{tail}" for key, each in text.items()})
+    return shown
+
+
+def _row(name: str, fit: Fit, calibration: Calibration, certified: Certified) -> dict[str, Any]:
+    is_valid, why = trust(name, fit, calibration)
+    return {
+        "name": name,
+        **{letter: _number(certified, name, letter, fit) for letter in "NK"},
+        "B": bias_instability(fit),
+        "slow": slow_terms(fit),
+        "valid": is_valid,
+        "why": why,
+        "known": known_at(fit, SHOWN),
+    }
+
+
+def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str, str] | None:
+    if name not in certified.axes:
+        return None
+    unit = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}[letter]
+    text = quantity_text(getattr(certified.axes[name], letter), unit, fit)
+    sign = "≤ " if certified.is_upper(name, letter) else ""
+    return {key: sign + each for key, each in text.items()}
+
+
+def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
+    rows = []
+    for name, each in certified.axes.items():
+        fit = calibration[name]
+        nees = each.nees.get(certified.horizon, float("nan"))
+        rows.append(
+            {
+                "name": name,
+                "N": _number(certified, name, "N", fit),
+                "K": _number(certified, name, "K", fit),
+                "start": quantity_text(each.initial_sd, "u", fit),
+                "nees": f"{nees:.2g}" if np.isfinite(nees) else "not predicted",
+            }
+        )
+    return {
+        "horizon": f"{certified.horizon:g}",
+        "shown": certified.horizon == SHOWN,
+        "rows": rows,
+        "texts": certified.texts,
+        "problem": certified.problem,
+        "notes": certified.notes,
+    }
+
+
+def known_at(fit: Fit, tau: float) -> float:
+    """Relative standard error of the model's Allan deviation at an averaging time."""
+    if not fit.keys or fit.wv.dt > tau:
+        return float("nan")
+    with np.errstate(all="ignore"):
+        value, _, upper = fit.deviation_interval(np.array([tau]), 0.6827)
+    return float(upper[0] / value[0] - 1.0) if value[0] > 0.0 else float("nan")
+
+
+def length_sentence(calibration: Calibration, horizon: float) -> str:
+    """Whether the recording is long enough for a horizon, and how long for all parameters."""
+    known = {name: known_at(fit, horizon) for name, fit in calibration.items()}
+    known = {name: each for name, each in known.items() if np.isfinite(each)}
+    parts = []
+    if known:
+        worst = max(known, key=lambda name: known[name])
+        need = calibration.duration * (known[worst] / _AIM) ** 2
+        # A curve that ends before the horizon is known there by the model alone.
+        covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
+        share = f"{100.0 * known[worst]:.2g} % (1 sigma, {worst})"
+        if need <= calibration.duration and covered:
+            parts.append(
+                f"long enough for {horizon:g} s outages: every curve is known there to {share}"
+            )
+        else:
+            least = max(need, 4.0 * horizon)
+            parts.append(
+                f"too short for {horizon:g} s outages: the curve is known there to {share}; record "
+                f"{duration_text(least)} for {100.0 * _AIM:g} %"
+            )
+    lengths = [
+        (seconds, f"{key} of {name}")
+        for name, fit in calibration.items()
+        for key, seconds in fit.needed_length(_AIM).items()
+    ]
+    finite = [each for each in lengths if np.isfinite(each[0])]
+    if finite:
+        longest, what = max(finite)
+        parts.append(
+            f"every parameter is known to {100.0 * _AIM:g} %"
+            if longest <= calibration.duration
+            else f"every parameter to {100.0 * _AIM:g} % would take {duration_text(longest)} "
+            f"({what})"
+        )
+    return "; ".join(parts) + "." if parts else ""

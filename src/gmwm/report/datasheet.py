@@ -1,0 +1,112 @@
+"""The numbers of a data sheet, to be laid over what was measured."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
+from gmwm.errors import InputError
+from gmwm.process import BiasInstability, Process, RandomWalk, WhiteNoise
+
+_TERMS: dict[str, tuple[str, type[Process]]] = {
+    "N": ("u/sqrt(Hz)", WhiteNoise),
+    "B": ("u", BiasInstability),
+    "K": ("u/s/sqrt(Hz)", RandomWalk),
+}
+_VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)\s*")
+_MEND = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
+
+
+@dataclass(frozen=True)
+class Datasheet:
+    """N, B and K by sensor or channel.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    entries : dict of str to dict
+        "gyro", "accel" or a channel -> letter -> value, SI.
+    """
+
+    name: str
+    entries: dict[str, dict[str, float]]
+
+    def of(self, channel: str, quantity: str | None) -> dict[str, float]:
+        """What it states of a channel; empty if nothing."""
+        return self.entries.get(channel, self.entries.get(quantity or "", {}))
+
+    def deviation(
+        self, channel: str, quantity: str | None, tau: FloatArray, dt: float
+    ) -> FloatArray | None:
+        """The Allan deviation that it states, u, or ``None``."""
+        values = self.of(channel, quantity)
+        if not values:
+            return None
+        curves = [_TERMS[key][1](value).haar_variance(tau, dt) for key, value in values.items()]
+        return np.asarray(np.sqrt(2.0 * np.sum(curves, axis=0)), dtype=float)
+
+
+def read_datasheet(path: str | os.PathLike[str], channels: dict[str, str]) -> Datasheet:
+    """Read a YAML file of N, B and K, each a number with its unit, by sensor or channel.
+
+    Parameters
+    ----------
+    path : path-like
+    channels : dict of str to str
+        Channel name -> quantity.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or has anything else.
+    """
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:
+        what = " ".join(str(error).split())[:200]
+        raise InputError(f"{path}: cannot be read as YAML ({what}): {_MEND}") from None
+    if not isinstance(content, dict) or not content:
+        raise InputError(f"{path}: holds no sensors: begin with 'gyro:' or 'accel:', and {_MEND}")
+    known = {**{quantity: quantity for quantity in SI_UNIT}, **channels}
+    entries: dict[str, dict[str, float]] = {}
+    for name, values in content.items():
+        if not isinstance(name, str) or name not in known:
+            raise InputError(
+                f"{path}: {str(name)[:40]!r} is no sensor of the recording: there are "
+                f"{', '.join(known)}"
+            )
+        if not isinstance(values, dict):
+            raise InputError(f"{path}: {name} has no numbers: {_MEND}")
+        entries[name] = {
+            str(key): _value(f"{path}: {name}", key, value, known[name])
+            for key, value in values.items()
+        }
+    return Datasheet(Path(path).name, entries)
+
+
+def _value(where: str, key: Any, value: Any, quantity: str) -> float:
+    if key not in _TERMS:
+        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(_TERMS)}: {_MEND}")
+    found = _VALUE.fullmatch(value) if isinstance(value, str) else None
+    try:
+        if found is None:
+            raise ValueError
+        number = float(found[1])
+    except ValueError:
+        raise InputError(
+            f"{where}: {key} = {str(value)[:40]!r} is no number with a unit: {_MEND}"
+        ) from None
+    unit = si_parameter_unit(_TERMS[key][0], quantity)
+    si = number * factor(found[2], unit)
+    if not (np.isfinite(si) and si > 0.0):
+        raise InputError(f"{where}: {key} = {value[:40]} is not positive: give a positive number")
+    return si

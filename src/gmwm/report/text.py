@@ -1,0 +1,46 @@
+"""Numbers and durations as people write them."""
+
+from __future__ import annotations
+
+_DAY, _YEAR = 86400.0, 365.25 * 86400.0
+_DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
+_MANY_YEARS = 100.0
+
+
+def duration_text(seconds: float) -> str:
+    """A duration as people say it: ``40 s``, ``35 min``, ``2 h 46 min``, ``12 days``."""
+    if seconds > _MANY_YEARS * _YEAR:
+        return "centuries"
+    if seconds >= _YEARS * _YEAR:
+        return f"{seconds / _YEAR:.2g} years"
+    if seconds >= _DAYS * _DAY:
+        return f"{seconds / _DAY:.3g} days"
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60.0)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def number(value: float) -> str:
+    """Four significant digits, without an exponent where a person would write none."""
+    text = f"{value:.4g}"
+    return text if "e" not in text else f"{value:.3e}"
+
+
+def short(value: float) -> str:
+    """Three significant digits, likewise."""
+    text = f"{value:.3g}"
+    return f"{float(text):,.0f}" if abs(value) >= 1000.0 else text
+
+
+def needed(seconds: float | None, duration: float) -> str:
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
+    if seconds is None:
+        return ""
+    if seconds <= duration:
+        return "long enough"
+    if seconds == float("inf"):
+        return "not identified"
+    text = duration_text(seconds)
+    return text if text == "centuries" else f"needs {text}"

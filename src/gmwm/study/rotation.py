@@ -1,0 +1,516 @@
+"""Every recording calibrated in turn, the others navigated with: what does not hang on one of them.
+
+Filters differ in their sensor models only, and every one has a slow state on every axis. What is
+compared comes from the recording that is calibrated alone; intervals allow for the few recordings.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from scipy.stats import norm
+
+from gmwm import filter_numbers
+from gmwm._core.documents import Document
+from gmwm._core.files import folder_to_fill, written
+from gmwm._core.notices import Notice
+from gmwm._core.runs import Earlier
+from gmwm._core.text import wrapped
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.calibration import Calibration, calibrate
+from gmwm.errors import InputError
+from gmwm.filter_numbers import SensorNumbers
+from gmwm.ins import tuning
+from gmwm.ins.imu import AXES, Recorded, SensorModels
+from gmwm.ins.montecarlo import GROUPS, Experiment, FilterErrors, Validation
+from gmwm.readers import Recording
+from gmwm.study.navigation import TEN, Calibrated, aligned, saved, scenario_of, times
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_FIRST = "GMWM"
+_BOUND = float(norm.ppf(0.975))  # of the interval whose coverage is counted
+_D = TypeVar("_D", bound=Document)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its bootstrap interval of 95 %."""
+
+    value: float
+    lower: float
+    upper: float
+
+    def __str__(self) -> str:
+        return f"{_short(self.value)} ({_short(self.lower)}-{_short(self.upper)})"
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """How filters navigated with each recording calibrated in turn.
+
+    Attributes
+    ----------
+    sources : tuple of str
+        The n recordings.
+    stretches : tuple of int
+        How many of each are navigated with.
+    turns : tuple of Validation
+        With each recording calibrated; its runs are the stretches of the others, in their order.
+    notices : tuple of Notice
+    """
+
+    sources: tuple[str, ...]
+    stretches: tuple[int, ...]
+    turns: tuple[Validation, ...]
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the filters; the others are compared with the first."""
+        return self.turns[0].names
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    def ratio(self, name: str, quantity: str, turn: int | None = None) -> Interval:
+        """Root mean square of an error at the ends of outages against the first filter's.
+
+        Parameters
+        ----------
+        name : str
+        quantity : {"horizontal", "vertical"}
+        turn : int, optional
+            With this recording calibrated; by default all of them.
+        """
+        part = slice(0, 2) if quantity == "horizontal" else slice(2, 3)
+
+        def squares(runs: FilterErrors, end: int) -> FloatArray:
+            return np.asarray(np.sum(runs.error[:, end, part] ** 2, axis=1))
+
+        other, first = (self._table(each, squares) for each in (name, _FIRST))
+        both = np.isfinite(other) & np.isfinite(first)
+        tables = [np.where(both, each, np.nan) for each in (other, first)]
+        return self._interval(tables, turn, np.sqrt)
+
+    def nees(self, name: str, group: str, turn: int | None = None) -> Interval:
+        """NEES per degree of freedom at the ends of outages, of a group of errors."""
+        index, part = list(GROUPS).index(group), GROUPS[group]
+
+        def judged(runs: FilterErrors, end: int) -> FloatArray:
+            return np.asarray(runs.nees[:, end, index] / (part.stop - part.start))
+
+        table = self._table(name, judged)
+        return self._interval([table, np.where(np.isfinite(table), 1.0, np.nan)], turn)
+
+    def coverage(self, name: str, group: str, turn: int | None = None) -> Interval:
+        """Fraction of errors within the predicted interval of 95 % at the ends of outages."""
+        part = GROUPS[group]
+
+        def inside(runs: FilterErrors, end: int) -> FloatArray:
+            standard = runs.error[:, end, part] / runs.sd[:, end, part]
+            hits = np.mean(np.abs(standard) < _BOUND, axis=1)
+            return np.where(np.isfinite(standard[:, 0]), hits, np.nan)
+
+        table = self._table(name, inside)
+        return self._interval([table, np.where(np.isfinite(table), 1.0, np.nan)], turn)
+
+    def _table(self, name: str, measure: Callable[[FilterErrors, int], FloatArray]) -> FloatArray:
+        """Mean over the outages, by recording calibrated, recording navigated with and stretch."""
+        n = len(self.sources)
+        table = np.full((n, n, max(self.stretches)), np.nan)
+        for i, turn in enumerate(self.turns):
+            runs = turn.study[name]
+            ends = [runs.index(outage.end) for outage in turn.study.outages]
+            values = np.mean([measure(runs, end) for end in ends], axis=0)
+            first = 0
+            for j, size in enumerate(self.stretches):
+                if j != i:
+                    table[i, j, :size] = values[first : first + size]
+                    first += size
+        return table
+
+    def _interval(
+        self,
+        tables: Sequence[FloatArray],
+        turn: int | None,
+        root: Callable[[FloatArray], FloatArray] = np.asarray,
+    ) -> Interval:
+        """Ratio of the sums of two tables."""
+        n = len(self.sources)
+        weights = _weights(self.stretches, turn, self.turns[0].experiment.seed)
+        above, below = (np.nan_to_num(each) for each in tables)
+        whole = np.ones((n, n)) if turn is None else np.outer(np.eye(n)[turn], np.ones(n))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            sums = [np.sum(whole[..., None] * each) for each in (above, below)]
+            value = root(np.array(sums[0] / sums[1]))
+            drawn = root(
+                np.einsum("dcts,cts->d", weights, above) / np.einsum("dcts,cts->d", weights, below)
+            )
+        drawn = drawn[np.isfinite(drawn)]
+        if not drawn.size:
+            return Interval(float(value), float("nan"), float("nan"))
+        tail = 0.5 - 0.5 * tuning.CONFIDENCE
+        lower, upper = np.quantile(drawn, [tail, 1.0 - tail])
+        return Interval(float(value), float(lower), float(upper))
+
+    # -- words ------------------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        turns = range(len(self.sources))
+        by_turn = [f"{i + 1} calibrated" for i in turns]
+        return "\n\n".join(
+            "\n".join(block)
+            for block in (
+                self._head(),
+                self._table_of(
+                    f"All turns together, at the ends of outages, before the first fix: errors "
+                    f"over those of {_FIRST}; NEES per degree of freedom",
+                    ["horizontal RMS", "vertical RMS", "NEES horizontal", "NEES vertical"],
+                    self._row,
+                ),
+                self._table_of(
+                    "Within the predicted intervals of 95 %, %; NEES of the position, which also "
+                    "judges how horizontal and vertical go together",
+                    ["horizontal", "vertical", "NEES position"],
+                    self._covered,
+                ),
+                self._table_of(
+                    f"Horizontal RMS over that of {_FIRST}, turn by turn",
+                    by_turn,
+                    lambda name: [self.ratio(name, "horizontal", i) for i in turns],
+                ),
+                self._table_of(
+                    "NEES of the position, turn by turn",
+                    by_turn,
+                    lambda name: [self.nees(name, "position", i) for i in turns],
+                ),
+            )
+        )
+
+    def _table_of(
+        self, title: str, head: Sequence[str], row: Callable[[str], list[Interval]]
+    ) -> list[str]:
+        width = max(map(len, self.names))
+        lines = [*wrapped(title), " " * width + "".join(f"{each:>17}" for each in head)]
+        for name in self.names:
+            lines.append(f"{name:{width}}" + "".join(f"{each!s:>17}" for each in row(name)))
+        return lines
+
+    def _head(self) -> list[str]:
+        turn = self.turns[0]
+        truth, ends = turn.study.truth, [f"{each.end:g}" for each in turn.study.outages]
+        n, runs = len(self.sources), sum(each.study[_FIRST].runs for each in self.turns)
+        text = (
+            f"{turn.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, outages that "
+            f"end at {', '.join(ends)} s; each of {n} recordings calibrated in turn, the others "
+            f"navigated with: {runs} runs, seed {turn.experiment.seed}"
+        )
+        lines = wrapped(text, indent=2)
+        for i, (source, size) in enumerate(zip(self.sources, self.stretches, strict=True)):
+            lines += wrapped(f"{source}, {size} stretches", f"{i + 1} ", 2)
+        for notice in self.notices:
+            lines += wrapped(str(notice), "- ", 2)
+        return lines
+
+    def _row(self, name: str) -> list[Interval]:
+        ratios = [self.ratio(name, each) for each in ("horizontal", "vertical")]
+        return ratios + [self.nees(name, each) for each in ("horizontal", "vertical")]
+
+    def _covered(self, name: str) -> list[Interval]:
+        found = [self.coverage(name, each) for each in ("horizontal", "vertical")]
+        shares = [Interval(100.0 * x.value, 100.0 * x.lower, 100.0 * x.upper) for x in found]
+        return [*shares, self.nees(name, "position")]
+
+    def markdown(self) -> str:
+        """All turns together, as a table for a page."""
+        head = ["filter", "horizontal error against GMWM", "NEES horizontal", "NEES vertical",
+                "NEES position", "within 95 %: horizontal", "vertical"]  # fmt: skip
+        rows = [head, ["---"] * len(head)]
+        for name in self.names:
+            ratio = "1" if name == _FIRST else _of(self.ratio(name, "horizontal"))
+            judged = [_of(self.nees(name, each)) for each in ("horizontal", "vertical", "position")]
+            shares = [f"{100.0 * self.coverage(name, each).value:.0f} %"
+                      for each in ("horizontal", "vertical")]  # fmt: skip
+            rows.append([name, ratio, *judged, *shares])
+        return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+    # -- figures ----------------------------------------------------------------------------------
+
+    def plot(self) -> Figure:
+        """Ratio of horizontal errors and NEES of each filter: every turn, and all together."""
+        from gmwm import plotting
+
+        turns = range(len(self.turns))
+        panels = {
+            "horizontal RMS against GMWM": {
+                name: [self.ratio(name, "horizontal", i) for i in (None, *turns)]
+                for name in self.names[1:]
+            },
+            "NEES of the position": {
+                name: [self.nees(name, "position", i) for i in (None, *turns)]
+                for name in self.names
+            },
+        }
+        return plotting.intervals(
+            {
+                title: {
+                    name: ([each.value for each in found[1:]],
+                           (found[0].value, found[0].lower, found[0].upper))
+                    for name, found in rows.items()
+                }
+                for title, rows in panels.items()
+            }
+        )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _weights(stretches: tuple[int, ...], turn: int | None, seed: int) -> FloatArray:
+    """Of all intervals of a study, or of one turn of it; see `crossed_weights`."""
+    calibrated = None if turn is None else np.eye(len(stretches))[turn]
+    rng = np.random.default_rng(seed)
+    return crossed_weights(stretches, calibrated, tuning.BOOTSTRAP_DRAWS, rng)
+
+
+def crossed_weights(
+    stretches: Sequence[int],
+    calibrated: FloatArray | None,
+    draws: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """How often a bootstrap draws each run, (draws, n, n, S).
+
+    Recordings that are calibrated, recordings that are navigated with and the stretches of these
+    are drawn with replacement, each of them once a draw for all runs that they are in: the crossed
+    ("pigeonhole") bootstrap, which is conservative for many recordings (Owen 2007, *Annals of
+    Applied Statistics* 1, 386-411). Of four, with eight stretches each, intervals of 95 % hold the
+    truth in 99 % of simulated studies where recordings do not differ, in 90 % where they differ as
+    much as stretches, and in 84 % where they differ twice as much.
+
+    Parameters
+    ----------
+    stretches : sequence of int
+        Of each of the n recordings, S at most.
+    calibrated : (n,) ndarray or None
+        Weights of those that are calibrated, if they are not drawn.
+    draws : int
+    rng : numpy.random.Generator
+    """
+    n = len(stretches)
+    even = np.full(n, 1.0 / n)
+    first = np.tile(calibrated, (draws, 1)) if calibrated is not None else None
+    by = rng.multinomial(n, even, draws) if first is None else first
+    of = np.zeros((draws, n, max(stretches)))
+    if calibrated is None:
+        times_drawn = rng.multinomial(n, even, draws)
+    else:
+        # The calibrated one is not navigated with: the others are drawn among themselves.
+        others = np.where(calibrated > 0.0, 0.0, 1.0)
+        times_drawn = rng.multinomial(n - 1, others / np.sum(others), draws)
+    for i, size in enumerate(stretches):
+        of[:, i, :size] = rng.multinomial(size, np.full(size, 1.0 / size), draws)
+    weights = by[:, :, None, None] * (times_drawn[:, :, None] * of)[:, None]
+    weights[:, np.arange(n), np.arange(n)] = 0.0
+    return np.asarray(weights)
+
+
+def rotate(
+    vehicle: str,
+    recordings: Sequence[Recording],
+    folder: Path,
+    *,
+    runs: int | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    earlier: Earlier = "refuse",
+    progress: Progress | None = None,
+) -> Rotation:
+    """Calibrate every recording in turn, and navigate with the others.
+
+    Parameters
+    ----------
+    vehicle : {"helicopter", "car"}
+    recordings : sequence of Recording
+        Two at least.
+    folder : Path
+        Where calibrations and finished runs are kept, so that work that was interrupted goes on.
+    runs : int, optional
+        Most stretches of each recording; by default all that do not overlap.
+    seed, jobs : int, optional
+    earlier : {"resume", "replace", "refuse"}, optional
+        What to do with what the folder holds.
+    progress : callable, optional
+        Called as ``progress(done, total, what)``.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two recordings, an axis is missing, one is too short, or the folder
+        holds runs that are not to be resumed.
+    """
+    if len(recordings) < 2:
+        raise InputError("give two recordings or more: each is calibrated in turn")
+    scenario = scenario_of(vehicle)
+    horizon = max(outage.duration for outage in scenario.outages)
+    parts = [
+        _shortened(Recorded.of(recording, scenario.trajectory.duration), runs)
+        for recording in recordings
+    ]
+    kept = folder / "calibrations"
+    if earlier == "refuse" and kept.exists():
+        raise InputError(
+            f"{folder} holds calibrations of an earlier study: resume it, or give another folder",
+            "earlier-runs",
+        )
+    turns: list[Validation] = []
+    notices: list[Notice] = []
+    with folder_to_fill(kept):
+        for i, recording in enumerate(recordings):
+            if progress is not None:
+                progress(i, len(recordings), recording.source)
+            filters, found = _filters(recording, parts[i].bias_sd, horizon, kept)
+            notices += found
+            source = _joined([part for j, part in enumerate(parts) if j != i])
+            total = len(source.stretches)
+            title = f"{vehicle}, real errors"
+            turns.append(
+                Validation.of(
+                    Experiment(scenario, source, filters, None, total, seed, title),
+                    jobs=jobs,
+                    folder=folder / f"{vehicle}-{i + 1}",
+                    earlier="resume",
+                )
+            )
+            notices += [replace(each, source=recording.source) for each in turns[-1].notices]
+    if progress is not None:
+        progress(len(recordings), len(recordings), "")
+    return Rotation(
+        sources=tuple(recording.source for recording in recordings),
+        stretches=tuple(len(part.stretches) for part in parts),
+        turns=tuple(turns),
+        notices=tuple(notices),
+    )
+
+
+def reproduce_rotation(
+    figure: str,
+    folder: Path,
+    *,
+    runs: int | None,
+    seed: int,
+    jobs: int,
+    recordings: Sequence[Recording],
+    resume: bool,
+    progress: Progress | None = None,
+) -> tuple[str, list[Path]]:
+    """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
+
+    Returns
+    -------
+    text, paths
+        What to print, and the files that were written.
+    """
+    for recording in recordings:
+        missing = [axis for axis in AXES if axis not in recording.names]
+        if missing:
+            raise InputError(
+                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
+                f"{', '.join(AXES)}"
+            )
+    rotation = rotate(
+        "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
+        jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,
+    )  # fmt: skip
+    text, paths = str(rotation), []
+    for suffix, content in (("txt", text), ("md", rotation.markdown())):
+        paths.append(folder / f"{figure}-rotated.{suffix}")
+        with written(paths[-1]) as stream:
+            stream.write(content + "\n")
+    return text, [*paths, *saved(rotation.plot(), folder / f"{figure}-rotated")]
+
+
+def _filters(
+    recording: Recording, start: dict[str, float], horizon: float, folder: Path
+) -> tuple[dict[str, SensorModels], list[Notice]]:
+    """What filters believe after one recording is calibrated: nothing else is known to them."""
+    stem = _digest(recording)
+
+    def kept(kind: type[_D], what: str, make: Callable[[], _D]) -> _D:
+        path = folder / f"{stem}-{what}.json"
+        if path.exists():
+            return kind.load(path)
+        made = make()
+        made.save(path)
+        return made
+
+    calibration = kept(Calibration, "calibration", lambda: calibrate(recording))
+    found = Calibrated.by_lines_too(calibration)
+    lines = found.line_models()
+    filters = {
+        _FIRST: aligned(SensorModels.of(calibration), start),
+        "lines": aligned(lines, start),
+        "lines x 10": aligned(times(lines, TEN), start),
+        "N+K read off": aligned(found.curve_models(horizon), start),
+    }
+    bound, reduce = filter_numbers.bound, filter_numbers.reduce
+    for name, numbers in {
+        "N+K bound": kept(SensorNumbers, f"bound-N+K-{horizon:g}",
+                          lambda: bound(calibration, "N+K", horizon)),
+        "N+K+GM bound": kept(SensorNumbers, f"bound-N+K+GM-{horizon:g}",
+                             lambda: bound(calibration, "N+K+GM", horizon)),
+        "N+K reduced": kept(SensorNumbers, f"reduce-N+K-{horizon:g}",
+                            lambda: reduce(calibration, "N+K", [horizon])),
+    }.items():  # fmt: skip
+        models = {axis: numbers[axis].model for axis in AXES}
+        filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
+    axes = found.lineless()
+    notices = []
+    if axes:
+        text = (
+            f"{', '.join(axes)}: the plot has neither a floor nor a line of slope +1/2: lines have "
+            "a Gauss-Markov process as high as its lowest point"
+        )
+        notices.append(
+            Notice("no-line", "note", "", text, {"axes": ", ".join(axes)}, source=recording.source)
+        )
+    return filters, notices
+
+
+def _digest(recording: Recording) -> str:
+    """Of what a calibration depends on: the samples, and the version of the program."""
+    from gmwm import __version__
+
+    digest = hashlib.sha256(f"{__version__} {recording.source} {recording.dt!r}".encode())
+    for axis in AXES:
+        digest.update(np.ascontiguousarray(recording[axis].values).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _shortened(part: Recorded, most: int | None) -> Recorded:
+    return part if most is None else replace(part, stretches=part.stretches[:most])
+
+
+def _joined(parts: Sequence[Recorded]) -> Recorded:
+    return replace(
+        parts[0],
+        stretches=tuple(each for part in parts for each in part.stretches),
+        source=", ".join(part.source for part in parts),
+    )
+
+
+def _short(value: float) -> str:
+    """Three digits, without an exponent."""
+    if not np.isfinite(value):
+        return "-"
+    digits = 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else 2
+    return f"{value:.{digits}f}"
+
+
+def _of(found: Interval) -> str:
+    return f"{_short(found.value)} ({_short(found.lower)} to {_short(found.upper)})"

@@ -1,0 +1,194 @@
+"""MAT, HDF5, Parquet, Feather and tables in memory."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+from scipy.io import savemat
+
+import gmwm
+from bags import START, at_rest
+from gmwm.readers.names import CANONICAL
+
+X = at_rest()
+SI = {"gyro": "rad/s", "accel": "m/s^2"}
+NAMES = [f"gyro_{a} [rad/s]" for a in "xyz"] + [f"accel_{a} [m/s^2]" for a in "xyz"]
+
+
+def exact(recording, samples=X):
+    return all(
+        np.array_equal(recording[name].values, column)
+        for name, column in zip(CANONICAL, samples.T, strict=True)
+    )
+
+
+def refusal(data, **arguments):
+    with pytest.raises(gmwm.InputError) as caught:
+        gmwm.read(data, **arguments)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def frame():
+    data = pd.DataFrame(X, columns=NAMES)
+    data.insert(0, "time", pd.to_datetime(START + 10_000_000 * np.arange(len(X))))
+    data["temperature [degC]"] = 30.0
+    return data
+
+
+# -- tables in memory -----------------------------------------------------------------------------
+
+
+def test_frames(frame):
+    table = pa.Table.from_pandas(frame)
+    for data in (frame, frame.set_index("time"), pl.from_pandas(frame), table):
+        found = gmwm.read(data)
+        assert exact(found)
+        assert found.rate == pytest.approx(100.0, rel=1e-12)
+        assert found["temperature"].mean == 30.0
+
+
+def test_calibrate_takes_a_frame(frame):
+    found = gmwm.calibrate(frame, gmwm.WhiteNoise(), screening=())
+    assert list(found) == list(CANONICAL)
+    assert found.source == "the pandas DataFrame"
+
+
+def test_columns_without_names():
+    assert exact(gmwm.read(pd.DataFrame(X), rate=100, units=SI))
+    assert exact(gmwm.read(pl.DataFrame(X), rate=100, units=SI, channels=dict(
+        zip(CANONICAL, range(6), strict=True))))  # fmt: skip
+
+
+def test_missing_values(frame):
+    holes = frame.copy()
+    holes.loc[5, NAMES[0]] = np.nan
+    assert np.isnan(gmwm.read(holes)["gyro_x"].values[5])
+    nulls = pl.from_pandas(frame).with_columns(
+        pl.when(pl.arange(0, len(X)) == 7).then(None).otherwise(pl.col(NAMES[5])).alias(NAMES[5])
+    )
+    assert np.flatnonzero(np.isnan(gmwm.read(nulls)["accel_z"].values)).tolist() == [7]
+
+
+def test_whole_numbers_keep_the_digits_of_stamps(frame):
+    data = frame.rename(columns={"time": "timestamp [ns]"})
+    data["timestamp [ns]"] = data["timestamp [ns]"].astype("int64") + np.arange(200) % 2
+    assert gmwm.read(data).jitter == pytest.approx(1e-7, rel=0.1)
+
+
+def test_frames_that_cannot_be_used(frame):
+    words = frame.assign(**{NAMES[0]: "word"})
+    assert "holds" in refusal(words)
+    assert "is not a usable number" in refusal(frame.assign(**{NAMES[0]: np.inf}))
+    assert "no column is known" in refusal(frame[["time"]])
+    assert "give the unit" in refusal(pd.DataFrame(X, columns=list(CANONICAL)), rate=100)
+    assert "holds no columns" in refusal(pd.DataFrame())
+    assert "single column" in refusal(frame["time"])
+    unsorted = frame.iloc[np.random.default_rng(1).permutation(200)]
+    assert "row" in refusal(unsorted)
+
+
+def test_unit_gate(frame):
+    scaled = frame.assign(**{name: frame[name] / 9.80665 for name in NAMES[3:]})
+    assert 'units={"accel": "g"}' in refusal(scaled)
+    assert gmwm.read(scaled, units={"accel": "g"})["accel_z"].mean == pytest.approx(9.8, abs=0.01)
+
+
+# -- Parquet and Feather --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("end", ["parquet", "feather"])
+def test_files_of_arrow(tmp_path, frame, end):
+    path = tmp_path / f"a.{end}"
+    getattr(frame, f"to_{end}")(path)
+    assert exact(gmwm.read(path))
+    whole = path.read_bytes()
+    for size in (0, 4, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        assert "is damaged or cut off" in refusal(path)
+
+
+# -- MAT and HDF5 ---------------------------------------------------------------------------------
+
+
+def test_mat(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"gyro": X[:, :3], "accel": X[:, 3:].T, "fs": 100.0, "note": "static"})
+    assert exact(gmwm.read(path, units=SI))
+    savemat(path, {"imu": {"gyro": X[:, :3], "accel": X[:, 3:], "dt": 0.01, "id": "a"}})
+    found = gmwm.read(path, units=SI)
+    assert exact(found)
+    assert found.rate == pytest.approx(100.0)
+    savemat(path, {"data": np.column_stack([np.arange(200) / 100, X])}, do_compression=True)
+    assert exact(gmwm.read(path, units=SI))
+    savemat(path, dict(zip(CANONICAL, X.T, strict=True)), oned_as="column")
+    assert exact(gmwm.read(path, units=SI, rate=100))
+
+
+def test_mat_that_cannot_be_used(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"note": "static"})
+    assert "holds no arrays of numbers" in refusal(path)
+    savemat(path, {"gyro": X[:, :3], "accel": X[:100, 3:], "fs": 100.0})
+    assert "give every column the same length" in refusal(path, units=SI)
+    savemat(path, {"gyro": X[:, :3], "a": {"fs": 100.0}, "b": {"fs": 200.0}})
+    assert "several rates" in refusal(path, units=SI)
+    whole = path.read_bytes()
+    for size in (0, 100, 130, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        assert "a.mat" in refusal(path)
+
+
+def test_hdf5(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        gyro = file.create_dataset("imu0/gyro", data=X[:, :3], compression="gzip", chunks=(50, 3))
+        gyro.attrs["units"] = "rad/s"
+        file["imu0/accel"] = X[:, 3:]
+        file["imu0/accel"].attrs["units"] = "m/s^2"
+        file["imu0/time"] = np.arange(200) / 100
+        file["imu0/time"].attrs["units"] = "s"
+        file["imu0/temperature"] = np.full(200, 30.0)
+        file["camera/images"] = np.zeros((3, 4, 5))
+        file["note"] = "static"
+    found = gmwm.read(path)
+    assert exact(found)
+    assert found.rate == pytest.approx(100.0)
+    assert any(channel.quantity == "temperature" for channel in found.values())
+    whole = path.read_bytes()
+    for size in (0, 10, 600, len(whole) - 500):
+        path.write_bytes(whole[:size])
+        assert "a.h5 is" in refusal(path)
+
+
+def test_mat_73_is_transposed(tmp_path):
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["imu/gyro"] = X[:, :3].T
+        file["imu/accel"] = X[:, 3:].T
+        file["fs"] = np.array([[100.0]])
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    assert exact(gmwm.read(path, units=SI))
+
+
+def test_compound_of_hdf5(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        rows = np.zeros(200, dtype=[(name, "f8") for name in NAMES])
+        for name, column in zip(NAMES, X.T, strict=True):
+            rows[name] = column
+        file["imu"] = rows
+    assert exact(gmwm.read(tmp_path / "a.h5", rate=100))
+
+
+def test_without_the_library(tmp_path, monkeypatch):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["gyro"] = X[:, :3]
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    assert refusal(path) == "a.h5 needs h5py, which is not installed: pip install 'gmwm[hdf5]'"

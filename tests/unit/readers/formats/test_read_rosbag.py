@@ -1,0 +1,307 @@
+"""Bags of ROS 1 and 2, written by rosbags."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+
+import numpy as np
+import pytest
+
+import gmwm
+from bags import (
+    IMU_TYPE,
+    ROS1,
+    ROS2,
+    START,
+    TEMPERATURE_TYPE,
+    TEXT_TYPE,
+    at_rest,
+    imu,
+    imu_topic,
+    stamps,
+    temperature,
+    text,
+    write1,
+    write2,
+)
+from gmwm.readers.names import CANONICAL
+
+X = at_rest()
+
+
+def exact(recording, samples=X):
+    return all(
+        np.array_equal(recording[name].values, column)
+        for name, column in zip(CANONICAL, samples.T, strict=True)
+    )
+
+
+def refusal(path, **arguments):
+    with pytest.raises(gmwm.InputError) as caught:
+        gmwm.read(path, **arguments)
+    message = str(caught.value)
+    assert "\n" not in message and ". " not in message
+    return message
+
+
+@pytest.fixture
+def bag1(tmp_path):
+    return write1(tmp_path / "static.bag", {"/imu": imu_topic(ROS1, X)})
+
+
+# -- every way a bag is stored --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("compression", [None, "BZ2", "LZ4"])
+def test_ros1(tmp_path, compression):
+    found = gmwm.read(write1(tmp_path / "a.bag", {"/imu": imu_topic(ROS1, X)}, compression))
+    assert exact(found)
+    assert found.rate == pytest.approx(100.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize(
+    ("storage", "compression"),
+    [("SQLITE3", c) for c in (None, "FILE", "MESSAGE")]
+    + [("MCAP", c) for c in (None, "FILE", "MESSAGE", "STORAGE")],
+)
+def test_ros2(tmp_path, storage, compression, big):
+    path = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)}, storage, compression, big)
+    found = gmwm.read(path)
+    assert exact(found)
+    assert found.source == "bag"
+
+
+@pytest.mark.parametrize(("storage", "suffix"), [("SQLITE3", ".db3"), ("MCAP", ".mcap")])
+def test_the_file_alone(tmp_path, storage, suffix):
+    folder = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)}, storage)
+    assert exact(gmwm.read(folder / f"bag{suffix}"))
+
+
+@pytest.mark.parametrize("big", [False, True])
+def test_alignment_behind_frames_of_every_length(tmp_path, big):
+    for length in range(10):
+        messages = imu_topic(ROS2, X[:70], frame="f" * length)
+        path = write2(tmp_path / f"two{length}", {"/imu": messages}, big=big)
+        assert exact(gmwm.read(path), X[:70])
+        messages = imu_topic(ROS1, X[:70], frame="f" * length)
+        assert exact(gmwm.read(write1(tmp_path / f"{length}.bag", {"/imu": messages})), X[:70])
+
+
+def test_frames_that_change_within_a_topic(tmp_path):
+    kind, messages = imu_topic(ROS1, X)
+    messages = [
+        (time, imu(ROS1, stamp, six, "f" * (i % 7)))
+        for i, ((time, _), stamp, six) in enumerate(zip(messages, stamps(200), X, strict=True))
+    ]
+    assert exact(gmwm.read(write1(tmp_path / "a.bag", {"/imu": (kind, messages)})))
+
+
+def test_more_than_a_block(tmp_path):
+    samples = np.tile(X, (25, 1))
+    path = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, samples)}, "MCAP", "STORAGE")
+    assert exact(gmwm.read(path), samples)
+
+
+# -- topics ---------------------------------------------------------------------------------------
+
+
+def test_other_topics_and_empty_ones_do_no_harm(tmp_path):
+    words = [(START + 10**7 * i, text(ROS2, "x" * i)) for i in range(50)]
+    topics = {"/imu": imu_topic(ROS2, X), "/chat": (TEXT_TYPE, words), "/imu2": (IMU_TYPE, [])}
+    assert exact(gmwm.read(write2(tmp_path / "bag", topics)))
+
+
+def test_several_imus_ask_for_a_topic(tmp_path):
+    other = at_rest(seed=4)
+    topics = {"/imu0": imu_topic(ROS1, X), "/imu1": imu_topic(ROS1, other)}
+    path = write1(tmp_path / "a.bag", topics)
+    message = refusal(path)
+    assert "/imu0 (200 messages), /imu1 (200 messages)" in message
+    assert 'topic="/imu0"' in message
+    assert exact(gmwm.read(path, topic="/imu1"), other)
+    assert exact(gmwm.read(path, topic="imu0"))
+    assert "no topic '/imu3'" in refusal(path, topic="/imu3")
+    assert "no pair" in refusal(path, topic=["/imu0", "/imu1"])
+
+
+@pytest.fixture(scope="module")
+def d435(tmp_path_factory):
+    """Gyros at 400 Hz, accelerometers at 250 Hz that begin 30 ms later, and a thermometer."""
+    gyro, accel = at_rest(1600, 1), at_rest(1000, 2)
+    gyro[:, 3:], accel[:, :3] = 0.0, 0.0
+    warm = [(START + 10**8 * i, temperature(ROS2, START + 10**8 * i, 30.0 + i)) for i in range(41)]
+    topics = {
+        "/gyro/sample": imu_topic(ROS2, gyro, 400.0),
+        "/accel/sample": imu_topic(ROS2, accel, 250.0, start=START + 30_000_000),
+        "/gyro/temperature": (TEMPERATURE_TYPE, warm),
+    }
+    return write2(tmp_path_factory.mktemp("d435") / "d435", topics, "MCAP"), gyro, accel
+
+
+def test_topics_of_two_rates(d435):
+    path, gyro, accel = d435
+    found = gmwm.read(path)
+    assert [1.0 / found[name].dt for name in ("gyro_x", "accel_x")] == pytest.approx([400.0, 250.0])
+    # Cut to what they share: from 30 ms to the end of the gyros at 4 s.
+    assert np.array_equal(found["gyro_y"].values, gyro[12:, 1])
+    assert np.array_equal(found["accel_z"].values, accel[: found["accel_z"].n, 5])
+    assert found["accel_z"].n * found["accel_z"].dt == pytest.approx(found.duration, abs=0.004)
+    grid = 0.03 + np.arange(found.n) / 400.0
+    assert found["temperature"].values == pytest.approx(30.0 + 10.0 * grid, abs=1e-6)
+    half = found.part(1.0, 3.0)
+    assert (half["gyro_x"].n, half["accel_x"].n) == (800, 500)
+    assert half["accel_x"].values[0] == found["accel_x"].values[250]
+    assert {"accel_x", "accel_y", "accel_z", "temperature"} == set(
+        gmwm.read(path, channels="accel")
+    )
+    only = gmwm.read(path, topic="/gyro/sample")
+    assert set(only) == {"gyro_x", "gyro_y", "gyro_z", "temperature"}
+
+
+def test_one_calibration_of_two_rates(d435):
+    path, gyro, accel = d435
+    found = gmwm.calibrate(gmwm.read(path), gmwm.WhiteNoise(), screening=())
+    for name, samples, rate in (("gyro_x", gyro[:, 0], 400.0), ("accel_x", accel[:, 3], 250.0)):
+        expected = np.std(samples) / np.sqrt(rate)
+        assert found[name].params["N"] == pytest.approx(expected, rel=0.1)
+        assert 1.0 / found[name].wv.dt == pytest.approx(rate)
+    text = gmwm.export(found, "ros-covariance")
+    assert "sample at 400 Hz" in text and "sample at 250 Hz" in text
+
+
+def test_health_of_two_rates(d435):
+    recording = gmwm.read(d435[0])
+    found = gmwm.health(recording)
+    assert list(found.channels) == [*CANONICAL]
+    lengths = {notice.values["rate"] for notice in found.of(code="length")}
+    assert sorted(lengths) == pytest.approx([250.0, 400.0])
+    assert len(found.of(code="topics-joined")) == 1
+    assert found.masked(recording).names == recording.names
+
+
+def test_topics_without_common_time(tmp_path):
+    gyro, accel = X.copy(), X.copy()
+    gyro[:, 3:], accel[:, :3] = 0.0, 0.0
+    topics = {
+        "/gyro": imu_topic(ROS1, gyro),
+        "/accel": imu_topic(ROS1, accel, start=START + 10**10),
+    }
+    assert "no time in common" in refusal(write1(tmp_path / "a.bag", topics))
+
+
+# -- stamps ---------------------------------------------------------------------------------------
+
+
+def test_time_of_recording(tmp_path):
+    kind, messages = imu_topic(ROS1, X)
+    late = [(START + i * 5_000_000, message) for i, (_, message) in enumerate(messages)]
+    path = write1(tmp_path / "a.bag", {"/imu": (kind, late)})
+    assert gmwm.read(path).rate == pytest.approx(100.0)
+    assert gmwm.read(path, clock="log").rate == pytest.approx(200.0)
+    assert "clock = 'bag'" in refusal(path, clock="bag")
+
+
+def test_headers_without_stamps(tmp_path):
+    kind, messages = imu_topic(ROS1, X)
+    bare = [(time, imu(ROS1, 0, six)) for (time, _), six in zip(messages, X, strict=True)]
+    path = write1(tmp_path / "a.bag", {"/imu": (kind, bare)})
+    assert 'clock="log"' in refusal(path)
+    assert exact(gmwm.read(path, clock="log"))
+
+
+# -- units ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("store", [ROS1, ROS2])
+def test_accelerometer_in_g(tmp_path, store):
+    samples = X / [1, 1, 1, 9.80665, 9.80665, 9.80665]
+    topics = {"/livox/imu": imu_topic(store, samples)}
+    path = (write1 if store is ROS1 else write2)(tmp_path / "a.bag", topics)
+    assert 'units={"accel": "g"}' in refusal(path)
+    found = gmwm.read(path, units={"accel": "g"})
+    assert found["accel_z"].mean == pytest.approx(9.8, abs=0.01)
+
+
+# -- what cannot be used --------------------------------------------------------------------------
+
+
+def test_truncated(bag1, tmp_path):
+    whole = bag1.read_bytes()
+    for size in (0, 5, 13, 1000, len(whole) // 2, len(whole) - 100):
+        bag1.write_bytes(whole[:size])
+        assert refusal(bag1).startswith("static.bag is ")
+    for storage, suffix in (("SQLITE3", ".db3"), ("MCAP", ".mcap")):
+        folder = write2(tmp_path / storage, {"/imu": imu_topic(ROS2, X)}, storage)
+        file = next(each for each in folder.iterdir() if each.suffix == suffix)
+        whole = file.read_bytes()
+        for size in (0, 10, 100, len(whole) // 2):
+            file.write_bytes(whole[:size])
+            assert " is " in refusal(folder)
+            assert file.name in refusal(file)
+
+
+def test_unknown_compression(bag1):
+    data = bag1.read_bytes()
+    bag1.write_bytes(data.replace(b"compression=none", b"compression=gzip"))
+    assert "'gzip' is not supported" in refusal(bag1)
+
+
+def test_folder_without_metadata(tmp_path):
+    folder = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
+    (folder / "metadata.yaml").unlink()
+    assert refusal(folder).startswith("bag has no metadata.yaml: name the .db3 or .mcap file")
+
+
+def test_missing_storage(tmp_path):
+    folder = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
+    (folder / "bag.db3").unlink()
+    assert "missing" in refusal(folder)
+
+
+def test_no_imu(tmp_path):
+    path = write1(tmp_path / "a.bag", {"/chat": (TEXT_TYPE, [(START, text(ROS1, "hello"))])})
+    assert "a.bag has no messages of sensor_msgs/Imu: it has /chat" in refusal(path)
+    assert "it is empty" in refusal(write1(tmp_path / "b.bag", {}))
+
+
+def test_stamps_out_of_order(tmp_path):
+    kind, messages = imu_topic(ROS1, X)
+    order = np.random.default_rng(1).permutation(200)
+    shuffled = [(messages[i][0], messages[j][1]) for i, j in enumerate(order)]
+    path = write1(tmp_path / "a.bag", {"/imu": (kind, shuffled)})
+    assert "of /imu (counted from 0)" in refusal(path)
+
+
+def test_infinite_sample(tmp_path):
+    samples = X.copy()
+    samples[7, 4] = np.inf
+    path = write1(tmp_path / "a.bag", {"/imu": imu_topic(ROS1, samples)})
+    assert "'accel_y [m/s^2]', message 7 of /imu" in refusal(path)
+
+
+def test_short_message(tmp_path):
+    folder = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
+    with sqlite3.connect(folder / "bag.db3") as base:
+        base.execute("UPDATE messages SET data = substr(data, 1, 200) WHERE id = 91")
+    base.close()
+    assert "message 90 of /imu (counted from 0) is cut off" in refusal(folder)
+
+
+def test_foreign_encoding(tmp_path):
+    folder = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
+    with sqlite3.connect(folder / "bag.db3") as base:
+        base.execute("UPDATE messages SET data = CAST(X'0007' || substr(data, 3) AS BLOB)")
+    base.close()
+    assert "is not plain CDR" in refusal(folder)
+
+
+def test_a_part_of_another_name(bag1, tmp_path):
+    shutil.copy(bag1, tmp_path / "recording.dat")
+    assert exact(gmwm.read(tmp_path / "recording.dat"))
+
+
+def test_topic_of_a_file_without(tmp_path):
+    np.save(tmp_path / "a.npy", X)
+    assert "has no topics" in refusal(tmp_path / "a.npy", topic="/imu")

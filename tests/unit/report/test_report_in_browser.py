@@ -1,0 +1,246 @@
+"""The report in a browser: nothing is fetched or cut off, and its controls do what they say.
+
+One start of the browser and one page for all of them.
+"""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+import gmwm
+from browser import Browser, needs_chromium
+from gmwm import GaussMarkov, WhiteNoise
+from gmwm.report import write_report
+
+pytestmark = needs_chromium
+
+
+@pytest.fixture(scope="module")
+def shown(calibration, recording):
+    """With a tie, and samples left out."""
+    rival = WhiteNoise(4e-4) + GaussMarkov(3e-4, 30.0)
+    return replace(calibration, rivals={"gyro_x": (rival,)}, left_out={"gyro_x": ((3000, 3100),)})
+
+
+@pytest.fixture(scope="module")
+def path(shown, recording, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "sheet.yaml").write_text("gyro: {N: 1.2 deg/sqrt(h), B: 40 deg/h}\n")
+    return write_report(shown, folder / "report.html", recording, datasheet=folder / "sheet.yaml")
+
+
+@pytest.fixture(scope="module")
+def tab(path, tmp_path_factory):
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    try:
+        browser.size(1300)
+        # What got in all the same would not run.
+        text = path.read_text(encoding="utf-8")
+        foreign = '<script>document.title = "foreign"</script><img src="http://127.0.0.1/x.png">'
+        path.write_text(text.replace("<header>", f"{foreign}<header>", 1), encoding="utf-8")
+        browser.open(path)
+        yield browser
+    finally:
+        browser.close()
+
+
+def trace(tab, name, place="plot-1"):
+    """Heights of a curve as drawn, ``None`` if it is hidden."""
+    return tab.run(
+        f"(function () {{ var t = document.getElementById('{place}')._fullData.find("
+        f"function (t) {{ return t.name === {name!r}; }});"
+        " return t.visible === true ? Array.from(t.y) : null; }())"
+    )
+
+
+def test_every_figure_is_drawn_and_nothing_foreign_runs(tab, path):
+    assert tab.run("document.title") != "foreign"
+    places = tab.run(
+        "Array.from(document.querySelectorAll('.plot')).map(function (p) {"
+        " return [p.id, !!p.querySelector('svg.main-svg')]; })"
+    )
+    assert len(places) == 3 + 1 + 4 * 3
+    assert all(drawn for _, drawn in places)
+    assert [each for each in tab.requests() if not each.startswith(("file:", "data:", "blob:"))
+            ] == []  # fmt: skip
+    complaints = [each["entry"]["text"] for each in tab.errors() if "entry" in each]
+    assert len(complaints) == len(tab.errors()) == 2
+    assert all("Content Security Policy" in text for text in complaints)
+
+
+@pytest.mark.parametrize("width", [1300, 420])
+def test_nothing_is_cut_off(tab, width):
+    try:
+        tab.size(width)
+        tab.run("new Promise(function (done) { setTimeout(done, 400); })")  # figures follow
+        assert tab.run("document.documentElement.scrollWidth") <= width
+        plots = tab.run("Array.from(document.querySelectorAll('.plot svg.main-svg')).map("
+                        "function (p) { return p.getBoundingClientRect().right; })")  # fmt: skip
+        assert max(plots) <= width
+    finally:
+        tab.size(1300)
+
+
+def test_a_box_hides_its_curve_and_shows_it_again(tab):
+    box = "document.querySelector('[data-legend=plot-1] input[data-trace=\"1\"]').click()"
+    assert trace(tab, "white noise") is not None
+    tab.run(box)
+    assert trace(tab, "white noise") is None
+    tab.run(box)
+    assert trace(tab, "white noise") is not None
+
+
+def test_units_change_the_curves_and_the_axis(tab, calibration):
+    def choose(value):
+        tab.run(
+            f"(function () {{ var s = document.querySelector('[data-units]'); s.value = '{value}';"
+            " s.dispatchEvent(new Event('change')); }())"
+        )
+
+    def title():
+        return tab.run("document.getElementById('plot-1').layout.yaxis.title.text")
+
+    name = "data, 95 % interval"
+    field = np.array(trace(tab, name))
+    assert title() == "Allan deviation [deg/h]"
+    try:
+        choose("si")
+        assert title() == "Allan deviation [rad/s]"
+        assert trace(tab, name) == pytest.approx(calibration["gyro_x"].wv.allan_deviation, rel=1e-4)
+        assert "rad/s/sqrt(Hz)" in tab.run("document.querySelector('tbody tr').innerText")
+    finally:
+        choose("field")
+    assert trace(tab, name) == pytest.approx(field)
+
+
+def test_sliders_move_the_curve_of_the_filter(tab, calibration):
+    def slide(letter, value):
+        tab.run(
+            "(function () { var s = document.querySelector("
+            f"'[data-whatif=plot-1][data-letter={letter}]'); s.value = {value};"
+            " s.dispatchEvent(new Event('input')); }())"
+        )
+
+    numbers = gmwm.bound(calibration["gyro_x"], horizon=60.0)
+    before = np.array(trace(tab, "filter: N and K"))
+    drawn = "document.getElementById('plot-1')._fullData.find"
+    tau = np.array(tab.run(drawn + "(function (t) { return t.name === 'filter: N and K'; }).x"))
+    per_si = np.degrees(1.0) * 3600.0
+
+    def believed(N, K):
+        return per_si * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
+
+    assert before == pytest.approx(believed(numbers.N, numbers.K), rel=1e-4)
+    slide("N", 0.3)
+    slide("K", -1)
+    moved = trace(tab, "filter: N and K")
+    assert moved == pytest.approx(believed(10**0.3 * numbers.N, 0.1 * numbers.K), rel=1e-4)
+    tab.run("document.querySelector('[data-reset=plot-1]').click()")
+    assert trace(tab, "filter: N and K") == pytest.approx(before)
+
+
+def copied(tab, title):
+    """What a button copies, by the selection that it makes."""
+    tab.run(
+        "Array.from(document.querySelectorAll('div[data-for=\"60\"] button')).find("
+        f"function (b) {{ return b.textContent.startsWith({title!r}); }}).click()"
+    )
+    return tab.run("getSelection().toString()")
+
+
+def test_copy_buttons_give_yaml_and_python(tab, calibration):
+    numbers = {name: gmwm.bound(fit, horizon=60.0) for name, fit in calibration.items()}
+    content = yaml.safe_load(copied(tab, "YAML, Kalibr"))
+    gyro = gmwm.bound(calibration["gyro_x"], horizon=60.0)
+    assert content["gyroscope_noise_density"] == pytest.approx(gyro.N, rel=1e-5)
+    assert content["gyroscope_random_walk"] == pytest.approx(gyro.K, rel=1e-5)
+    assert content["update_rate"] == 100
+    spaces = {}
+    exec(compile(copied(tab, "Python, axis"), "copied", "exec"), spaces)
+    by_axis = yaml.safe_load(copied(tab, "YAML, axis"))
+    assert by_axis == spaces["imu_noise"]
+    for name, each in numbers.items():
+        assert by_axis[name]["N"] == pytest.approx(each.N, rel=1e-5)
+    assert by_axis["accel_x"]["K"] > 0.0  # the upper bound of a walk that was not found
+    compile(copied(tab, "Python, GTSAM"), "copied", "exec")
+    assert "gyroparams(" in copied(tab, "MATLAB")
+
+
+def test_the_horizon_swaps_the_numbers(tab):
+    def choose(seconds):
+        tab.run(
+            "(function () { var s = document.querySelector('[data-horizon]');"
+            f" s.value = '{seconds}'; s.dispatchEvent(new Event('change')); }}())"
+        )
+        return tab.run("Array.from(document.querySelectorAll('div[data-for]')).filter("
+                       "function (d) { return !d.hidden; }).map("
+                       "function (d) { return d.dataset.for; })")  # fmt: skip
+
+    assert choose(10) == ["10"]
+    assert choose(60) == ["60"]
+
+
+def test_csv_holds_every_curve(tab, shown):
+    tab.run("window.kept = []; var old = URL.createObjectURL;"
+            "URL.createObjectURL = function (b) { kept.push(b); return old.call(URL, b); };"
+            "document.querySelector('[data-csv=plot-1]').click()")  # fmt: skip
+    lines = tab.run("kept[0].text()").splitlines()
+    assert lines[:2] == [
+        "# x: averaging time [s]; y: Allan deviation [deg/h]", "curve,x,y,lower,upper",
+    ]  # fmt: skip
+    names = {line.split('"')[1] for line in lines[2:]}
+    assert {"model", "white noise", "random walk", "data sheet", "models that tie",
+            "data, 95 % interval", "filter: N and K"} <= names  # fmt: skip
+    data = [line.split(",")[2:] for line in lines if line.startswith('"data')]
+    low = [float(row[2]) for row in data if row[2]]
+    assert len(low) == shown["gyro_x"].wv.tau.size
+
+
+CONTRAST = """
+(function () {
+  function light(c) {
+    var p = c.match(/[\\d.]+/g).slice(0, 3).map(function (v) {
+      v /= 255; return v <= 0.03928 ? v / 12.92 : Math.pow((v + 0.055) / 1.055, 2.4); });
+    return 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
+  }
+  function behind(node) {
+    for (; node; node = node.parentElement) {
+      var c = getComputedStyle(node).backgroundColor;
+      if (c !== "rgba(0, 0, 0, 0)" && c !== "transparent") { return c; }
+    }
+    return "rgb(255, 255, 255)";
+  }
+  var worst = [99, ""];
+  document.querySelectorAll("body *").forEach(function (node) {
+    var own = Array.from(node.childNodes).some(function (n) {
+      return n.nodeType === 3 && n.textContent.trim(); });
+    if (!own || !node.getClientRects().length) { return; }
+    if (/SCRIPT|STYLE|OPTION/i.test(node.tagName)) { return; }
+    var style = getComputedStyle(node);
+    var a = light(node instanceof SVGElement ? style.fill : style.color), b = light(behind(node));
+    var ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < worst[0]) { worst = [ratio, node.tagName + " " + node.textContent.slice(0, 40)]; }
+  });
+  return worst;
+}())
+"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read(tab, scheme):
+    try:
+        tab.scheme(scheme)
+        ratio, where = tab.run(CONTRAST)
+        assert ratio >= 4.5, where
+    finally:
+        tab.scheme("light")
+
+
+def test_paper(tab):
+    """Three axes take six pages at most; the small table of six takes eight on a real sensor."""
+    pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf()))
+    assert 2 <= pages <= 6
+    assert trace(tab, "model") is not None
