@@ -19,6 +19,7 @@ from gmwm.ins.geometry.earth import ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.trajectory.missions import helicopter_mapping
+from gmwm.ins.trajectory.trajectory import Trajectory
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -184,6 +185,26 @@ def check(data, apart_by=0.01):
 def test_the_same_solution_with_an_outage_in_a_short_flight():
     ours = check(flight(14.0, 1, velocity=True, outages=[Outage(5.0, 7.0)], start=80.0))
     assert ours.sd[11, 1] > 1.2 * ours.sd[5, 1]
+
+
+def test_the_same_solution_with_fixes_between_samples():
+    """Both propagate to the fix; pyins from the epoch before, and with the row of that epoch."""
+    parts = 4
+    place = (np.radians(46.5), np.radians(6.6), -100.0)
+    fine = helicopter_mapping(duration=94.0, dt=DT / parts, start=place).segment(80.0, 94.0)
+    truth = Trajectory(DT, *(each[::parts] for each in (fine.lla, fine.velocity, fine.rpy)))
+    rng = np.random.default_rng(4)
+    errors = models().simulate(truth.n, DT, rng).total
+    aiding = gnss(fine, 1.0 + DT / parts, position_sd=POSITION_SD, velocity_sd=VELOCITY_SD)
+    imu = emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
+    data = Flight(truth, imu, aiding.noisy(rng))
+    assert np.any(data.aiding.events(DT, truth.n).offset)
+    apart, wider, ours = compared(data)
+    # Within a sample of a fix, one filter has used it and the other has not.
+    near = np.abs(ours.time[: apart.size, None] - data.aiding.fixes[0].time).min(axis=1) < DT
+    assert np.count_nonzero(~near[1:]) > 0
+    assert wider[~near].max() < 0.02
+    assert apart[~near].max() < 0.1
 
 
 @pytest.mark.slow

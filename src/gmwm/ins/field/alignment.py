@@ -5,6 +5,7 @@ Levelling and gyrocompassing after Groves (2013), secs. 5.6.2 and 5.6.3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,7 +62,7 @@ def align(
     models: SensorModels,
     heading: float | None = None,
     heading_sd: float = tuning.HEADING_SD,
-    attitude: FloatArray | None = None,
+    attitude: Sequence[float] | None = None,
     attitude_sd: float = tuning.ATTITUDE_SD,
 ) -> Alignment:
     """Find an initial state in the data.
@@ -78,7 +79,7 @@ def align(
         GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros show it.
     heading_sd : float, optional
         How well a given heading is known, rad.
-    attitude : (3,) ndarray, optional
+    attitude : three floats, optional
         Roll, pitch and yaw at the first fix, rad. By default the vehicle is levelled while it is
         steady; if it never is, the attitude follows from how its velocity changes.
     attitude_sd : float, optional
@@ -454,7 +455,7 @@ def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
     level, usual = mean[rest].mean(axis=0), np.sqrt(np.mean(scatter[rest] ** 2, axis=0))
     slow = np.abs(mean[:, :3] - level[:3]) <= tuning.STEADY[0]
     still = np.all(scatter <= quieter * usual, axis=1) & np.all(slow, axis=1)
-    time = (np.flatnonzero(still) + 1) * window * imu.dt
+    time = np.asarray((np.flatnonzero(still) + 1) * window * imu.dt, dtype=float)
     zeros = np.zeros((time.size, 3))
     return Fixes("standstill", time, zeros, zeros + sd)
 

@@ -174,8 +174,8 @@ class _Task:
         scenario, source, aiding = self.scenario, self.source, self.scenario.aiding
         truth = scenario.trajectory
         fixes = [(each.kind, each.time, each.value, each.sd) for each in aiding.fixes]
-        arms = aiding.lever_arm, aiding.coloured_sd, aiding.coloured_tau
-        arms += aiding.barometer_sd, aiding.barometer_tau, aiding.gate or 0.0
+        arms = (aiding.lever_arm, aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd,
+                aiding.barometer_tau, aiding.gate)  # fmt: skip
         drawn = _exactly(source.models) if isinstance(source, Simulated) else source
         return {
             "seed": self.seed,
