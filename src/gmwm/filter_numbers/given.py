@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,9 +105,23 @@ _ALONE = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
 _EACH = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 
 
+def _lines(content: object) -> Iterator[str]:
+    """A line for each key of JSON whose value is a number or three."""
+    if not isinstance(content, dict):
+        return
+    for key, value in content.items():
+        several = value if isinstance(value, list) else [value]
+        if len(several) in (1, 3) and all(map(checks.is_number, several)):
+            yield f"{key}: {several if len(several) == 3 else several[0]}"
+        yield from _lines(value)
+
+
 def _entries(text: str) -> dict[str, FloatArray]:
     """Values of keys: one number, or three."""
     values: dict[str, FloatArray] = {}
+    # A list of JSON may have a line for each number.
+    with contextlib.suppress(ValueError, RecursionError):
+        text = "\n".join(_lines(json.loads(text)))
     for name, rest in _ENTRY.findall(_COMMENT.sub("", text)):
         alone = _ALONE.fullmatch(rest)
         found = [alone[1]] if alone else _EACH.findall(rest)
