@@ -16,6 +16,7 @@ import gmwm
 from gmwm import BiasInstability, GaussMarkov, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.calibration import random_walk
 from gmwm.filter_numbers import Chain
+from gmwm.filter_numbers.spectra import Estimated, Problem, Target, standard_errors
 from gmwm.ins import (
     Recorded,
     SensorModels,
@@ -54,24 +55,44 @@ HORIZONS = (1.0, 10.0, 60.0, 600.0)
 OUTAGES = (10.0, 30.0, 60.0)
 
 
+SENSORS = ("1 GM", "demo gyro", "3 GM", "3 GM, other")
+
+
+def _least_error(truth: Model, hours: int) -> float:
+    """Relative standard error of K that any estimate from a record has (Cramer-Rao bound)."""
+    found = gmwm.cramer_rao(truth, hours * 36_000, 0.1)
+    problem = Problem((Target.of(truth, 0.1, 60.0),), 60.0)
+    safe = gmwm.bound(truth, dt=0.1)
+    known = Estimated(truth, found.keys, found.covariance)
+    return standard_errors(problem, safe.model, [known])["K"] / safe.K
+
+
 def length() -> None:
     """K from records of several lengths, by the old rule, bound and reduce."""
-    print("K [rad/s^2/sqrt(Hz)] by length of record; random walk: fitted, or its 95 % bound")
-    print(f"{'hours':>6} {'seed':>5} {'random walk':>12} {'bound 60 s':>11} {'reduce':>11}   NEES "
-          f"with reduce after {', '.join(f'{t:g}' for t in OUTAGES)} s")  # fmt: skip
+    print("K [u/s/sqrt(Hz)] for 60 s by length of record, and its relative standard error: least")
+    print("(Cramer-Rao), and as the result has it; random walk: fitted, or its 95 % bound")
+    heads = ("random walk", "bound", "of truth", "least se", "its se", "reduce", "of truth")
+    print(f"{'truth':<12}{'hours':>6}" + "".join(f"{head:>12}" for head in heads)
+          + f"   NEES of reduce after {', '.join(f'{t:g}' for t in OUTAGES)} s")  # fmt: skip
     chain = Chain.usual("gyro")
-    for hours in (1, 4, 16, 64):
-        for seed in (1, 2, 3):
-            series = ONE.simulate(hours * 36_000, 0.1, seed)
-            fit = gmwm.fit(WhiteNoise() + GaussMarkov(), series, 0.1)
+    for name in SENSORS:
+        truth = TRUTHS[name]
+        right = gmwm.bound(truth, dt=0.1).K
+        small_right = gmwm.reduce({"gyro_x": truth}, dt=0.1)["gyro_x"].K
+        for hours in (1, 4, 16, 64):
+            series = truth.simulate(hours * 36_000, 0.1, hours)
+            fit = gmwm.fit(truth.opened(), series, 0.1)
+            safe = gmwm.bound(fit)
             small = gmwm.reduce({"gyro_x": fit.model}, dt=0.1)["gyro_x"]
-            errors = chain.errors(ONE, small.model, 0.1, OUTAGES, believed_sd=small.initial_sd)
+            errors = chain.errors(truth, small.model, 0.1, OUTAGES, believed_sd=small.initial_sd)
             nees = " ".join(f"{value:6.3f}" for value in errors.nees())
-            print(f"{hours:>6} {seed:>5} {random_walk(fit).value:>12.2e} "
-                  f"{gmwm.bound(fit).K:>11.2e} {small.K:>11.2e}   {nees}", flush=True)  # fmt: skip
-    right = gmwm.reduce({"gyro_x": ONE})["gyro_x"]
-    print(f"{'truth':>6} {'':>5} {'none':>12} {gmwm.bound(ONE).K:>11.2e} {right.K:>11.2e}   "
-          + " ".join(f"{right.nees[t]:6.3f}" for t in OUTAGES))  # fmt: skip
+            cells = (
+                f"{random_walk(fit).value:.2e}", f"{safe.K:.2e}", f"{safe.K / right:.3f}",
+                f"{_least_error(truth, hours):.3f}", f"{safe.stderr.get('K', np.nan) / safe.K:.3f}",
+                f"{small.K:.2e}", f"{small.K / small_right:.3f}",
+            )  # fmt: skip
+            print(f"{name:<12}{hours:>6}" + "".join(f"{cell:>12}" for cell in cells)
+                  + "   " + nees, flush=True)  # fmt: skip
 
 
 def tightness() -> None:

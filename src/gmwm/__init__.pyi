@@ -6,7 +6,7 @@ from .calibration import (
     load as load,
     without_departures as without_departures,
 )
-from .diagnosis import Health as Health, health as health
+from .diagnosis import Health as Health, Still as Still, find_still as find_still, health as health
 from .errors import (
     FitWarning as FitWarning,
     InputError as InputError,

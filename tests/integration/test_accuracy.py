@@ -40,7 +40,7 @@ REACHED = [case for case in CASES if case not in (("table3", "beta"), ("table3",
 def tables(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     return {
-        name: run_study(study, folder, runs=runs, methods=methods, jobs=2)
+        name: run_study(study, folder, runs=runs, methods=methods)
         for name, (study, methods, runs) in RUN.items()
     }
 

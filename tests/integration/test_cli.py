@@ -304,9 +304,9 @@ def with_line(number, text):
     return lines
 
 
-def with_time(gap):
+def with_time(gap, slower=1.0):
     t = np.arange(ROWS) * 0.01
-    t[120:] += gap
+    t[120:] += gap + (slower - 1.0) * (t[120:] - t[120])
     lines = good_lines()
     return [f"time_s,{lines[0]}", *(f"{a:.4f},{b}" for a, b in zip(t, lines[1:], strict=True))]
 
@@ -349,17 +349,16 @@ BAD = {
         ("--rate", "200", *SI),
         ("stamps give 100 Hz, not the 200 Hz stated", "leave out the rate"),
     ),
-    "gap longer than the recording": (
-        with_time(3.0),
+    "a clock that stops": (
+        with_time(0.0, 0.0),
         SI,
-        ("f.csv, column 'time_s', line 122", "300 samples are missing", "more than half"),
+        ("f.csv, column 'time_s', line 123", "repeats the one before", "--rate 100 --time none"),
     ),
-    "short step in the time stamps": (
-        with_time(-0.006),
+    "a clock that runs backwards": (
+        with_time(0.0, -1.0),
         SI,
-        ("f.csv, column 'time_s', line 122", "a step of 0.004 where 0.01 is usual"),
+        ("column 'time_s', line 123", "goes back", "and 78 more", "--rate 100 --time none"),
     ),
-    "time that goes back": (with_time(-0.5), SI, ("column 'time_s', line 122", "goes back")),
     "all channels constant": (
         ["gyro_x,accel_x", *["0.5,9.8"] * ROWS],
         ALL,
@@ -624,8 +623,26 @@ def turned_file(tmp_path_factory):
     return write_csv(tmp_path_factory.mktemp("data") / "turned.csv", columns)
 
 
-def test_exit_status_where_no_axis_is_valid(run, turned_file):
+def test_stretches_at_rest_of_a_log_that_moves(run, turned_file):
     code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, "--model", "N")
+    assert (code, told) == (0, "")
+    shown = " ".join(printed.split())
+    assert "at rest from 0 to 29.75, 60.25 to 120 s |###" in shown
+    assert "no averaging time is longer than the longest of them" in shown
+    assert "8,950 samples a channel" in shown
+    rows = np.loadtxt(turned_file, delimiter=",", skiprows=1)
+    rows += 30.0 * np.sin(np.arange(len(rows)) / 70.0)[:, None] * [1, 1, 1, 0, 0, 0]
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    write_csv("moving.csv", dict(zip(names, rows.T, strict=True)))
+    code, _, told = run("calibrate", "moving.csv", *RATE, *FIELD, "--model", "N")
+    assert code == 2
+    assert told.startswith("gmwm: moving.csv is not static, and its longest stretch at rest has ")
+    assert told.endswith("where 10 s are needed: give e.g. --all to take everything as static\n")
+
+
+def test_exit_status_where_no_axis_is_valid(run, turned_file):
+    chosen = ("--model", "N", "--all", "--channels", "gyro_z")
+    code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, *chosen)
     assert code == 1
     assert told == "gmwm: no channel has a valid model, for the reasons in the report\n"
     shown = " ".join(printed.split())

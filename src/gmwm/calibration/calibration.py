@@ -22,6 +22,7 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
+from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
 from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
@@ -237,6 +238,7 @@ def calibrate(
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
     screening: Collection[str] = SCREENING,
+    still: bool = True,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -256,15 +258,18 @@ def calibrate(
     Parameters
     ----------
     recording : Recording or sequence of Recording
-        Several of one sensor have one model, fitted jointly; see `gmwm.JointFit`. A DataFrame or
-        an Arrow table is read with `gmwm.read`, which needs a column of time stamps and units in
-        the names of the others.
+        At rest, or with stretches at rest. Several of one sensor have one model, fitted jointly;
+        see `gmwm.JointFit`. A DataFrame or an Arrow table is read with `gmwm.read`, which needs a
+        column of time stamps and units in the names of the others.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel name; by default the model of each channel is
         selected.
     screening : collection of str, optional
         Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
         unexamined.
+    still : bool, optional
+        Whether only the stretches at rest of a log that is not static are used, as several
+        recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter do in turns; -1 is one per core.
@@ -278,11 +283,15 @@ def calibrate(
     Raises
     ------
     InputError
-        If no channel can be calibrated, or a mapping has no model for one.
+        If no channel can be calibrated, a mapping has no model for one, or a log that is not static
+        has no stretch of ten seconds at rest.
     """
     given = _recordings(recording)
     _check_together(given)
-    treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    parts = [part for each in given for part in each.by_rate()]
+    if still and screening:
+        parts = [piece for part in parts for piece in stretches_at_rest(part)]
+    treated = [screened(part, screening) for part in parts]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -332,6 +341,8 @@ def calibrate(
     done = {name: item for name, item in found.items() if not isinstance(item, InputError)}
     issues = [issue for each in treated for issue in each.notices]
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
+    if not still:
+        spoiling.pop("not-static", None)  # as the caller says
     fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
@@ -414,7 +425,9 @@ def _usable(
     dead: dict[str, Notice] = {}
     for each in treated:
         for channel in each.recording.inertial:
-            why = _reason_to_skip(channel)
+            straight = (n for n in each.notices if n.code == "interpolated")
+            why = next((n for n in straight if n.where == channel.name), None)
+            why = why or _reason_to_skip(channel)
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:

@@ -90,3 +90,6 @@ LARGEST_LOG_EVIDENCE = 700.0
 
 FREQUENCIES = 64
 """At which the floor of the spectrum is looked for, from one period of the record to two blocks."""
+
+MOST_STRETCHES = 20
+"""Stretches at rest of one log that are fitted jointly, the longest ones."""

@@ -72,6 +72,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="Leave events, lines, resonances, outliers or all as they are: samples of "
                    "shocks are masked otherwise, lines and resonances are terms that a model may "
                    "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
+@click.option("--all", "everything", is_flag=True,
+              help="Take everything as static; by default only the stretches at rest of a log "
+                   "that moves are used.")  # fmt: skip
 @click.option(
     "--export",
     "target",
@@ -88,6 +91,7 @@ def calibrate(
     output: Path,
     models: tuple[str, ...],
     left: tuple[str, ...],
+    everything: bool,
     target: str | None,
     datasheet: Path | None,
     jobs: int,
@@ -95,7 +99,7 @@ def calibrate(
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Calibrate every channel of a static recording, or of several of one sensor.
+    """Calibrate every channel of a recording at rest, or of several of one sensor.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY, NPZ,
     MAT, HDF5, Parquet or Feather; a bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), or a log of
@@ -103,7 +107,7 @@ def calibrate(
     missing samples.
     For each channel an error model is selected and estimated; the table shows it in the units of
     the field, the files hold everything in SI units. Several recordings of one sensor have one
-    model, with a test whether they agree.
+    model, with a test whether they agree; so have the stretches at rest of a log that moves.
 
     Exit status: 0 if a channel has a valid model, 1 if none has (the files are written all the
     same), 2 if the input cannot be used.
@@ -135,7 +139,9 @@ def calibrate(
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar)
+            result = run(
+                recordings, model, screening=chosen, still=not everything, jobs=jobs, progress=bar
+            )
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +23,7 @@ _NEEDED = (
 
 _READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
             "start": "--imu-start"}  # fmt: skip
-_OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
+_OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 
 
 @click.command()
@@ -49,7 +50,11 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
                                             "calibrate; axes forward, right, down.")  # fmt: skip
 @click.option("--gnss", "gnss_fixes", metavar="FILE",
               help="Fixes: time, latitude, longitude, height, on the IMU's clock.")  # fmt: skip
-@click.option("--sensors", metavar="FILE", help="calibration.json of the IMU.")
+@click.option("--sensors", multiple=True, metavar="[NAME=]FILE",
+              help="calibration.json of the IMU; several with names are compared.")  # fmt: skip
+@click.option("--outages", "outage_length", metavar="auto|SECONDS",
+              help="Length of the outages that are cut into the log to compare sensors.  "
+                   "[default: auto]")  # fmt: skip
 @click.option("--lever-arm", metavar="X,Y,Z",
               help="m, from the IMU to the antenna: forward, right, down.")  # fmt: skip
 @click.option("--heading", type=float,
@@ -78,6 +83,7 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors"})
 )
 @click.option("--accel-bias", metavar="VALUE",
               help="The same of an accelerometer.  [default: 0.1 m/s^2]")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, of your own data.")
 @reading_options
 def navigate(
     file: Path | None,
@@ -94,7 +100,8 @@ def navigate(
     cluster: str | None,
     imu: str | None,
     gnss_fixes: str | None,
-    sensors: str | None,
+    sensors: tuple[str, ...],
+    outage_length: str | None,
     lever_arm: str | None,
     heading: float | None,
     attitude: str | None,
@@ -104,6 +111,7 @@ def navigate(
     gate: float | None,
     gyro_bias: str | None,
     accel_bias: str | None,
+    as_json: bool,
     rate: float | None,
     gyro_unit: str | None,
     accel_unit: str | None,
@@ -119,7 +127,9 @@ def navigate(
     before it; see docs/navigation.md.
 
     With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
-    written; whether the innovations agree with the sensor models is printed.
+    written; whether the innovations agree with the sensor models is printed, and which fault of
+    the log explains them if they do not. Several --sensors are compared: outages are cut into the
+    log, and the errors after them, from a smoother of all fixes, show which model to take.
 
     \b
     Examples:
@@ -127,11 +137,15 @@ def navigate(
       gmwm navigate --trajectory car --truth cal.json --filter GMWM=cal.json \\
         --filter AV=av.json --outage 600:60 --outage 900:40
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors out/calibration.json
+      gmwm navigate --imu imu.csv --gnss fixes.csv --sensors A=a.json \\
+        --sensors B=b.json --outages auto
     """
     from gmwm.ins.spec import read_document
 
     options = _given(trajectory, duration, truth, filters, outages, runs, seed)
     data = _given_data(imu, gnss_fixes, sensors, lever_arm, heading, gyro_bias, accel_bias)
+    if outage_length is not None:
+        data["outages"] = _length(outage_length)
     data |= _given_aiding(attitude, barometer, zero_velocity, gate)
     if file is None and not options and not data:
         raise InputError(_NEEDED)
@@ -144,6 +158,11 @@ def navigate(
     if imu_start is not None:
         reading["start"] = imu_start
     if _OF_DATA.isdisjoint(content):
+        if as_json or outage_length is not None:
+            raise InputError(
+                f"{'--json' if as_json else '--outages'} is about your own data: give --imu, "
+                "--gnss and --sensors"
+            )
         # The rate is also that of a ready-made trajectory.
         if "rate" in reading:
             content["rate"] = reading.pop("rate")
@@ -155,7 +174,12 @@ def navigate(
         _validate(content, folder, output, jobs or os.cpu_count() or 1, resume, cluster, place)
     else:
         content["imu"] = _with_reading(content.get("imu"), reading)
-        _filter(content, folder, output, place)
+        if "compare" in content:
+            _compare(content, folder, output, place, as_json)
+        elif "outages" in content:
+            raise InputError("--outages needs sensors to compare: give --sensors A=a.json twice")
+        else:
+            _filter(content, folder, output, place, as_json)
 
 
 @contextmanager
@@ -201,7 +225,9 @@ def _validate(
     click.echo(f"\nwrote {table}\nwrote {report}")
 
 
-def _filter(content: dict[str, Any], base: Path, output: Path, place: Path | None) -> None:
+def _filter(
+    content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
+) -> None:
     """Filter real data."""
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.ins.field import Measured, Navigated
@@ -214,24 +240,50 @@ def _filter(content: dict[str, Any], base: Path, output: Path, place: Path | Non
         navigated = Navigated.of(measured)
         navigated.write_solution(paths[0])
         write_navigated_report(navigated, paths[1])
+    if as_json:
+        click.echo(json.dumps(navigated.to_dict(), allow_nan=False))
+        return
     click.echo(navigated)
     click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
+
+
+def _compare(
+    content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
+) -> None:
+    """Compare sensor models on real data."""
+    from gmwm._core.files import folder_to_fill, replaceable
+    from gmwm.ins.field import Comparison
+    from gmwm.report import write_comparison_report
+
+    with _named_in_messages(place):
+        comparison = Comparison.of(content, base)
+    with folder_to_fill(output) as folder:
+        page = write_comparison_report(comparison, replaceable(folder / "comparison.html"))
+    if as_json:
+        click.echo(json.dumps(comparison.to_dict(), allow_nan=False))
+        return
+    click.echo(comparison)
+    click.echo(f"\nwrote {page}")
 
 
 def _given_data(
     imu: str | None,
     gnss_fixes: str | None,
-    sensors: str | None,
+    sensors: tuple[str, ...],
     lever_arm: str | None,
     heading: float | None,
     gyro_bias: str | None,
     accel_bias: str | None,
 ) -> dict[str, Any]:
     """The options of real data as the file would have them."""
-    files = {"imu": imu, "gnss_fixes": gnss_fixes, "sensors": sensors}
+    files = {"imu": imu, "gnss_fixes": gnss_fixes}
     found: dict[str, Any] = {
         name: _absolute(path) for name, path in files.items() if path is not None
     }
+    if len(sensors) == 1:
+        found["sensors"] = _absolute(sensors[0])
+    elif sensors:
+        found["compare"] = _named("--sensors", sensors)
     if lever_arm is not None:
         found["lever_arm"] = _three("--lever-arm", lever_arm)
     if heading is not None:
@@ -305,27 +357,35 @@ def _given(
         "seed": seed,
     }
     if filters:
-        found["filters"] = _named(filters)
+        found["filters"] = _named("--filter", filters)
     if outages:
         found["outages"] = [_span(text) for text in outages]
     return {name: each for name, each in found.items() if each is not None}
 
 
-def _named(texts: tuple[str, ...]) -> dict[str, str]:
+def _length(text: str) -> str | float:
+    try:
+        return "auto" if text == "auto" else float(text)
+    except ValueError:
+        raise InputError(f"--outages {text}: write auto, or seconds, e.g. 60") from None
+
+
+def _named(option: str, texts: tuple[str, ...]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in texts:
-        name, path = _pair(text)
+        name, path = _pair(option, text)
         if name in found:
-            raise InputError(f"--filter {name}=... is given twice: give each a name of its own")
+            raise InputError(f"{option} {name}=... is given twice: give each a name of its own")
         found[name] = path
     return found
 
 
-def _pair(text: str) -> tuple[str, str]:
+def _pair(option: str, text: str) -> tuple[str, str]:
     name, separator, path = text.partition("=")
     if not (name and separator and path):
-        raise InputError(f"--filter {text}: write NAME=FILE, e.g. GMWM=out/calibration.json")
-    return name, path if path == "truth" else _absolute(path)
+        raise InputError(f"{option} {text}: write NAME=FILE, e.g. GMWM=out/calibration.json")
+    is_truth = option == "--filter" and path == "truth"
+    return name, path if is_truth else _absolute(path)
 
 
 def _absolute(path: str) -> str:

@@ -25,6 +25,10 @@ _OPTIONS = (
                       "accel_z=5; repeat. By default roles are guessed from the column names."),
     click.option("--time", "time_column", metavar="COLUMN",
                  help="Time column by name or number; 'none' to ignore it."),
+    click.option("--layout", metavar="LAYOUT",
+                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
+                      "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
+                      "[,rates][,little|big]."),
 )  # fmt: skip
 
 
@@ -74,6 +78,7 @@ def read_recording(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    layout: str | None = None,
     topics: tuple[str, ...] = (),
     clock: str = CLOCKS[0],
     only: str | None = None,
@@ -96,6 +101,7 @@ def read_recording(
         units=units,
         channels=_chosen(roles(channels), only),
         time=time_reference(time_column),
+        layout=layout,
         topic=topics,
         clock=clock,
     )

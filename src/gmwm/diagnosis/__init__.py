@@ -4,5 +4,17 @@ from gmwm.diagnosis.check import health
 from gmwm.diagnosis.repeated import thinned
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
 from gmwm.diagnosis.spectrum import Spectrum, spectrum
+from gmwm.diagnosis.still import Still, find_still, rest_of
 
-__all__ = ["ChannelHealth", "Health", "Repetition", "Spectrum", "health", "spectrum", "thinned"]
+__all__ = [
+    "ChannelHealth",
+    "Health",
+    "Repetition",
+    "Spectrum",
+    "Still",
+    "find_still",
+    "health",
+    "rest_of",
+    "spectrum",
+    "thinned",
+]

@@ -23,7 +23,7 @@ from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.repeated import repetition, repetition_notice, thinned
+from gmwm.diagnosis.repeated import interpolation_notice, repetition, repetition_notice, thinned
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
@@ -165,6 +165,9 @@ def _clean(name: str) -> Notice:
 def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
     """A channel at its own rate, if each sample of it is written several times."""
     found = repetition(channel)
+    straight = interpolation_notice(channel) if found is None and channel.is_of_a_sensor else None
+    if straight is not None:
+        return _Examined([straight], ChannelHealth(), None)
     if found is None:
         return _examined(channel, motion)
     one = _examined(thinned(channel, found), motion)

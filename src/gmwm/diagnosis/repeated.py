@@ -1,4 +1,4 @@
-"""Channels of which each sample is written several times: sample and hold of a lower rate."""
+"""Channels of a lower rate than their rows: sample and hold, and linear interpolation."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.resolution import step_size
 from gmwm.diagnosis.result import Repetition
 from gmwm.readers import Channel
 
@@ -52,3 +53,38 @@ def repetition_notice(channel: Channel, found: Repetition) -> Notice:
         {"times": float(found.times), "rate": rate},
         "one of each is used, at that rate",
     )
+
+
+def interpolation_notice(channel: Channel) -> Notice | None:
+    """Say that samples lie on straight lines between those of a lower rate.
+
+    Second differences vanish but where two lines meet, which two of them see: of an interpolation
+    from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
+
+    Parameters
+    ----------
+    channel : Channel
+    """
+    values = np.asarray(channel.values, dtype=float)
+    bends = np.abs(np.diff(values, 2))
+    bends = bends[~np.isnan(bends)]
+    if bends.size < tuning.FEWEST_KNOWN:
+        return None
+    size = float(np.quantile(bends, tuning.BENT))
+    rounding = 4.0 * max(
+        step_size(values[~np.isnan(values)]), float(np.spacing(np.nanmax(np.abs(values))))
+    )
+    limit = max(tuning.STRAIGHT * size, rounding)
+    if not limit < tuning.STRAIGHT_AT_MOST * size:
+        return None  # steps as large as the noise
+    share = float(np.mean(bends <= limit))
+    if share < max(tuning.LEAST_STRAIGHT, 10.0 * limit / size):
+        return None
+    rate = 0.5 * (1.0 - share) / channel.dt
+    text = (
+        f"{share:.0%} of the samples lie on straight lines between others: it was interpolated "
+        f"from about {rate:.3g} Hz, and its noise is not that of the sensor"
+    )
+    action = "record the samples of the sensor; the channel is skipped in the calibration"
+    values_of = {"share": share, "rate": rate}
+    return Notice("interpolated", "bad", channel.name, text, values_of, action)

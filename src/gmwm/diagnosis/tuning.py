@@ -262,3 +262,44 @@ LARGE, LAGS, CLUSTERED = 2.0, 8, 0.05
 """Errors beyond so many standard deviations are independent of so many after them: their mean
 correlation is 0.10 where bursts of ten samples are a hundredth of the record, and below 0.03 for
 independent noise of heavy tails of 5,000 samples."""
+
+# -- stretches at rest ----------------------------------------------------------------------------
+
+STILL_BLOCK, FEWEST_STILL = 0.25, 8
+"""s of a block, and blocks of a log that is examined: ends are found to half a second."""
+
+SHORTEST_STILL = 10.0
+"""s of a stretch that is used: a thousand samples at 100 Hz show the white noise to 3 %."""
+
+BLOCKS_OF_FLOOR, ROUNDS_OF_FLOOR = 20, 3
+"""Blocks (5 s) of the quietest seconds, and rounds in which all quiet ones replace them."""
+
+MOST_OF_FLOOR, MOST_OF_AXIS = 1.8, 3.5
+"""Scatter of a block over that of the noise, of all axes and of one: that of 16 samples of white
+noise in six axes is above 1.8 in 1 of 100,000 blocks, in one axis above 3.5 in as many."""
+
+BLOCKS_OF_SHOCK = 4
+"""Blocks (1 s) of a shock within a stretch, which screening masks."""
+
+LOUDER_THAN_REST = 1.5
+"""Scatter of an axis over that of the quietest stretch, from which the stretch vibrates: white
+noise that is 22 % larger."""
+
+POINTS_OF_BAND, PEAK_OF_BAND, SHARE_OF_BAND = 512, 20.0, 0.3
+"""Points of a spectrum; its peak over the median within an octave, and the share of the variance in
+it, of a stretch that vibrates: a sensor at rest has lines, but most of its noise is none."""
+
+SWAYING_RATE = 3.5e-3
+"""rad/s (0.2 deg/s) by which the mean rate of a sensor at rest does not change from second to
+second, half of the time; for gravity that is `SWAYS`."""
+
+# -- interpolated samples -------------------------------------------------------------------------
+
+BENT, STRAIGHT, STRAIGHT_AT_MOST = 0.9, 3e-5, 0.02
+"""Quantile of the second differences that gives their size, and the share of it that counts as
+none (single precision leaves 1e-5 beside gravity); where rounding leaves more than the last,
+nothing is seen."""
+
+LEAST_STRAIGHT = 0.15
+"""Share of second differences that vanish: of noise there are ten times the threshold over its
+size, at most; of an interpolation to 2.4 times the rate and more there are as many."""

@@ -1,6 +1,7 @@
 """Numbers for filters in the files that other programs read, one file per consumer or format."""
 
 import sys
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +16,9 @@ class _Room(ModuleType):
 
     def __call__(self, *args: Any, **kwargs: Any) -> str:
         return export(*args, **kwargs)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return import_module, (self.__name__,)
 
 
 sys.modules[__name__].__class__ = _Room

@@ -14,6 +14,7 @@ from gmwm.export import tuning
 from gmwm.export.comments import by_axis
 from gmwm.export.imu import Axis, Imu, Triad
 from gmwm.export.target import ImuFile
+from gmwm.filter_numbers import EKF2_INTERVAL
 
 _UNITS = {
     ("gyro", "N"): "rad/s/sqrt(Hz)",
@@ -147,7 +148,7 @@ def _variance(value: float, letter: str, rate: float) -> float:
 
 def _ekf2(value: float, letter: str, rate: float) -> float:
     """A step of the filter, not of the IMU, adds (value times dt)^2."""
-    return value / sqrt(tuning.EKF2_INTERVAL)
+    return value / sqrt(EKF2_INTERVAL)
 
 
 KALIBR = ImuFile(
@@ -246,7 +247,7 @@ MAPLAB = ImuFile(
 PX4 = ImuFile(
     "px4", "PX4 EKF2", "a parameter file for QGroundControl",
     "N/sqrt(dt) and K/sqrt(dt) for all axes, dt = "
-    f"{tuning.EKF2_INTERVAL:g} s the interval of the filter (EKF2_PREDICT_US), not of the IMU",
+    f"{EKF2_INTERVAL:g} s the interval of the filter (EKF2_PREDICT_US), not of the IMU",
     "src/modules/ekf2/EKF/covariance.cpp: predictCovariance; src/modules/ekf2/module.yaml",
     Keys(
         _named("EKF2_GYR_NOISE", "EKF2_ACC_NOISE", "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag, expm, logm
+from scipy.linalg import expm, logm
 
 from gmwm._core import checks
 from gmwm._core.files import moved_into_place
@@ -24,7 +24,7 @@ from gmwm.export.imu import numbers_of
 from gmwm.export.json_targets import json_text
 from gmwm.export.target import Target
 from gmwm.filter_numbers import FORMS, SensorNumbers
-from gmwm.process import Model, Process, StateSpace
+from gmwm.process import Model, Process, StateSpace, block_diagonal
 
 Matrices = dict[str, FloatArray]
 """F, G, H, Q, R, mean x0 and covariance P0 of the start."""
@@ -138,7 +138,7 @@ def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> 
     common: Matrices = {
         "H": whole.output[None, :],
         "x0": whole.initial_mean,
-        "P0": _diagonal(starts),
+        "P0": block_diagonal(starts),
     }
     discrete = {
         **_driven(whole.transition, whole.process_noise),
@@ -149,7 +149,7 @@ def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> 
     rates: Matrices | None = None
     known = [pair for pair in pairs if pair is not None]
     if len(known) == len(pairs):
-        drift, density = (_diagonal([pair[i] for pair in known]) for i in (0, 1))
+        drift, density = (block_diagonal([pair[i] for pair in known]) for i in (0, 1))
         rates = {
             **_driven(drift, density),
             **common,
@@ -201,11 +201,6 @@ def _driven(transition: FloatArray, noise: FloatArray) -> Matrices:
         "G": np.eye(len(noise))[:, driven],
         "Q": noise[np.ix_(driven, driven)],
     }
-
-
-def _diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
-    kept = [block for block in blocks if block.size]
-    return np.asarray(block_diag(*kept)) if kept else np.zeros((0, 0))
 
 
 def _plain(each: dict[str, Any]) -> dict[str, Any]:

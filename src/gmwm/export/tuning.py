@@ -9,8 +9,5 @@ KEYFRAME = 1.0
 OUTLOOK = (10.0, 60.0, 600.0)
 """s: horizons that comments compare."""
 
-EKF2_INTERVAL = 0.01
-"""s, the update interval of PX4's EKF2: its parameter EKF2_PREDICT_US is 10000 by default."""
-
 OUTAGES = (1.0 / 6.0, 0.5, 1.0)
 """Of the horizon, for which reduced numbers are found: as 10, 30 and 60 s are of 60 s."""

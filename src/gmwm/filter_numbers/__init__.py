@@ -12,9 +12,11 @@ from gmwm.filter_numbers.given import read_numbers
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.reduce import reduce
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
+from gmwm.filter_numbers.tuning import EKF2_INTERVAL
 
 __all__ = [
     "CONSUMERS",
+    "EKF2_INTERVAL",
     "FORMS",
     "Cause",
     "Certificate",

@@ -14,7 +14,15 @@ from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
-from gmwm.filter_numbers.spectra import KINDS, Problem, Target, dominating, region_targets
+from gmwm.filter_numbers.spectra import (
+    KINDS,
+    Estimated,
+    Problem,
+    Target,
+    dominating,
+    region_targets,
+    standard_errors,
+)
 from gmwm.process import Model
 
 
@@ -74,7 +82,7 @@ def bound(
     Returns
     -------
     FilterNumbers or SensorNumbers
-        Of one axis, or by channel.
+        Of one axis, or by channel; N and K of valid fits with the standard errors that these leave.
 
     Raises
     ------
@@ -122,7 +130,12 @@ def bound_of(
     if level is not None:
         for axis, target in zip(group, targets, strict=True):
             region += region_targets(target, _fit(axis), level)
-    model = dominating(Problem(targets, horizon, tuple(region)), form)
+    problem = Problem(targets, horizon, tuple(region))
+    model = dominating(problem, form)
+    # Errors of a fit that is not valid are not those of its parameters either.
+    fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
+    known = form == "N+K" and level is None and len(fits) == len(group)
+    stderr = standard_errors(problem, model, fits) if known else {}
     sd = max(_start(group, each, model) for each in (*targets, *region))
     return [
         FilterNumbers(
@@ -134,6 +147,7 @@ def bound_of(
             predicted=predicted(axis, model, sd, (horizon, 10.0 * horizon)),
             notices=(*target.notices, *about(axis, level)),
             quantity=axis.quantity,
+            stderr=stderr,
         )
         for axis, target in zip(group, targets, strict=True)
     ]

@@ -19,7 +19,7 @@ from gmwm.filter_numbers.given import Given, in_use
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
-from gmwm.process import Model, WhiteNoise
+from gmwm.process import Model, Process, WhiteNoise
 from gmwm.readers import Recording
 
 _GRAVITY = 9.80665
@@ -228,7 +228,7 @@ def _bound(group: Sequence[Axis], horizon: float, level: float | None = None) ->
     return bound_of(group, "N+K", horizon, level)[0]
 
 
-def _with(group: Sequence[Axis], terms: Sequence[object]) -> tuple[Axis, ...]:
+def _with(group: Sequence[Axis], terms: Sequence[Process]) -> tuple[Axis, ...]:
     """Axes with more terms; white noise joins that of the model."""
     result = []
     for axis in group:
@@ -239,6 +239,6 @@ def _with(group: Sequence[Axis], terms: Sequence[object]) -> tuple[Axis, ...]:
                 parts = [part for part in parts if not part.is_white]
                 parts.append(WhiteNoise(float(np.sqrt(white))))
             else:
-                parts.append(term)  # type: ignore[arg-type]
+                parts.append(term)
         result.append(replace(axis, model=Model(tuple(parts)), fit=None))
     return tuple(result)

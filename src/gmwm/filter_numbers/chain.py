@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import eigh
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.chain_kernels import settle
-from gmwm.process import Model, StateSpace
+from gmwm.process import Model, StateSpace, block_diagonal
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +125,8 @@ class Chain:
         real, own = _with_constant(truth, true_sd, dt), _with_constant(believed, believed_sd, dt)
         n, q = self.order, own.n_states
         start = np.diag(np.square(self.initial_sd[:n]))
-        P = block_diag(start, _moments(own))
-        J = block_diag(start, np.zeros((q, q)), _moments(real))
+        P = block_diagonal([start, _moments(own)])
+        J = block_diagonal([start, np.zeros((q, q)), _moments(real)])
         kept: list[tuple[float, FloatArray, FloatArray]] = []
 
         fixes = int(self.settled / self.interval)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import factor
 from gmwm.errors import InputError
+from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
-from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
+from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise, as_model
 
 Pair = tuple[float, float]
 """N and K."""
@@ -21,36 +27,134 @@ Pair = tuple[float, float]
 Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
 """Numbers of all axes, or by axis or kind (gyro, accel): `FilterNumbers`, a model, or N and K."""
 
-# Keys of gyro N and K, accelerometer N and K; what a value is worth at a rate f: N as N sqrt(a f),
-# K as K sqrt(b f), or the squares of these. Sources: the same as in gmwm.export.
+
+@dataclass(frozen=True)
+class _Walk:
+    """Keys of gyro N and K and accelerometer N and K, and what a value is worth.
+
+    At a rate f (that of the IMU, or a given one) it is N sqrt(white f) and K sqrt(walk f), or N and
+    K where these are zero, to a power. Sources: the same as in gmwm.export.
+    """
+
+    keys: tuple[str, str, str, str]
+    white: float = 0.0
+    walk: float = 0.0
+    power: int = 1
+    rate: float | None = None
+
+    def numbers(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Any]]:
+        """Gyro and accelerometer: N and K of one axis for all, or of three."""
+        f = self.rate or rate
+        if self.white > 0.0 and not f > 0.0:
+            raise InputError("its numbers depend on the rate of the IMU: give it in Hz")
+        scale = [np.sqrt(a * f) if a > 0.0 else 1.0 for a in (self.white, self.walk)] * 2
+        own = [values[k] ** (1.0 / self.power) / each
+               for k, each in zip(self.keys, scale, strict=True)]  # fmt: skip
+        pairs = [np.broadcast_arrays(*own[i : i + 2]) for i in (0, 2)]
+        return [[(float(N), float(K)) for N, K in zip(*pair, strict=True)] for pair in pairs]
+
+
+@dataclass(frozen=True)
+class _Memory:
+    """Keys of N, sigma and tau of gyro and accelerometer, and what one of them is in SI."""
+
+    keys: tuple[str, str, str, str, str, str]
+    units: tuple[float, float, float, float, float, float]
+
+    def numbers(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Any]]:
+        own = [values[key] * unit for key, unit in zip(self.keys, self.units, strict=True)]
+        triples = [np.broadcast_arrays(*own[i : i + 3]) for i in (0, 3)]
+        return [
+            [WhiteNoise(float(N)) + GaussMarkov(float(sigma), float(tau))
+             for N, sigma, tau in zip(*triple, strict=True)]
+            for triple in triples
+        ]  # fmt: skip
+
+
+_ARW, _DEG_H, _VRW = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s"), 1.0 / 60.0
+
 _LAYOUTS = (
-    (("gyroscope_noise_density", "gyroscope_random_walk",
-      "accelerometer_noise_density", "accelerometer_random_walk"), 0.0, 0.0, 1),
-    (("IMU.NoiseGyro", "IMU.GyroWalk", "IMU.NoiseAcc", "IMU.AccWalk"), 0.0, 0.0, 1),
-    (("imuGyrNoise", "imuGyrBiasN", "imuAccNoise", "imuAccBiasN"), 0.0, 0.0, 1),
-    (("gyr_n", "gyr_w", "acc_n", "acc_w"), 2.0, 1.0, 1),
-    (("gyr_cov", "b_gyr_cov", "acc_cov", "b_acc_cov"), 1.0, 1.0, 2),
+    _Walk(("gyroscope_noise_density", "gyroscope_random_walk",
+           "accelerometer_noise_density", "accelerometer_random_walk")),
+    _Walk(("IMU.NoiseGyro", "IMU.GyroWalk", "IMU.NoiseAcc", "IMU.AccWalk")),
+    _Walk(("imuGyrNoise", "imuGyrBiasN", "imuAccNoise", "imuAccBiasN")),
+    _Walk(("sigma_g_c", "sigma_gw_c", "sigma_a_c", "sigma_aw_c")),
+    _Walk(("gyro_noise_density", "gyro_bias_random_walk_noise_density",
+           "acc_noise_density", "acc_bias_random_walk_noise_density")),
+    _Walk(("gyro_noise_std", "gyro_bias_std", "accel_noise_std", "accel_bias_std")),
+    _Walk(("gyr_n", "gyr_w", "acc_n", "acc_w"), 2.0, 1.0),
+    _Walk(("gyr_cov", "b_gyr_cov", "acc_cov", "b_acc_cov"), 1.0, 1.0, 2),
+    _Walk(("gyroscopeCovariance", "biasOmegaCovariance",
+           "accelerometerCovariance", "biasAccCovariance"), power=2),
+    _Walk(("EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE", "EKF2_ACC_NOISE", "EKF2_ACC_B_NOISE"),
+          1.0, 1.0, rate=1.0 / tuning.EKF2_INTERVAL),
+    _Memory(("arw", "gbstd", "corrtime", "vrw", "abstd", "corrtime"),
+            (_ARW, _DEG_H, 3600.0, _VRW, 1e-5, 3600.0)),
+    _Memory(("gyro_arw", "gyro_b_stability", "gyro_b_corr",
+             "accel_vrw", "accel_b_stability", "accel_b_corr"),
+            (_ARW, _DEG_H, 1.0, _VRW, 1.0, 1.0)),
 )  # fmt: skip
 
 _RATES = ("update_rate", "IMU.Frequency")
-_ENTRY = re.compile(r"^\s*([A-Za-z_][\w.]*)\s*:\s*([-+.\deE]+)\s*(?:#.*)?$", re.MULTILINE)
+_COMMENT = re.compile(r"(#|//).*$", re.MULTILINE)
+_ENTRY = re.compile(
+    r"""^\s*(?:\d+\s+\d+\s+)?(?:\w+->|\w+\.(?=set))?["']?([A-Za-z_][\w.]*)["']?\s*[:=(\t](.*)$""",
+    re.MULTILINE,
+)
+_ALONE = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
+_EACH = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 
 
-def read_numbers(path: str | os.PathLike[str], rate: float | None = None) -> dict[str, Pair]:
-    """N and K of gyro and accelerometer in a program's file.
+def _lines(content: object) -> Iterator[str]:
+    """A line for each key of JSON whose value is a number or three."""
+    if not isinstance(content, dict):
+        return
+    for key, value in content.items():
+        several = value if isinstance(value, list) else [value]
+        if len(several) in (1, 3) and all(map(checks.is_number, several)):
+            yield f"{key}: {several if len(several) == 3 else several[0]}"
+        yield from _lines(value)
+
+
+def _entries(text: str) -> dict[str, FloatArray]:
+    """Values of keys: one number, or three."""
+    values: dict[str, FloatArray] = {}
+    # A list of JSON may have a line for each number.
+    with contextlib.suppress(ValueError, RecursionError):
+        text = "\n".join(_lines(json.loads(text)))
+    for name, rest in _ENTRY.findall(_COMMENT.sub("", text)):
+        alone = _ALONE.fullmatch(rest)
+        found = [alone[1]] if alone else _EACH.findall(rest)
+        if len(found) not in (1, 3) or (len(found) == 1 and not alone):
+            continue
+        # A setter is called as what it sets.
+        key = name[3].lower() + name[4:] if re.match(r"set[A-Z]", name) else name
+        try:
+            values[key] = np.array([float(each) for each in found])
+        except ValueError:
+            continue
+    return values
+
+
+def read_numbers(
+    path: str | os.PathLike[str], rate: float | None = None
+) -> dict[str, Pair | Model]:
+    """The numbers of gyro and accelerometer in a program's file.
 
     Parameters
     ----------
     path : path-like
-        Of Kalibr, OpenVINS and others with their keys, VINS-Mono and VINS-Fusion, ORB-SLAM3,
-        FAST-LIO, LIO-SAM.
+        Of Kalibr, OpenVINS, Kimera and others with their keys, VINS-Mono and VINS-Fusion,
+        ORB-SLAM3, FAST-LIO, LIO-SAM, OKVIS2, maplab, Basalt, PX4 (EKF2 at its usual interval),
+        GTSAM (Python, C++), KF-GINS and gnss-ins-sim.
     rate : float, optional
         Of the IMU, Hz, for programs whose numbers depend on it; by default the file's own.
 
     Returns
     -------
     dict
-        "gyro" and "accel" -> N (u/sqrt(Hz)) and K (u/s/sqrt(Hz)).
+        "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
+        (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
 
     Raises
     ------
@@ -61,32 +165,30 @@ def read_numbers(path: str | os.PathLike[str], rate: float | None = None) -> dic
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error}): check the path") from None
-    values: dict[str, float] = {}
-    for name, number in _ENTRY.findall(text):
-        try:
-            values[name] = float(number)
-        except ValueError:
+    values = _entries(text)
+    for layout in _LAYOUTS:
+        if not any(key in values for key in layout.keys):
             continue
-    for keys, white, walk, power in _LAYOUTS:
-        found = [key for key in keys if key in values]
-        if not found:
-            continue
-        missing = [key for key in keys if key not in values]
+        missing = [key for key in layout.keys if key not in values]
         if missing:
             raise InputError(f"{path}: {missing[0]} is missing: add it")
-        wrong = [key for key in keys if not values[key] > 0.0]
+        wrong = [key for key in layout.keys if not np.all(values[key] > 0.0)]
         if wrong:
-            raise InputError(f"{path}: {wrong[0]} = {values[wrong[0]]:g}: give a positive number")
-        f = rate or next((values[key] for key in _RATES if key in values), 0.0)
-        if white > 0.0 and not f > 0.0:
-            raise InputError(f"{path}: its numbers depend on the rate of the IMU: give it in Hz")
-        scale = [np.sqrt(a * f) if a > 0.0 else 1.0 for a in (white, walk)] * 2
-        numbers = [
-            float(values[key] ** (1.0 / power) / each)
-            for key, each in zip(keys, scale, strict=True)
-        ]
-        return {"gyro": (numbers[0], numbers[1]), "accel": (numbers[2], numbers[3])}
-    known = "; ".join(", ".join(layout[0][:2]) for layout in _LAYOUTS)
+            raise InputError(
+                f"{path}: {wrong[0]} = {values[wrong[0]][0]:g}: give a positive number"
+            )
+        f = rate or next((float(values[key][0]) for key in _RATES if key in values), 0.0)
+        try:
+            found = layout.numbers(values, f)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        names = ("gyro", "accel")
+        return {
+            f"{name}_{axis}" if axis else name: item
+            for name, items in zip(names, found, strict=True)
+            for axis, item in zip(("x", "y", "z") if len(items) == 3 else ("",), items, strict=True)
+        }
+    known = "; ".join(", ".join(layout.keys[:2]) for layout in _LAYOUTS)
     raise InputError(f"{path}: has no noise parameters by names known here ({known}): give N and K")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
@@ -52,6 +52,7 @@ class FilterNumbersForm(Form):
     predicted: Annotated[Sequence[PredictedForm], Field(max_length=100)]
     notices: Notices
     quantity: Text
+    stderr: dict[Text, NotNegative] = Field(default_factory=dict)
 
 
 class SensorNumbersForm(Form):
@@ -108,6 +109,9 @@ class FilterNumbers(Document):
         What of the error model the numbers leave out, and why.
     quantity : {"gyro", "accel", ""}
         What the axis measures; empty if it is not known.
+    stderr : dict
+        Standard errors of the N and K that bound a valid fit, from those of the fit; empty for
+        other forms, for models, and where a level covers them.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
@@ -120,8 +124,10 @@ class FilterNumbers(Document):
     predicted: tuple[Predicted, ...] = ()
     notices: tuple[Notice, ...] = ()
     quantity: str = ""
+    stderr: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        freeze(self, "stderr")
         checks.choice("form", self.form, FORMS)
         checks.choice("method", self.method, METHODS)
 
@@ -175,7 +181,8 @@ class FilterNumbers(Document):
         for key, value in self._shown():
             letter = key if key in _UNITS else key.partition("_")[0]
             unit = si_parameter_unit(_UNITS[letter], self.quantity)
-            lines.append(f"  {key:<10} {value:>11.4g} {unit}")
+            error = f" +- {self.stderr[key]:.2g}" if key in self.stderr else ""
+            lines.append(f"  {key:<10} {value:>11.4g}{error} {unit}")
         for each in self.predicted:
             lines.append(
                 f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
@@ -189,12 +196,23 @@ class FilterNumbers(Document):
         values = [(key, float(value or 0.0)) for key, value in self.model.params.items()]
         return [*values, ("initial_sd", self.initial_sd)]
 
+    def _columns(self) -> dict[str, float]:
+        """Of the table of a sensor."""
+        errors = {f"{key} +-": value for key, value in self.stderr.items()}
+        return {
+            **dict(self._shown()),
+            **errors,
+            **{f"NEES {each.time:g} s": each.nees for each in self.predicted},
+            **{f"sd {each.time:g} s": each.tightness for each in self.predicted},
+        }
+
     def row(self) -> dict[str, Any]:
         """What `to_frame` shows of it, SI."""
         first = self.predicted[0] if self.predicted else None
         return {
             "form": self.form,
             **dict(self._shown()),
+            **{f"{key}_stderr": value for key, value in self.stderr.items()},
             "horizon": self.horizon,
             "nees": first.nees if first else float("nan"),
             "tightness": first.tightness if first else float("nan"),
@@ -216,6 +234,7 @@ class FilterNumbers(Document):
             ],
             "notices": [notice.to_dict() for notice in self.notices],
             "quantity": self.quantity,
+            "stderr": dict(self.stderr),
         }
 
     @classmethod
@@ -237,6 +256,7 @@ class FilterNumbers(Document):
             ),
             notices=tuple(map(Notice.from_dict, content["notices"])),
             quantity=str(content["quantity"]),
+            stderr={str(k): float(v) for k, v in content.get("stderr", {}).items()},
         )
 
 
@@ -317,17 +337,12 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
         names = max(map(len, self))
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
             group = self.of(quantity)
-            keys = [key for key, _ in next(iter(group.values()))._shown()]
-            times = [each.time for each in next(iter(group.values())).predicted]
-            columns = keys + [f"NEES {time:g} s" for time in times]
-            columns += [f"sd {time:g} s" for time in times]
+            columns = tuple(next(iter(group.values()))._columns())
             title = f"{quantity or 'channel'} [{SI_UNIT.get(quantity, 'u')}, s]"
             names = max(names, len(title))
             lines += ["", f"{title:<{names}}" + "".join(f" {column:>11}" for column in columns)]
             for name, each in group.items():
-                values = [value for _, value in each._shown()]
-                values += [c.nees for c in each.predicted]
-                values += [c.tightness for c in each.predicted]
+                values = each._columns().values()
                 lines.append(f"{name:<{names}}" + "".join(f" {value:>11.4g}" for value in values))
         if first.predicted:
             lines += ["", *wrapped(

@@ -57,6 +57,9 @@ SHORTEST_TAU = 600.0
 AS_GOOD = 1e-4
 """Of the objective, below which a difference is none."""
 
+TOUCHED = 1e-10
+"""Of a spectrum or of a limit, within which a bound touches it."""
+
 SAFETY = 1.0 + 1e-9
 """Times every variance of a bound: arithmetic of the linear program."""
 
@@ -147,3 +150,8 @@ LARGE = 2.0
 
 CONSISTENT = (0.5, 2.0)
 """NEES per degree of freedom within which numbers are called consistent."""
+
+# -- files of programs ----------------------------------------------------------------------------
+
+EKF2_INTERVAL = 0.01
+"""s, the update interval of PX4's EKF2: its parameter EKF2_PREDICT_US is 10000 by default."""

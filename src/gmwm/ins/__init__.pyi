@@ -4,6 +4,12 @@ from .covariance.reduction import (
     loiter_with_outages as loiter_with_outages,
     reduce as reduce,
 )
+from .field.compare import (
+    Comparison as Comparison,
+    Outcome as Outcome,
+    Paired as Paired,
+    compare as compare,
+)
 from .field.fix_file import read_fixes as read_fixes
 from .field.imu_file import read_imu as read_imu
 from .field.measured import Measured as Measured

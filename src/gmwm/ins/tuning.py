@@ -114,6 +114,86 @@ MOSTLY_FINE = 1.5
 OUTAGES_SHOWN = 6
 """Times without fixes that a report draws, the longest ones: more make it long."""
 
+# -- faults of a log -------------------------------------------------------------------------------
+
+LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
+"""s, of a constant error of the fixes' stamps that is looked for: leap seconds are more, and leave
+no fix near; and of the fixes left out at both ends beside it."""
+
+LARGEST_ARM = 5.0
+"""m, usual length of a lever arm that was left out: 1 sigma."""
+
+HEADINGS = 8
+"""Directions that are tried where the filter is lost: 45 deg apart."""
+
+ROUGH_HEADING, FINE_HEADING = math.radians(15.0), math.radians(0.5)
+"""rad, 1 sigma of each direction when it is tried (the nearest is up to 22.5 deg off), and when the
+error is estimated: small, so that the data and not the start decide."""
+
+DIAGNOSED = 3600.0
+"""s from the start in which faults are looked for: tens of runs of the filter."""
+
+MOST_FAULTS = 4
+"""At once: with more, nothing can be known."""
+
+ROUNDS, SETTLED_GAIN = 6, 0.05
+"""Gauss-Newton steps, and the gain of the log-likelihood below which they end."""
+
+REFINED, TRIALS = 4, 40
+"""Explanations that are worked out, by their gain at first sight; runs to fit coloured noise."""
+
+LEAST_WHITE, LONGEST_COLOUR = -4.0, 1e4
+"""Logarithm of the least factor on the white part of coloured fixes; s, longest correlation."""
+
+SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
+"""Logarithm of the factors on a noise that are tried first, and of the largest."""
+
+AMBIGUOUS = 3.0
+"""Of the log-likelihood: an explanation that is less than 20 times as probable is no decision."""
+
+MOST_OUTLIERS = 0.1
+"""Fraction of the fixes beyond which those that a gate rejects are no outliers: it is the filter
+that is wrong."""
+
+SEEN = 5.0
+"""Standard errors that a constant error must have to be found at the level of the tests."""
+
+UNSEEN = {"s": 0.5, "m": 3.0, "heading": math.radians(10.0)}
+"""Least constant error that is found, beyond which a motion is reported not to show it: more is
+rare in practice."""
+
+MILD = 1.5
+"""Factor on the deviations of fixes up to which the solution may be used all the same."""
+
+# -- comparisons on a log --------------------------------------------------------------------------
+
+SMOOTHER_STEP = 0.5
+"""s between steps of the smoother's covariance: a turn of 6 deg/s makes 3 deg of it."""
+
+OUTAGE, LONGEST_OUTAGE = 30.0, 600.0
+"""s without fixes, and as long with them before the next: what a tunnel or a street of houses
+takes, and long enough that errors of sensors are larger than those of the fixes."""
+
+OUTAGES_FROM = 60.0
+"""s from the start of the filter, in which it settles, to the first outage."""
+
+FEWEST_OUTAGES = 8
+"""Of a comparison: with fewer the interval of a ratio is a guess."""
+
+LEAST_SHARE = 0.01
+"""Of the predicted variance, that the difference of two covariances is at least."""
+
+ACCURACY_LEVEL, SCORE_LEVEL = 0.04, 0.01
+"""Probability that equal models are not a tie, by their errors and by what they predict: 5 % in
+all."""
+
+TIE_RATIO, TIE_SCORE = 0.02, 0.05
+"""Logarithm of a ratio of errors, and difference of scores, below which models are as good as each
+other however surely they differ: nearly equal models differ surely by nothing that matters."""
+
+POWER, WORTH = 0.95, 0.9
+"""Probability with which a difference is found, and the ratio of errors that is worth it."""
+
 # -- validations ----------------------------------------------------------------------------------
 
 SETTLED = 0.25

@@ -16,7 +16,7 @@ from gmwm.process.noise import (
 from gmwm.process.parameter import Parameter, parameter
 from gmwm.process.sinusoid import Sinusoid
 from gmwm.process.spectral import PSD, evaluated, haar_gain, legendre, quadrature
-from gmwm.process.state_space import StateSpace
+from gmwm.process.state_space import StateSpace, block_diagonal
 from gmwm.process.wavelet_gain import pair_weights, unit_legendre
 from gmwm.process.wavelets import ComplexArray, Wavelet, wavelet
 
@@ -46,6 +46,7 @@ __all__ = [
     "Wavelet",
     "WhiteNoise",
     "as_model",
+    "block_diagonal",
     "evaluated",
     "haar_gain",
     "legendre",

@@ -22,6 +22,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, number, split_line
+from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
 from gmwm.readers.text_file import blocks, content_size
@@ -49,7 +50,7 @@ class CsvTable:
             If it cannot be read or is not a table.
         """
         _, head = next(blocks(path, size=_HEAD), (1, b""))
-        return cls(path, find_layout(path.name, head))
+        return cls(path, with_dialect(find_layout(path.name, head), path.name, head))
 
     @property
     def source(self) -> str:
@@ -111,7 +112,11 @@ class CsvTable:
                 self._require(max(held, self._estimated_samples(len(columns))))
         infinite.complain(self.source)
         # One column at a time lets the blocks go before the next one is joined.
-        return {column: np.concatenate(parts.pop(0)) for column in columns}
+        joined = {column: np.concatenate(parts.pop(0)) for column in columns}
+        for column, scale in self.layout.scales.items():
+            if column in joined:
+                joined[column] *= scale
+        return joined
 
     def _require(self, samples: float) -> None:
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from statistics import mode
 
 from gmwm._core.notices import Notice
@@ -15,7 +15,9 @@ from gmwm.readers.cells import BLANKS, number, split_header, split_line
 from gmwm.readers.names import meaning
 from gmwm.readers.table import FORMATS
 
-_COMMENT_MARKS = ("#", "%")
+_COMMENT_MARKS = ("#", "%", "//")
+_BLACKBOX = re.compile(rb'"?Product"?\s*,\s*"?Blackbox')
+_BLACKBOX_HEADER = re.compile(rb'(?m)^"?loopIteration"?\s*,')
 _DELIMITERS = (";", "\t", ",", BLANKS)  # of two that explain the lines equally well, the first
 _UTF8_MARK = b"\xef\xbb\xbf"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -42,6 +44,8 @@ class Layout:
     line : int
         Number of that line, counted from 1.
     notices : tuple of Notice
+    scales : dict
+        Index of a column -> what its numbers are multiplied by.
     """
 
     delimiter: str
@@ -52,6 +56,7 @@ class Layout:
     offset: int
     line: int
     notices: tuple[Notice, ...] = ()
+    scales: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def width(self) -> int:
@@ -139,11 +144,22 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
     comments: list[_Line] = []
     lines: list[_Line] = []
     start = len(_UTF8_MARK) if head.startswith(_UTF8_MARK) else 0
+    preamble = 0
+    if _BLACKBOX.match(head, start):
+        header = _BLACKBOX_HEADER.search(head, start)
+        if header is None:
+            raise InputError(
+                f"{source} has the preamble of a blackbox log but no line that begins with "
+                "loopIteration: decode the log again"
+            )
+        preamble = header.start()
     for i, found in enumerate(_LINE.finditer(head, start), start=1):
         raw = found.group().strip(b" \r\n")
         if not raw.strip():
             continue
         text = raw.decode(errors="replace")
+        if found.start() < preamble:
+            continue
         if lines or not text.startswith(_COMMENT_MARKS):
             if not lines:
                 _check_utf8(source, i, raw)
@@ -239,7 +255,7 @@ def _commented_names(
     """The comment that is a header: as many words as columns, best with names that we know."""
     candidates = []
     for comment in reversed(comments):
-        text = comment.text.lstrip("".join(_COMMENT_MARKS)).strip(" ")
+        text = comment.text.lstrip("#%/").strip(" ")
         try:
             names = _without_last_empty(split_header(text, delimiter), width)
         except ValueError:

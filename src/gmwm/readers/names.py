@@ -194,6 +194,8 @@ def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
             return Meaning(TIME, seconds=seconds) if unit != "s" and not bracket else None
     elif rest and rest[-1] in _LONG_SECONDS and len(rest) > 1:
         seconds = seconds or _LONG_SECONDS[rest.pop()]
+    if rest == ["sample", "time", "fine"]:  # of Xsens, 10 kHz
+        return Meaning(TIME, seconds=1e-4)
     if rest[-2:] == ["time", "stamp"]:
         rest[-2:] = ["timestamp"]
     if not rest or rest[-1] not in _TIME_WORDS or not _BEFORE_TIME.issuperset(rest[:-1]):

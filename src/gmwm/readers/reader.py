@@ -6,15 +6,18 @@ import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
+from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import Clock, Timing, agree
 from gmwm.readers.formats import (
@@ -37,6 +40,7 @@ def read(
     units: Mapping[str, str] | None = None,
     channels: Mapping[str, Reference] | Collection[str] | None = None,
     time: Reference | Literal[False] | None = None,
+    layout: str | None = None,
     *,
     topic: str | Sequence[str] = (),
     clock: str = "header",
@@ -66,6 +70,12 @@ def read(
         Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
         header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
         as seconds, and for others ``rate`` is needed.
+    layout : str, optional
+        Of a binary file without a header: ``"IMAR"``, ``"LN200"``, ``"LN200IG"``, ``"IXSEA"``,
+        ``"NAVCHIP_INT"``, ``"NAVCHIP_FLT"``, ``"KF-GINS"``, or
+        ``"TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"``: each record is a time (float64, s)
+        and six numbers of a type, gyro and accelerometer x, y, z, in units of the scales (rad and
+        m/s; of rates rad/s and m/s^2).
     topic : str or sequence of str, optional
         Of a bag or a flight log, the topic to read, or one of gyros and one of accelerometers;
         needed where there are several.
@@ -92,7 +102,11 @@ def read(
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
     topics = (topic,) if isinstance(topic, str) else tuple(topic)
-    tables = open_tables(path, topics, clock)
+    tables = (
+        open_tables(path, topics, clock)
+        if layout is None
+        else [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
+    )
     return _read(tables, rate, units or {}, channels, time)
 
 
@@ -223,6 +237,16 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
         )
 
 
+def _repeated(columns: Sequence[FloatArray]) -> BoolArray:
+    """Which rows have the values of the row before in every column."""
+    same = np.ones(columns[0].size, dtype=bool)
+    same[0] = False
+    for values in columns:
+        both = np.isnan(values[1:]) & np.isnan(values[:-1])
+        same[1:] &= (values[1:] == values[:-1]) | both
+    return same
+
+
 def _timing(
     table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
@@ -237,6 +261,7 @@ def _timing(
         seconds=meaning(name).seconds,
         own_unit=meaning(name).stated,
         where=table.where,
+        same=lambda: _repeated([arrays[i] for i in arrays if i != time]),
     )
     timing = clock.timing(stated)
     if stated is None:

@@ -18,7 +18,9 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
+    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
+    | {"partial-record", "still-stretches"}
 )
 """Codes of the notices about how a file was read."""
 

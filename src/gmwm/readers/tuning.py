@@ -87,3 +87,63 @@ OFF_GRID = 0.25
 
 FEWEST_IN_RHYTHM = 4
 """Jumps from which a rhythm shows that stamps were rounded."""
+
+ROUNDS_OF_LINE, LINE_SETTLED = 20, 1e-9
+"""Steps of the robust line through the stamps, at most, and the relative change that ends them."""
+
+# -- uneven clocks --------------------------------------------------------------------------------
+
+ROWS_OF_ROUGH = 32
+"""Rows over which the interval is known to 2 % with jitter of 0.4, and of which most have no loss
+where one of a hundred is lost."""
+
+JITTER_EXPECTED, LEAST_JITTER = 0.25, 0.05
+"""Standard deviation of stamps about the clock, in intervals: that of uniform jitter of 40 % is
+0.23; rounding of a fifth of an interval has 0.05."""
+
+CLOCK_COSTS = (5.0, 5.0, 25.0, 8.0)
+"""Negative logarithms of the chance of a loss and a repetition (1 of 150 rows) and of a set clock
+(1e-11), and the most that one stamp costs: four standard deviations."""
+
+COPIES = 0.8
+"""Share of the repeated stamps that have repeated samples too, above which these are copies: by
+chance, coarse samples repeat less often."""
+
+ROWS_OF_CLOCK = (128, 1024, 1024, 1024)
+"""Rows over which the clock is followed: first alone, phase to 0.05 and rate to 1e-3 of an interval
+with jitter of 0.25; then about its slow changes, until nothing changes."""
+
+ROWS_KNOWN = 16
+"""Rows that the interval and the phase at the beginning are worth."""
+
+ROWS_OF_TRIAL, TRIED_INTERVALS = 2048, (1.0, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4)
+"""First rows on which intervals are tried, and how much shorter than the rough one they are: 0 to
+30 % of the rows are lost."""
+
+ROWS_OF_TREND = 257
+"""Rows over which slow changes of the clock are averaged: 1e-3 of an interval at 100 ppm in an
+hour."""
+
+ROWS_AT_ONCE = 1 << 15
+"""Rows that are decided at a time: bounds the memory."""
+
+MOST_SET, MOST_UNEVEN = 2e-3, 0.75
+"""Fraction of rows at which a clock that is set is none, and the median distance from the clock, in
+intervals, above which stamps are no even clock."""
+
+ASTRAY = 2.0
+"""Intervals from the clock, beyond the rows of a burst, from which stamps are reported as far."""
+
+MOST_OF_ONE_STAMP = 1024
+"""Rows with one stamp that a full buffer holds, or a host that stalls writes."""
+
+# -- binary files ---------------------------------------------------------------------------------
+
+LARGEST_OF_BINARY = 60.0
+"""s: larger first steps of a binary file are numbers of another layout."""
+
+RECORDS_AT_ONCE = 1 << 16
+"""Records of a binary file that are read at a time."""
+
+LONGEST_OF_WRAP = 100.0
+"""Steps within which a counter that ran over goes on."""

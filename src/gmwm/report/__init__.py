@@ -2,7 +2,7 @@
 
 from gmwm.report.calibration import fragment, write_report
 from gmwm.report.datasheet import read_datasheet
-from gmwm.report.navigated import write_navigated_report
+from gmwm.report.navigated import write_comparison_report, write_navigated_report
 from gmwm.report.text import duration_text
 from gmwm.report.validation import write_validation_report
 
@@ -10,6 +10,7 @@ __all__ = [
     "duration_text",
     "fragment",
     "read_datasheet",
+    "write_comparison_report",
     "write_navigated_report",
     "write_report",
     "write_validation_report",

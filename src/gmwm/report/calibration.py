@@ -16,6 +16,7 @@ import gmwm
 from gmwm._core.files import written
 from gmwm._core.units import field_units
 from gmwm.calibration import Calibration, floor, sentence, white_density
+from gmwm.errors import printable
 from gmwm.estimate import Estimate, Fit
 from gmwm.readers import Recording
 from gmwm.report.answer import answer, bias_instability, quantity_text, slow_terms, trust, verdict
@@ -135,7 +136,7 @@ def _provenance(
     known = {"recording": calibration.source or "not named", **given}
     if sheet is not None:
         known["data sheet"] = sheet.name
-    return known | {
+    return {printable(key): printable(value) for key, value in known.items()} | {
         "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
         f"Python {platform.python_version()}",
         "report of": datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),

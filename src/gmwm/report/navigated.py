@@ -7,7 +7,7 @@ from pathlib import Path
 
 import gmwm
 from gmwm._core.files import written
-from gmwm.ins.field import Navigated, outage_pictures
+from gmwm.ins.field import Comparison, Navigated, outage_pictures
 from gmwm.report.page import rendered
 from gmwm.report.validation import svg
 
@@ -38,6 +38,28 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         summary=str(navigated),
         models=[(axis, model, sensors.bias_sd[axis]) for axis, model in sensors.models.items()],
     )
+    with written(path) as stream:
+        stream.write(text)
+    return Path(path)
+
+
+def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a comparison of sensor models as one HTML file.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    path : path-like
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    text = rendered(
+        "comparison.html", title=comparison.title, version=gmwm.__version__, c=comparison,
+        summary=str(comparison),
+    )  # fmt: skip
     with written(path) as stream:
         stream.write(text)
     return Path(path)

@@ -3,6 +3,7 @@
 from gmwm.study.appendix import converge, convergence_table
 from gmwm.study.choice import choice_study, choice_table
 from gmwm.study.demo import compare, simulated_imu
+from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
 from gmwm.study.rotation import reproduce_rotation
@@ -11,6 +12,7 @@ from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
 
 __all__ = [
+    "FAULTS",
     "FIGURES",
     "STUDIES",
     "Study",
@@ -20,9 +22,11 @@ __all__ = [
     "compare",
     "converge",
     "convergence_table",
+    "emulated_log",
     "reproduce_figure",
     "reproduce_rotation",
     "run_study",
+    "sensors",
     "simulated_imu",
     "summarise",
 ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -143,11 +144,9 @@ class Rotation:
     ) -> Interval:
         """Ratio of the sums of two tables."""
         n = len(self.sources)
-        calibrated = None if turn is None else np.eye(n)[turn]
-        rng = np.random.default_rng(self.turns[0].experiment.seed)
-        weights = crossed_weights(self.stretches, calibrated, tuning.BOOTSTRAP_DRAWS, rng)
+        weights = _weights(self.stretches, turn, self.turns[0].experiment.seed)
         above, below = (np.nan_to_num(each) for each in tables)
-        whole = np.ones((n, n)) if calibrated is None else np.outer(calibrated, np.ones(n))
+        whole = np.ones((n, n)) if turn is None else np.outer(np.eye(n)[turn], np.ones(n))
         with np.errstate(invalid="ignore", divide="ignore"):
             sums = [np.sum(whole[..., None] * each) for each in (above, below)]
             value = root(np.array(sums[0] / sums[1]))
@@ -269,6 +268,14 @@ class Rotation:
                 for title, rows in panels.items()
             }
         )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _weights(stretches: tuple[int, ...], turn: int | None, seed: int) -> FloatArray:
+    """Of all intervals of a study, or of one turn of it; see `crossed_weights`."""
+    calibrated = None if turn is None else np.eye(len(stretches))[turn]
+    rng = np.random.default_rng(seed)
+    return crossed_weights(stretches, calibrated, tuning.BOOTSTRAP_DRAWS, rng)
 
 
 def crossed_weights(

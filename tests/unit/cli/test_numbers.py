@@ -89,6 +89,15 @@ def test_certify_a_file_and_numbers(run, calibration, tmp_path):
     assert str(expected) in again
 
 
+def test_certify_a_json_file_of_a_program(run, calibration, tmp_path):
+    entries = {"gyro_noise_std": [1e-4] * 3, "gyro_bias_std": [1e-6] * 3}
+    entries |= {"accel_noise_std": [1e-3] * 3, "accel_bias_std": [2e-5] * 3}
+    (tmp_path / "basalt.json").write_text(json.dumps({"value0": entries}, indent=1))
+    code, printed, _ = run("certify", calibration, "--imu", "basalt.json", "--json")
+    assert code == 0
+    assert len(json.loads(printed)["checks"]) > 0
+
+
 def test_certify_what_bound_saved(run, calibration):
     run("bound", calibration, "-o", "numbers.json")
     code, printed, _ = run("certify", calibration, "--imu", "numbers.json", "--json")
@@ -124,6 +133,7 @@ def test_units_of_imperfections(run, calibration):
         (("certify", "CAL", "-N", "1", "-K", "1,1"), "-N 1: write a positive number for gyro and"),
         (("certify", "CAL", "-N", "1,x", "-K", "1,1"), "-N 1,x: write a positive number"),
         (("certify", "CAL", "--imu", "none.yaml"), "none.yaml: cannot be read"),
+        (("certify", "CAL", "--imu", "none.json"), "none.json: cannot be read"),
         (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--outages", "a"), "--outages a: write sec"),
         (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--motion", "boat"), "motion 'boat' is not"),
         (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--scale-error", "1"), "add --motion drone"),

@@ -192,10 +192,17 @@ def test_too_short_to_be_examined(record):
     assert find_motion(record(gyro_x=step)).moves == ()
 
 
-def test_fits_of_what_moved_are_not_valid(moved):
-    cal = gmwm.calibrate(moved(turn(30_000, 100, 200, 60.0, (0, 0, 1))), WhiteNoise())
-    assert not any(fit.valid or fit.reasons["recording_static"] for fit in cal.values())
-    assert "not-static" in {notice.code for notice in cal.notices}
+def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
+    recording = moved(turn(30_000, 100, 200, 60.0, (0, 0, 1)))
+    cal = gmwm.calibrate(recording, WhiteNoise())
+    assert all(fit.reasons["recording_static"] for fit in cal.values())
+    (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
+    assert notice.values["total"] == pytest.approx(200.0, abs=2.0)
+    cal = gmwm.calibrate(recording, WhiteNoise(), still=False)
+    assert "not-static" in {each.code for each in cal.notices}
+
+
+def test_fits_of_what_was_tilted_are_not_valid(moved):
     cal = gmwm.calibrate(moved(turn(30_000, 150, 151, 5.0, (1, 0, 0))), WhiteNoise())
     kept = {name: fit.reasons["attitude_kept"] for name, fit in cal.items()}
     assert kept == {name: name.startswith("gyro") for name in cal}

@@ -63,3 +63,37 @@ def test_a_round_trip(record, tmp_path):
     found = gmwm.health(record(accel_x=held(2, 5000)))
     found.save(tmp_path / "health.json")
     assert gmwm.diagnosis.Health.load(tmp_path / "health.json").channels == found.channels
+
+
+def interpolated(rate, seed, digits=None):
+    """Noise of a lower rate in rows of 200 Hz, on straight lines between its samples."""
+    rng = np.random.default_rng(seed)
+    own = 9.8 + 0.05 * rng.normal(size=round(60 * rate) + 2)
+    values = np.interp(np.arange(12_000) / 200.0, np.arange(own.size) / rate, own)
+    return values if digits is None else np.round(values, digits)
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(63.0, None), (63.0, 6), (50.5, None), (31.0, 7)])
+@pytest.mark.parametrize("seed", range(2))
+def test_linear_interpolation_is_named_and_not_modelled(rate, digits, seed):
+    noise = 1e-3 * np.random.default_rng(9).normal(size=12_000)
+    channels = {"accel_x": interpolated(rate, seed, digits), "gyro_x": noise}
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    rec = gmwm.Recording.from_arrays(channels, 200.0, units)
+    found = gmwm.health(rec)
+    (notice,) = found.of(where="accel_x")
+    assert notice.code == "interpolated"
+    assert notice.values["rate"] == pytest.approx(rate, rel=0.02)
+    assert found.events("accel_x") == ()
+    assert not found.of(where="gyro_x", code="interpolated")
+    cal = gmwm.calibrate(rec, gmwm.WhiteNoise())
+    assert cal.skipped["accel_x"].code == "interpolated"
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-4, 1e-2, 0.3, 1.0, 3.0])
+def test_noise_is_not_interpolated(step):
+    noise = np.random.default_rng(3).normal(size=20_000)
+    noise = np.round(noise / step) * step if step else noise
+    for values in (noise, np.cumsum(noise), noise + np.sin(np.arange(noise.size) / 9.0)):
+        rec = gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "deg/s"})
+        assert not gmwm.health(rec).of(code="interpolated")

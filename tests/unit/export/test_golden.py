@@ -5,8 +5,10 @@ import re
 import pytest
 
 import gmwm
+from gmwm import InputError
 from gmwm.export import TARGETS
-from imu_numbers import FORMS, numbers
+from gmwm.filter_numbers import read_numbers
+from imu_numbers import FORMS, RATE, K, N, numbers
 from places import GOLDEN, REPOSITORY
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
@@ -28,6 +30,40 @@ def test_file(name):
     assert NUMBER.sub("0", found) == NUMBER.sub("0", kept)
     values = [[float(v) for v in NUMBER.findall(text)] for text in (found, kept)]
     assert values[0] == pytest.approx(values[1], rel=1e-9, abs=1e-30)
+
+
+READ = {
+    "kalibr": 1, "openvins": 1, "vins": 1, "orbslam3": 1, "fastlio": 1, "liosam": 1, "kimera": 1,
+    "okvis2": 1, "maplab": 1, "px4": 1, "basalt": 3, "gtsam": 3, "gtsam-cpp": 3, "gnss-ins-sim": 3,
+    "kfgins": 3,
+}  # fmt: skip
+"""Files that a certificate reads, and whether they hold one number for all axes or three."""
+
+
+@pytest.mark.parametrize("name", READ)
+def test_numbers_come_back_from_the_file(name):
+    found = read_numbers(path_of(name), RATE)
+    given = numbers(TARGETS[name].form)
+    if READ[name] == 1:
+        largest = {kind: (max(N[kind]), max(K[kind])) for kind in ("gyro", "accel")}
+        assert found == {kind: pytest.approx(pair, rel=1e-6) for kind, pair in largest.items()}
+        return
+    assert list(found) == list(given)
+    for axis, own in found.items():
+        if isinstance(own, tuple):
+            assert own == pytest.approx((given[axis].N, given[axis].K), rel=1e-6)
+            continue
+        assert own.params["N"] == pytest.approx(given[axis].N, rel=1e-6)
+        # One correlation time for all axes: S(0) or the slope is kept, whichever bounds.
+        assert own.params["sigma"] >= 0.99 * given[axis].sigma[0]
+        if name != "kfgins":
+            assert own.params["tau"] == pytest.approx(given[axis].tau[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - set(READ)))
+def test_files_without_both_numbers_or_without_names_of_their_own_are_refused(name):
+    with pytest.raises(InputError, match="has no noise parameters by names known here"):
+        read_numbers(path_of(name), RATE)
 
 
 def test_nothing_else_is_kept():

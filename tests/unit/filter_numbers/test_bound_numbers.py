@@ -249,6 +249,36 @@ def test_models_of_the_region_are_dominated(fitted, form):
     assert 1.0 < numbers.tightness[60.0] / plain.tightness[60.0] < 2.0
 
 
+def test_standard_errors_are_those_of_the_fit_by_the_chain_rule(fitted):
+    """Against bounds of models that differ by a step along each independent error."""
+    found = gmwm.bound(fitted, "N+K", 60.0)
+    values, vectors = np.linalg.eigh(fitted.covariance)
+    total = {"N": 0.0, "K": 0.0}
+    for column in (vectors * np.sqrt(values)).T:
+        ends = []
+        for side in (-0.01, 0.01):
+            steps = zip(fitted.keys, side * column, strict=True)
+            model = fitted.model.with_params({k: fitted.params[k] + step for k, step in steps})
+            ends.append(gmwm.bound(model, "N+K", 60.0, dt=1.0).model.params)
+        for key in total:
+            total[key] += ((ends[1][key] - ends[0][key]) / 0.02) ** 2
+    assert set(found.stderr) == set(total)
+    for key, square in total.items():
+        assert found.stderr[key] == pytest.approx(np.sqrt(square), rel=0.03), key
+
+
+def test_standard_errors_of_shared_axes_and_of_none(fitted):
+    one = gmwm.bound(fitted)
+    both = gmwm.bound({"gyro_x": fitted, "gyro_y": fitted}, shared=True)["gyro_x"]
+    assert both.K == one.K
+    assert both.stderr["K"] == pytest.approx(one.stderr["K"], rel=1e-6)
+    assert not gmwm.bound(ONE).stderr
+    assert not gmwm.bound(fitted, level=0.95).stderr
+    assert not gmwm.bound(fitted, "N+GM").stderr
+    assert FilterNumbers.from_dict(one.to_dict()) == one
+    assert f"+- {one.stderr['K']:.2g}" in str(one)
+
+
 def test_the_region_reaches_to_the_joint_interval(fitted):
     region = ParameterRegion.of(fitted, 0.95)
     points = region.draws(4000, np.random.default_rng(1))

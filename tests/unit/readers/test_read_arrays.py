@@ -219,7 +219,7 @@ def test_npz_of_objects_only_or_empty(save, tmp_path):
 
 def test_time_in_a_row_message(save, samples):
     stamps = TIME.copy()
-    stamps[40] = stamps[39]
+    stamps[40:] = stamps[39]
     message = problem(save(t=stamps, gx=samples[:, 0]), rate=None)
     assert "a.npz, column 't', row 40 (counted from 0): time stamp 0.39 repeats" in message
 

@@ -580,6 +580,12 @@ def test_names_are_text_not_markup(calibration):
     assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == HOSTILE
 
 
+def test_provenance_is_printable_text(calibration):
+    given = {f"hash of {HOSTILE}\udcff": "\x1b[31m\udcff"}
+    shown = Page(page(calibration, provenance=given))
+    assert f"hash of {HOSTILE}\\udcff: \\x1b[31m\\udcff" in shown.text
+
+
 def test_units_are_text_not_markup(calibration):
     fit = calibration["voltage"]
     hostile = replace(fit, wv=replace(fit.wv, unit=HOSTILE))

@@ -239,6 +239,18 @@ def test_text_can_be_read(tab, scheme):
         tab.scheme("light")
 
 
+def test_a_narrow_screen_from_the_start(tab, path):
+    try:
+        tab.size(420)
+        tab.open(path)
+        assert tab.run("document.documentElement.scrollWidth") <= 420
+        plots = tab.run("Array.from(document.querySelectorAll('.plot svg.main-svg')).map("
+                        "function (p) { return p.getBoundingClientRect().right; })")  # fmt: skip
+        assert max(plots) <= 420
+    finally:
+        tab.size(1300)
+
+
 def test_paper(tab):
     """Three axes take six pages at most; the small table of six takes eight on a real sensor."""
     pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf()))

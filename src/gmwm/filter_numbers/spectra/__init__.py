@@ -6,15 +6,18 @@ from gmwm.filter_numbers.spectra.dominance import (
     dominating,
     with_correlation_times,
 )
+from gmwm.filter_numbers.spectra.propagation import Estimated, standard_errors
 from gmwm.filter_numbers.spectra.region import ParameterRegion, region_targets
 from gmwm.filter_numbers.spectra.target import Target
 
 __all__ = [
     "KINDS",
+    "Estimated",
     "ParameterRegion",
     "Problem",
     "Target",
     "dominating",
     "region_targets",
+    "standard_errors",
     "with_correlation_times",
 ]

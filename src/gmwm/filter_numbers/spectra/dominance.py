@@ -105,16 +105,16 @@ def dominating(problem: Problem, form: str) -> Model:
             "towards zero frequency; use N+K or N+K+GM"
         )
     plain: list[Process] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in kinds)
-    columns = _columns(problem, plain)
+    columns = columns_of(problem, plain)
     if "G" not in kinds:
-        return _scaled(problem, plain, _solved(problem, columns)[0])
+        return _scaled(problem, plain, solved(problem, columns)[0])
 
     def at(log_taus: FloatArray) -> tuple[list[Process], FloatArray]:
         """Gauss-Markov processes of unit amplitude, and the shares with each of them."""
         gauss: list[Process] = [GaussMarkov(1.0, float(tau)) for tau in np.exp(log_taus)]
-        slow = _columns(problem, gauss).T[:, :, None]
+        slow = columns_of(problem, gauss).T[:, :, None]
         fast = np.broadcast_to(columns, (len(gauss), *columns.shape))
-        return gauss, _solved(problem, np.concatenate([fast, slow], axis=2))
+        return gauss, solved(problem, np.concatenate([fast, slow], axis=2))
 
     grid = _correlation_times(problem)
     costs = np.sum(at(grid)[1], axis=1)
@@ -142,7 +142,7 @@ def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -
         processes.append(RandomWalk(1.0))
     processes += [GaussMarkov(1.0, tau) for tau in taus]
     walking = any(process.is_walk for process in processes)
-    shares = _solved(problem, _columns(problem, processes), walking)[0]
+    shares = solved(problem, columns_of(problem, processes), walking)[0]
     least = tuning.LEAST_SHARE * float(np.sum(shares))
     return _scaled(problem, processes, np.maximum(shares, least))
 
@@ -163,28 +163,34 @@ def _correlation_times(problem: Problem) -> FloatArray:
     return np.unique(np.append(np.linspace(low, high, number), inside))
 
 
-def _columns(problem: Problem, processes: Sequence[Process]) -> FloatArray:
+def columns_of(problem: Problem, processes: Sequence[Process]) -> FloatArray:
     """Spectra of processes of unit amplitude over what is needed, per unit of their cost."""
     return np.column_stack(
         [p.psd(problem.f, problem.dt) / problem.need / problem.cost(p) for p in processes]
     )
 
 
-def _solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> FloatArray:
+def solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> FloatArray:
     """The share of the least cost that each of m processes has, for each of b sets: (b, m).
 
     Columns are those of one set, (n, m), or of several, (b, n, m).
     """
-    least = np.zeros(columns.shape[-1])
-    least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.dominated)
-    walk = max(target.walk for target in problem.dominated)
-    if walk > 0.0 and is_walking:
-        least[1] = problem.cost(RandomWalk(1.0)) * walk
+    least = limits(problem, columns.shape[-1], is_walking)
     sets = columns.reshape(-1, *columns.shape[-2:])
     shares = least_sum(sets, least)
     for i in np.flatnonzero(np.any(np.isnan(shares), axis=1)):
         shares[i] = _with_care(sets[i], least)
     return shares
+
+
+def limits(problem: Problem, m: int, is_walking: bool) -> FloatArray:
+    """Least shares of m processes, of which white noise comes first, a walk second."""
+    least = np.zeros(m)
+    least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.dominated)
+    walk = max(target.walk for target in problem.dominated)
+    if walk > 0.0 and is_walking:
+        least[1] = problem.cost(RandomWalk(1.0)) * walk
+    return least
 
 
 def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:

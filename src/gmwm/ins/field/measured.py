@@ -154,7 +154,7 @@ class Measured:
         spec = MeasuredSpec.parse(content)
         if spec.attitude is not None and spec.heading is not None:
             raise InputError("heading and attitude: the attitude has a yaw; leave the heading out")
-        sensors, assumed = _with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
+        sensors, assumed = with_bias(read_models("sensors", spec.sensors, folder), spec.bias.given)
         log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding, cut = _within(
@@ -196,7 +196,7 @@ class Measured:
         )
 
 
-def _with_bias(
+def with_bias(
     models: SensorModels, given: Mapping[str, float]
 ) -> tuple[SensorModels, tuple[Notice, ...]]:
     """Models with a constant that is drawn when a sensor is switched on, and what was assumed."""

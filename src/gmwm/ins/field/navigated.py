@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from gmwm._core.files import written
 from gmwm._core.notices import Notice
@@ -15,12 +16,14 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import Alignment, align, started
+from gmwm.ins.field.alignment import Alignment, align
+from gmwm.ins.field.explanations import LEVEL
+from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
-from gmwm.ins.filter import KINDS, Solution, navigate
+from gmwm.ins.field.replay import Replay, innovation_sizes
+from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu import AXES
-from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
+from gmwm.ins.montecarlo import InnovationTest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,21 +95,15 @@ class Navigated:
             measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
             measured.attitude, measured.attitude_sd,
         )  # fmt: skip
-        imu, aiding = started(measured.imu, measured.aiding, alignment)
-        times = next(each.time for each in aiding.fixes if each.kind == "position")
+        replay = Replay.of(measured, alignment)
+        imu = replay.imu
+        times = next(each.time for each in replay.aiding.fixes if each.kind == "position")
         if not times.size:
             raise InputError("no position fix follows the first one: there is nothing to filter")
-        models = measured.sensors
-        if alignment.gyro_bias_sd is not None:
-            known = {axis: alignment.gyro_bias_sd for axis in AXES[:3]}
-            models = replace(models, bias_sd={**models.bias_sd, **known})
         ends = np.concatenate([[0.0], times, [imu.n * imu.dt]])
         longest = int(np.argmax(np.diff(ends)))
         start, end = float(ends[longest]), float(ends[longest + 1])
-        solution = navigate(
-            imu, alignment.state, models, aiding, initial_sd=alignment.sd, interval=interval,
-            before=(end,),
-        )  # fmt: skip
+        solution = replay.solution(interval, (end,))
         return cls(measured, alignment, solution, _hole(solution, start, end))
 
     # -- numbers ----------------------------------------------------------------------------------
@@ -119,15 +116,19 @@ class Navigated:
         kind : {"position", "velocity"}, optional
             By default both together.
         """
-        found = [KINDS[each] for each in ((kind,) if kind else self.kinds)]
-        innovations = self.solution.innovations
-        parts = [innovations.standard[innovations.kind == each] for each in found]
-        seen = np.concatenate([part[np.isfinite(part)] for part in parts])
-        products = np.concatenate([(part[1:] * part[:-1]).ravel() for part in parts])
-        products = products[np.isfinite(products)]
-        scale = float(np.sqrt(np.sum(products**2)))
-        whiteness = 2.0 * norm.sf(abs(np.sum(products)) / scale) if scale > 0.0 else float("nan")
-        return InnovationTest(chi_square_ratio(seen**2, 1), float(whiteness))
+        return innovation_sizes(self.solution.innovations, kind)
+
+    @cached_property
+    def faults(self) -> Faults:
+        """What explains the innovations better than that all is right; tens of runs of the filter
+        where they contradict it, five where they do not.
+        """
+        return Faults.of(Replay.of(self.measured, self.alignment))
+
+    @property
+    def fault_notices(self) -> tuple[Notice, ...]:
+        """Faults that were found, by code and values; what this motion would show of others."""
+        return tuple(map(fault_notice, self.faults.found))
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -181,28 +182,36 @@ class Navigated:
     def fits(self) -> bool:
         """Whether the innovations do not contradict the filter's model."""
         # Kind by kind: too large positions and too small velocities must not make each other good.
-        return self.solution.diverged_at is None and not self._misfits and self._is_white
+        return (
+            self.solution.diverged_at is None
+            and not self._misfits
+            and self._is_white
+            and not self.faults.found
+        )
 
     @property
     def _misfits(self) -> dict[str, float]:
         """Kinds whose innovations have another size than expected -> how many times it is."""
         tests = {kind: self.test(kind).nis for kind in self.kinds}
         tests["all"] = self.test().nis
-        found = {
-            k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= tuning.CONTRADICTED
-        }
+        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
 
     @property
     def _is_white(self) -> bool:
         whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > tuning.CONTRADICTED)
+        return bool(np.isnan(whiteness) or whiteness > LEVEL)
 
     @property
     def verdict(self) -> Notice:
-        """Whether the filter's model fits these data; only the innovations show it."""
-        sizes = self._misfits
+        """Whether the filter's model fits these data; only the innovations show it.
+
+        A fault of the log comes before a fault of the sensor models.
+        """
+        faults, sizes = self.fault_notices, self._misfits
         largest = max(sizes.values(), default=1.0)
+        if faults and (self.faults.explained or largest <= tuning.LOST):
+            return self._fault_verdict(faults)
         if self.solution.diverged_at is not None:
             return Notice(
                 "diverged", "bad", "",
@@ -237,12 +246,26 @@ class Navigated:
                 sizes,
             )  # fmt: skip
         return Notice(
-            "coloured", "bad", "",
+            "not-white", "bad", "",
             "The filter's model does not fit: innovations are as large as it expects, but depend "
-            "on those before; the errors of the fixes are coloured, or a slow error of the "
-            "sensors is missing in their models.",
+            "on those before; a slow error of the sensors is missing in their models.",
             {"whiteness": self.test().whiteness},
         )  # fmt: skip
+
+    def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
+        first, found = faults[0], self.faults
+        text = "The filter's model does not fit these data: " + "; ".join(
+            f"{fault}" for fault in faults
+        )
+        if found.alternatives:
+            text += f"; nearly as probable: {', '.join(found.alternatives)}"
+        text += (
+            ". With that, the innovations are as large as expected, and white."
+            if found.explained
+            else ". That does not explain all: something else is wrong too."
+        )
+        values = {**first.values, "explained": found.explained, "faults": len(faults)}
+        return Notice(first.code, first.severity, first.where, text, values)
 
     def _cause(self, sizes: dict[str, float]) -> tuple[str, str]:
         """What innovations of these sizes may come from: code and text."""
@@ -285,6 +308,7 @@ class Navigated:
         far, at = self.farthest
         lines += [f"largest: {far:.3g} sigma at {at:.10g} s", "", *self._accuracy(), ""]
         lines += wrapped(self.verdict.text)
+        lines += ["", *wrapped(resolution_notice(self.faults).sentence)]
         return "\n".join(lines)
 
     def _accuracy(self) -> list[str]:
@@ -314,6 +338,23 @@ class Navigated:
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
         return lines + wrapped(text)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was found, in JSON types: the verdict, faults, tests of the innovations."""
+        return {
+            "title": self.measured.title,
+            "verdict": self.verdict.to_dict(),
+            "faults": [each.to_dict() for each in self.fault_notices],
+            "resolution": resolution_notice(self.faults).to_dict(),
+            "notices": [
+                each.to_dict() for each in (*self.measured.notices, *self.alignment.notices)
+            ],
+            "innovations": {
+                kind: {"nis": test.nis.value, "nis_p_value": test.nis.p_value,
+                       "whiteness": None if np.isnan(test.whiteness) else test.whiteness}
+                for kind, test in ((kind, self.test(kind)) for kind in self.kinds)
+            },
+        }  # fmt: skip
 
     def write_solution(self, path: Path) -> Path:
         """Write the solution as a CSV file.

@@ -1,6 +1,6 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, gnss
+from gmwm.ins.filter.aiding import KINDS, Aiding, Events, Fixes, Outage, gnss
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION,
     excess,
@@ -17,7 +17,7 @@ from gmwm.ins.filter.filter_kernels import (
     measurement_row,
     noise_state,
 )
-from gmwm.ins.filter.solution import Solution
+from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import IntArray, SensorStates
 
 __all__ = [
@@ -27,7 +27,9 @@ __all__ = [
     "KINDS",
     "NAVIGATION",
     "Aiding",
+    "Events",
     "Filter",
+    "FilterInnovations",
     "Fixes",
     "InitialSd",
     "IntArray",

@@ -22,6 +22,7 @@ from gmwm.errors import InputError
 from gmwm.ins.geometry import matrix_from_rotation_vector
 from gmwm.ins.imu.emulation import Imu
 from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.process import block_diagonal
 
 Start = Literal["known", "stationary"]
 
@@ -136,7 +137,7 @@ def preintegrate(
     output = block_diag(*[part.output[None, :] for part in parts]) if m else np.zeros((6, 0))
     white = np.diag([part.measurement_noise for part in parts])
     drive, transition, stationary = (
-        _diagonal([getattr(part, name) for part in parts], m)
+        block_diagonal([getattr(part, name) for part in parts])
         for name in ("process_noise", "transition", "initial_covariance")
     )
     steps, dt = _Steps.of(imu.rotation, imu.velocity), imu.dt
@@ -180,11 +181,6 @@ def _start(start: Start | FloatArray, stationary: FloatArray) -> FloatArray:
             "covariance of theirs"
         )
     return given
-
-
-def _diagonal(blocks: list[FloatArray], m: int) -> FloatArray:
-    kept = [block for block in blocks if block.size]
-    return np.asarray(block_diag(*kept)) if kept else np.zeros((m, m))
 
 
 def _cross(v: FloatArray) -> FloatArray:

@@ -1,6 +1,12 @@
 """Many runs of several filters on the same errors, and their statistics."""
 
-from gmwm.ins.montecarlo.consistency import Consistency, InnovationTest, Ratio, chi_square_ratio
+from gmwm.ins.montecarlo.consistency import (
+    Consistency,
+    InnovationTest,
+    Ratio,
+    chi_square_ratio,
+    mean_ratio,
+)
 from gmwm.ins.montecarlo.experiment import Experiment
 from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
 from gmwm.ins.montecarlo.outage_errors import QUANTITIES
@@ -20,4 +26,5 @@ __all__ = [
     "Simulated",
     "Validation",
     "chi_square_ratio",
+    "mean_ratio",
 ]

@@ -71,9 +71,10 @@ class FrameTable:
             raise InputError(f"{place} holds {kind}: give numbers")
         with damage_named(self.source):
             values = self.read(column)
-        if is_time or (pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME):
-            return _from_first(values)
-        found = np.array(values.cast(pa.float64(), safe=False).to_numpy(), dtype=float)
+            is_stamp = pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME
+            if is_time or is_stamp:
+                return _from_first(values)
+            found = np.array(values.cast(pa.float64(), safe=False).to_numpy(), dtype=float)
         check_usable(place, found, self.where)
         return found
 

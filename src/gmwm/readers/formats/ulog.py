@@ -56,6 +56,11 @@ def open_ulog(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable
     InputError
         If it is damaged, holds no IMU at its own rate, or topics have to be chosen.
     """
+    with damage_named(path.name, _damage):  # formats that are damaged lack fields
+        return _tables(path, topics)
+
+
+def _tables(path: Path, topics: Sequence[str]) -> tuple[ArrayTable, ...]:
     sets, notices = _data_sets(path)
     ranks = [
         [_topic(each, frozenset(_UNITS)) for each in sets if each.name == _COMBINED],

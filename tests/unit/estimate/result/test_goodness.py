@@ -39,7 +39,7 @@ class Noise(Process):
 
 class TestResiduals:
     def test_they_are_standard_normal_at_every_level_if_the_model_is_right(self):
-        runs = 150
+        runs = 80
         truth = gmwm.process.as_model(TRUTH)
         residuals = []
         for seed in range(runs):

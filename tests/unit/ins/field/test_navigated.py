@@ -144,8 +144,8 @@ def test_a_good_gyro_finds_north_by_itself(tmp_path):
     [
         ({"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}, "lost"),
         ({"sensors": {"gyro": {"N": "1 deg/s/sqrt(Hz)"}, "accel": {"N": "30000 ug/sqrt(Hz)"}}},
-         "too-small"),
-        ({"position_sd": 0.3}, "too-large"),
+         "sensor-white-noise"),
+        ({"position_sd": 0.3}, "fix-noise"),
     ],
 )  # fmt: skip
 def test_a_wrong_model_is_told(tmp_path, changes, verdict):
@@ -294,9 +294,9 @@ def test_misfits_of_two_kinds_do_not_make_each_other_good(tmp_path):
         Measured.of(content(position_sd=[0.8, 0.8, 1.2], velocity_sd=0.2), tmp_path)
     )
     assert not found.fits
-    assert " in position and " in found.verdict.text
-    assert found.verdict.code == "mixed-sizes"
-    assert found.verdict.values["position"] > 1.0 > found.verdict.values["velocity"]
+    factors = {each.where: each.values["factor"] for each in found.fault_notices}
+    assert {each.code for each in found.fault_notices} == {found.verdict.code} == {"fix-noise"}
+    assert factors["position"] > 1.0 > factors["velocity"]
     assert "which it is not" in str(found)
 
 

@@ -74,7 +74,8 @@ def test_states_are_those_of_the_models():
     assert found.jacobian.shape == (9 + m, m)
     assert len(found.states) == 9 + m
     assert found.states[:1] == ("rotation x",)
-    assert found.states[9] == "gyro_x Gauss-Markov"
+    assert found.states[9:11] == ("gyro_x Gauss-Markov 1", "gyro_x Gauss-Markov 2")
+    assert len(set(found.states)) == len(found.states)
     white = preintegrate(still(2), {"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)})
     assert white.covariance.shape == (9, 9)
     assert white.jacobian.shape == (9, 0)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.jumps import Change, Jumps, find_change, find_jumps
+from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, jumps_of
+from gmwm.readers.clock.uneven import Followed, followed
 
 _UNITS = {
     86400.0: "days",
@@ -43,7 +44,7 @@ class Timing:
     jumps : Jumps
         Where rows are missing.
     notices : tuple of Notice
-        On the clock: its rate, its unit, its jitter, its jumps.
+        On the clock: its rate, its unit, its jitter, its jumps, and what else is uneven.
     jitter : float
         Standard deviation of the steps, as a share of a step.
     """
@@ -70,6 +71,8 @@ class Clock:
         The unit as the header states it.
     where : callable
         Row -> where that is in the file.
+    same : callable
+        Which rows have the samples of the row before; asked where stamps repeat.
     """
 
     source: str
@@ -78,6 +81,7 @@ class Clock:
     seconds: float | None
     own_unit: str
     where: Callable[[int], str]
+    same: Callable[[], BoolArray]
 
     @property
     def place(self) -> str:
@@ -103,22 +107,42 @@ class Clock:
         Raises
         ------
         InputError
-            If a stamp is missing, if they are not increasing or not uniform, if more than half of
-            the rows are missing, or if the stamps contradict what is expected.
+            If a stamp is missing, if most are far from any even clock, if more than half of the
+            rows are missing, or if the stamps contradict what is expected.
+
+        Notes
+        -----
+        Where no step is shorter than half of the usual one, the jumps are those of the steps.
+        Else every row is given its sample number: see `gmwm.readers.clock.uneven`.
         """
         self._check_complete()
+        unwrapped = _unwrapped(self.stamps)
+        if unwrapped is not None:
+            text = "the counter of the time stamps ran over: they were continued"
+            timing = replace(self, stamps=unwrapped).timing(expected)
+            wrapped = Notice("clock-wraps", "note", "", text)
+            return replace(timing, notices=(*timing.notices, wrapped))
+        uneven: Followed | None = None
         with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
             steps = np.diff(self.stamps)
-            self._check_increasing(steps)
-            change = find_change(self.stamps)
-            if change is None:
-                self._check_not_short(steps)
-            jumps = find_jumps(self.stamps)
-            jitter = float(np.std(np.delete(steps, jumps.rows - 1)))
+            increasing = bool(np.all(steps > 0.0))
+            change = find_change(self.stamps[:: 1 if increasing else tuning.ROWS_OF_ROUGH])
+            if change is not None and not increasing:
+                change = replace(change, row=change.row * tuning.ROWS_OF_ROUGH)
+            is_even = increasing and (change is not None or self._short(steps) is None)
+            if is_even:
+                jumps = find_jumps(self.stamps)
+                jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
+                # What is longer than the recording is no gap.
+                is_even = change is not None or not np.any(jumps.missing > self.stamps.size)
+            if not is_even:
+                uneven = self._followed(steps)
+                jumps = jumps_of(uneven)
+                jitter = float(np.std(np.diff(uneven.late)[uneven.is_usual]))
         step = jumps.interval
         if not _SHORTEST_STEP < step < 1.0 / _SHORTEST_STEP:
             raise InputError(
-                f"{self.place}: steps of {step:g} are not those of a clock: {_WAY_OUT}", "clock"
+                f"{self.place}: steps of {step:g} are not those of a clock", "clock", _WAY_OUT
             )
         seconds, guessed = self._unit(step, expected)
         self._check_change(change, seconds)
@@ -133,54 +157,74 @@ class Clock:
         text = (
             f"time stamps (column {self.column}, {_UNITS.get(seconds, self.own_unit)}"
             f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
-            f"vary by {jitter * seconds:.3g} s rms ({jitter / step:.2%} of a step)"
+            f"vary by {jitter * step * seconds:.3g} s rms ({jitter:.2%} of a step)"
         )
-        values = {"rate": rate, "unit": seconds, "jitter": jitter / step}
+        values = {"rate": rate, "unit": seconds, "jitter": jitter}
         notice = Notice("time-stamps", "note", "", text, values)
         notices = [notice, *self._notices_of_jumps(jumps, seconds)]
         if change is not None:
             notices.append(self._notice_of_change(change, seconds, rate))
-        return Timing(rate, jumps, tuple(notices), jitter / step)
+        if uneven is not None:
+            notices += self._notices_of_uneven(uneven, jumps, seconds)
+        return Timing(rate, jumps, tuple(notices), jitter)
 
     def _check_complete(self) -> None:
         bad = np.flatnonzero(np.isnan(self.stamps))
         if bad.size:
             others = f", and {bad.size - 1:,} more such" if bad.size > 1 else ""
             raise InputError(
-                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}: remove such "
-                f"lines, or, {_WAY_OUT}",
+                f"{self.place}, {self.where(int(bad[0]))}: no time stamp{others}",
                 "clock",
-            )
-
-    def _check_increasing(self, steps: FloatArray) -> None:
-        bad = np.flatnonzero(~(steps > 0.0))
-        if bad.size:
-            row = int(bad[0]) + 1
-            what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
-            raise InputError(
-                f"{self.place}, {self.where(row)}: time stamp {self.stamps[row]:.15g} {what}: "
                 f"remove such lines, or, {_WAY_OUT}",
-                "clock",
             )
 
-    def _check_not_short(self, steps: FloatArray) -> None:
-        median = float(np.median(steps))
-        bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median))
-        if bad.size:
-            row = int(bad[0]) + 1
-            raise InputError(
-                f"{self.place}, {self.where(row)}: a step of {steps[row - 1]:.6g} where "
-                f"{median:.6g} is usual: use a part of the file with an even clock, or, {_WAY_OUT}",
-                "clock",
-            )
+    def _followed(self, steps: FloatArray) -> Followed:
+        """Number the rows one by one, if there is a clock that most of them agree on."""
+        repeats = steps == 0.0
+        same = np.zeros(self.stamps.size, dtype=bool)
+        if np.any(repeats):
+            same[1:] = repeats & self.same()[1:]
+        found = None
+        if float(np.spacing(np.max(np.abs(self.stamps)))) < 0.1 * np.median(
+            np.abs(steps[~repeats])
+        ):
+            found = followed(self.stamps, same)
+        if found is None or not found.is_a_clock:
+            raise self._no_clock(steps)
+        return found
+
+    def _no_clock(self, steps: FloatArray) -> InputError:
+        """The first step that no clock has, and how many there are."""
+        wrong, what = np.flatnonzero(steps < 0.0) + 1, "goes back"
+        if not wrong.size:
+            wrong, what = np.flatnonzero(steps == 0.0) + 1, "repeats the one before"
+        if not wrong.size:
+            short = self._short(steps)
+            row = int(np.argmax(steps)) + 1 if short is None else short
+            wrong = np.array([row])
+            what = f"is {steps[row - 1]:.6g} after the one before, {np.median(steps):.6g} is usual"
+        row = int(wrong[0])
+        others = f", and {wrong.size - 1:,} more such" if wrong.size > 1 else ""
+        return InputError(
+            f"{self.place}, {self.where(row)}: time stamp {self.stamps[row]:.15g} {what}{others}, "
+            "so that no even clock fits most of them",
+            "clock",
+            f"sort the rows or use a part with an even clock, or, {_WAY_OUT}",
+        )
+
+    def _short(self, steps: FloatArray) -> int | None:
+        """First row after a step that rounding does not make so short."""
+        bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * float(np.median(steps))))
+        return int(bad[0]) + 1 if bad.size else None
 
     def _check_change(self, change: Change | None, seconds: float) -> None:
         if change is not None and change.ratio > tuning.SHARP_CHANGE:
             first, then = (rate / seconds for rate in change.rates)
             raise InputError(
                 f"{self.place}, near {self.where(change.row)}: the sampling rate goes from "
-                f"{first:.4g} to {then:.4g} Hz: use the part before or after",
-                "clock",
+                f"{first:.4g} to {then:.4g} Hz",
+                "rate-changes",
+                "use the part before or after",
             )
 
     def _notice_of_change(self, change: Change, seconds: float, used: float) -> Notice:
@@ -188,7 +232,7 @@ class Clock:
         when = float(self.stamps[change.row] - self.stamps[0]) * seconds
         text = (
             f"the sampling rate goes from {first:.4g} to {then:.4g} Hz at about {when:.4g} s, and "
-            f"{used:.6g} Hz, its mean, is the rate of neither"
+            f"{used:.6g} Hz, between the two, is the rate of neither"
         )
         values = {"before": first, "after": then, "time": when, "rate": used}
         action = f"use the part before or after ({self.where(change.row)})"
@@ -200,8 +244,9 @@ class Clock:
             raise InputError(
                 f"{self.place}, {self.where(row)}: a step of two intervals, and "
                 f"{jumps.rows.size - 1:,} more such at even distances, as if the stamps were "
-                f"rounded too coarsely: {_WAY_OUT}",
+                "rounded too coarsely",
                 "clock",
+                _WAY_OUT,
             )
         n = self.stamps.size
         if jumps.total > n:
@@ -210,8 +255,9 @@ class Clock:
                 f"{self.place}, {self.where(row)}: the clock jumps by "
                 f"{jumps.missing[jumps.longest]:,.6g} sampling intervals, and in all "
                 f"{jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
-                f"the recording: use the part before or after, or, {_WAY_OUT}",
+                "the recording",
                 "clock",
+                f"use the part before or after, or, {_WAY_OUT}",
             )
 
     def _notices_of_jumps(self, jumps: Jumps, seconds: float) -> list[Notice]:
@@ -241,6 +287,44 @@ class Clock:
             notices.append(Notice("clock-off-grid", "note", "", text, values))
         return notices
 
+    def _notices_of_uneven(self, found: Followed, jumps: Jumps, seconds: float) -> list[Notice]:
+        """Bursts, rows that come twice, stamps far from the clock, and a clock that was set."""
+        notices = []
+        if found.burst > 1:
+            text = (
+                f"{found.burst} rows come with one stamp, usually: it is taken as that of the last "
+                "of them, and the others are one sampling interval apart"
+            )
+            notices.append(Notice("stamps-in-bursts", "note", "", text, {"rows": found.burst}))
+        if count := jumps.repeated.size:
+            text = f"{count:,} row{'s repeat the rows' if count > 1 else ' repeats the row'} before"
+            values = {"count": count}
+            notices.append(Notice("rows-repeated", "note", "", text, values, "left out"))
+        astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
+        if astray.size:
+            worst = astray[np.argmax(np.abs(found.late[astray]))]
+            by = float(found.late[worst]) * jumps.interval * seconds
+            text = (
+                f"{astray.size:,} time stamp{'s are' if astray.size > 1 else ' is'} far from the "
+                f"clock, at most by {by:.3g} s ({self.where(int(worst))}): the samples were taken "
+                "as evenly spaced"
+            )
+            notices.append(
+                Notice("stamps-astray", "note", "", text, {"count": astray.size, "largest": by})
+            )
+        if count := jumps.set_at.size:
+            far = (self.stamps[jumps.set_at] - self.stamps[jumps.set_at - 1]) * seconds
+            first, largest = int(jumps.set_at[0]), float(far[np.argmax(np.abs(far))])
+            times = "once" if count == 1 else f"{count:,} times"
+            text = (
+                f"the clock was set {times}, farthest by {largest:+.6g} s, first at "
+                f"{self.where(first)}: the samples were taken as evenly spaced there"
+            )
+            numbers = {"count": float(count), "largest": largest}
+            action = "if samples are missing there, use the part before or after"
+            notices.append(Notice("clock-set", "warning", "", text, numbers, action))
+        return notices
+
     def _unit(self, step: float, expected: float | None) -> tuple[float, bool]:
         """The unit in seconds, and whether it is a guess."""
         if self.seconds is not None:
@@ -258,3 +342,20 @@ class Clock:
                 "time-unit",
             )
         return 1.0, True
+
+
+def _unwrapped(stamps: FloatArray) -> FloatArray | None:
+    """Stamps of a counter of 16 or 32 bit that ran over, continued; None if it did not."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(stamps)
+        back = np.flatnonzero(steps < 0.0)
+        if not back.size:
+            return None
+        usual = float(np.median(steps))
+        for bits in (16, 32):
+            forward = steps[back] + 2.0**bits
+            if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):
+                wraps = np.zeros(stamps.size)
+                wraps[back + 1] = 2.0**bits
+                return np.asarray(stamps + np.cumsum(wraps))
+    return None

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
 from gmwm.readers import tuning
+from gmwm.readers.clock.line import interval_of
+from gmwm.readers.clock.uneven import Followed
 
 _Rows = npt.NDArray[np.int64]
 
@@ -18,7 +20,7 @@ _LONG = 2.25
 
 @dataclass(frozen=True)
 class Jumps:
-    """Where a clock jumps forward.
+    """Where a clock jumps forward, which rows come twice, and where the clock was set.
 
     Attributes
     ----------
@@ -30,12 +32,18 @@ class Jumps:
         Whole number of rows that are missing there, one or more.
     interval : float
         Sampling interval, in the unit of the stamps.
+    repeated : (r,) ndarray of int
+        Rows that repeat the one before them.
+    set_at : (s,) ndarray of int
+        First row after each time that the clock was set.
     """
 
     rows: _Rows
     steps: FloatArray
     missing: FloatArray
     interval: float
+    repeated: _Rows = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    set_at: _Rows = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def total(self) -> float:
@@ -59,10 +67,11 @@ class Jumps:
         A clock of 700 Hz that is written in whole milliseconds steps by 1 and now and then by 2,
         in a rhythm; rows are lost without one.
         """
-        if self.rows.size < tuning.FEWEST_IN_RHYTHM or np.any(self.missing > 1.0):
+        single = self.missing == 1.0
+        if np.count_nonzero(single) < max(tuning.FEWEST_IN_RHYTHM, 0.9 * self.rows.size):
             return False
-        distance = np.diff(self.rows)
-        return bool(np.std(distance) <= 0.5 + 0.1 * np.mean(distance))
+        low, usual, high = np.quantile(np.diff(self.rows), [0.25, 0.5, 0.75])
+        return bool(high - low <= 1.0 + 0.1 * usual)
 
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
@@ -73,12 +82,15 @@ class Jumps:
 
         Returns
         -------
-        (n + total,) ndarray
-            NaN where a row is missing.
+        ndarray
+            NaN where a row is missing; without those that repeat another.
         """
+        if self.repeated.size:
+            values = np.delete(values, self.repeated)
         if not self.rows.size:
             return values
-        ends = np.append(self.rows, values.size)
+        rows = self.rows - np.searchsorted(self.repeated, self.rows)
+        ends = np.append(rows, values.size)
         result = np.full(values.size + int(self.total), np.nan)
         result[: ends[0]] = values[: ends[0]]
         shift = np.cumsum(self.missing).astype(np.int64)
@@ -131,6 +143,8 @@ def find_change(stamps: FloatArray) -> Change | None:
     rows = np.array_split(steps, parts)
     medians = np.array([np.median(part) for part in rows])
     usual = [part[part < _LONG * median] for part, median in zip(rows, medians, strict=True)]
+    if not all(part.size for part in usual):
+        return None
     means = np.array([np.mean(part) for part in usual])
     if not (np.all(means > 0.0) and np.all(np.isfinite(means))):
         return None
@@ -160,8 +174,7 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     Returns
     -------
     Jumps
-        The sampling interval is the time from the first to the last stamp over the number of
-        intervals between them, those of missing rows included.
+        The sampling interval is the slope of a robust line through the stamps.
 
     Notes
     -----
@@ -179,10 +192,31 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     missing = np.maximum(np.rint(advance) - 1.0, 0.0)
     real = missing > 0.0
     rows, advance, missing = candidates[real], advance[real], missing[real]
+    advances = np.ones(stamps.size, dtype=np.int64)
+    advances[rows] += missing.astype(np.int64)
     # What a jump off the grid goes beyond it belongs to no interval.
-    beyond = np.sum((advance - 1.0 - missing)[_off_grid(advance, missing)])
-    span = stamps[-1] - stamps[0] - interval * beyond
-    return Jumps(rows, advance, missing, float(span / (steps.size + np.sum(missing))))
+    starts = np.zeros(stamps.size, dtype=bool)
+    starts[rows[_off_grid(advance, missing)]] = True
+    line = interval_of(stamps, np.cumsum(advances), starts)
+    return Jumps(rows, advance, missing, line)
+
+
+def jumps_of(found: Followed) -> Jumps:
+    """The jumps of a clock that was followed row by row."""
+    rows = np.flatnonzero(found.advance > 1)
+    missing = np.asarray(found.advance[rows] - 1, dtype=np.float64)
+    reach = np.arange(tuning.NEIGHBOURS)
+    last = found.late.size - 1
+    later = np.median(found.late[np.minimum(rows[:, None] + reach, last)], axis=1)
+    earlier = np.median(found.late[np.maximum(rows[:, None] - 1 - reach, 0)], axis=1)
+    return Jumps(
+        rows=rows,
+        steps=1.0 + missing + later - earlier,
+        missing=missing,
+        interval=found.interval,
+        repeated=np.flatnonzero(found.advance == 0)[1:],
+        set_at=np.flatnonzero(found.is_set),
+    )
 
 
 def _off_grid(steps: FloatArray, missing: FloatArray) -> npt.NDArray[np.bool_]:

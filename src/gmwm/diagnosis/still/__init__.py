@@ -1,0 +1,5 @@
+"""Stretches of a field log in which the sensor is at rest."""
+
+from gmwm.diagnosis.still.stretches import Still, find_still, rest_of
+
+__all__ = ["Still", "find_still", "rest_of"]

@@ -1,0 +1,240 @@
+"""What may be wrong with a log: each is tried as a filter that allows for it.
+
+An explanation changes what the filter assumes. Its parameters are those under which the fixes are
+most probable, and its gain is by how much more probable they are (a likelihood ratio). Constant
+errors, which move the innovations in proportion, are estimated by least squares from the
+innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom. Control* 14, 359-367).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._core.typing import FloatArray
+from gmwm.ins import tuning
+from gmwm.ins.field.replay import Replay
+
+TESTS = 14
+"""Ways in which a log can contradict a filter, or be explained better: each gets its share of the
+probability of a false alarm."""
+
+LEVEL = tuning.CONTRADICTED / TESTS
+"""Of each test: right models are blamed with ``tuning.CONTRADICTED`` at most (Bonferroni)."""
+
+Change = Callable[[Replay], Replay]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A change of what a filter assumes.
+
+    Attributes
+    ----------
+    code, where : str
+        What is wrong, and with what.
+    change : callable
+        What is assumed of any log.
+    replay : Replay
+        This log under the changed assumptions.
+    gain : float
+        Of the log-likelihood of the fixes.
+    cost : float
+        Gain that is reached by chance with the probability of a false alarm.
+    values, errors : dict
+        What was estimated, in SI units, and standard errors.
+    """
+
+    code: str
+    where: str
+    change: Change
+    replay: Replay
+    gain: float
+    cost: float
+    values: dict[str, float] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def excess(self) -> float:
+        """Gain beyond what chance gives."""
+        return self.gain - self.cost
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An explanation that is worth a closer look if its first gain is among the largest.
+
+    Attributes
+    ----------
+    codes : frozenset of str
+        What would be found.
+    gain : float
+        A first guess, after few runs of the filter.
+    refined : callable
+        What is found; several that go together have the same gain and cost.
+    errors : dict
+        Standard errors of constant errors that are estimated together, whether there are any or
+        not.
+    """
+
+    codes: frozenset[str]
+    gain: float
+    refined: Callable[[], tuple[Explanation, ...]]
+    errors: dict[str, float] = field(default_factory=dict)
+
+
+def cost(parameters: int, among: int = 1) -> float:
+    """Gain of a right model by chance, with its share of the probability of a false alarm."""
+    return float(0.5 * chi2.isf(LEVEL / among, parameters))
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant error: how it is allowed for, steps of its derivatives, and what is possible."""
+
+    code: str
+    names: tuple[str, ...]
+    change: Callable[[Replay, FloatArray], Replay]
+    step: float
+    prior: float
+
+
+_CLOCK = Constant(
+    "time-offset", ("time offset",), lambda r, x: r.later(-float(x[0])), 0.05,
+    tuning.LARGEST_OFFSET,
+)  # fmt: skip
+_ARM = Constant(
+    "lever-arm", ("forward", "right", "down"), lambda r, x: r.with_arm_longer(x), 0.5,
+    tuning.LARGEST_ARM,
+)  # fmt: skip
+_HEADING = Constant(
+    "heading", ("heading",), lambda r, x: r.turned(float(x[0])), 0.01, 0.5 * np.pi
+)  # fmt: skip
+TOGETHER = ((_CLOCK,), (_ARM,), (_HEADING,), (_CLOCK, _ARM))
+"""What is tried. Along a straight track at constant speed a time offset is a lever arm, so that one
+of the two alone takes up what the other does; both together are right."""
+
+
+def constant_errors(base: Replay) -> Iterator[Candidate]:
+    """Stamps, antenna, heading: five runs of the filter and one."""
+    columns = {
+        each.code: _columns(
+            base, lambda x, each=each: each.change(base, x), _steps((each,)),  # type: ignore[misc]
+            np.zeros(len(each.names)),
+        )
+        for each in (_CLOCK, _ARM, _HEADING)
+    }  # fmt: skip
+    for errors in TOGETHER:
+        found = [column for each in errors for column in columns[each.code]]
+        _, covariance, gain = _step(base, found, errors, np.zeros(len(found)))
+
+        def refined(errors: tuple[Constant, ...] = errors) -> tuple[Explanation, ...]:
+            return _fitted(base, base, errors)
+
+        names = [name for each in errors for name in each.names]
+        deviations = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        yield Candidate(
+            frozenset(each.code for each in errors), gain, refined, deviations
+        )  # fmt: skip
+
+
+def far_heading(base: Replay) -> Candidate:
+    """A heading that is wrong by much, as of an IMU that is mounted rotated."""
+    angles = np.arange(1, tuning.HEADINGS) * (2.0 * np.pi / tuning.HEADINGS)
+    tried = [base.turned(float(angle), tuning.ROUGH_HEADING) for angle in angles]
+    best = int(np.argmax([each.log_likelihood for each in tried]))
+    angle = float(angles[best])
+
+    def refined() -> tuple[Explanation, ...]:
+        return _fitted(base, base.turned(angle, tuning.FINE_HEADING), (_HEADING,), angle)
+
+    return Candidate(frozenset({"heading"}), difference(tried[best], base), refined)
+
+
+def _fitted(
+    base: Replay, here: Replay, errors: tuple[Constant, ...], start: float = 0.0
+) -> tuple[Explanation, ...]:
+    """Constant errors by Gauss-Newton, one explanation each; ``start`` is in ``here`` already."""
+    origin, parts = here, _parts(errors)
+    theta = np.zeros(parts[-1].stop)
+
+    def changed(x: FloatArray) -> Replay:
+        replay = origin
+        for each, part in zip(errors, parts, strict=True):
+            replay = each.change(replay, x[part])
+        return replay
+
+    covariance = np.eye(theta.size)
+    for _ in range(tuning.ROUNDS):
+        columns = _columns(here, changed, _steps(errors), theta)
+        move, covariance, promised = _step(here, columns, errors, theta)
+        tried = theta + move
+        if errors[0] is _CLOCK:
+            tried[0] = np.clip(tried[0], -tuning.LARGEST_OFFSET, tuning.LARGEST_OFFSET)
+        new = changed(tried)
+        if not new.log_likelihood > here.log_likelihood:
+            break
+        theta, here = tried, new
+        if promised < tuning.SETTLED_GAIN:
+            break
+    if not np.any(theta) and start == 0.0:
+        return ()
+    gain, deviations = difference(here, base), np.sqrt(np.diag(covariance))
+    if start != 0.0:
+        theta[0] = (theta[0] + start + np.pi) % (2.0 * np.pi) - np.pi
+    found = []
+    for each, part in zip(errors, parts, strict=True):
+        values = dict(zip(each.names, theta[part].tolist(), strict=True))
+        spread = dict(zip(each.names, deviations[part].tolist(), strict=True))
+
+        def change(replay: Replay, each: Constant = each, x: FloatArray = theta[part]) -> Replay:
+            return each.change(replay, x)
+
+        found.append(
+            Explanation(each.code, "", change, here, gain, cost(theta.size), values, spread)
+        )
+    return tuple(found)
+
+
+def _steps(errors: tuple[Constant, ...]) -> FloatArray:
+    return np.concatenate([np.full(len(each.names), each.step) for each in errors])
+
+
+def _parts(errors: tuple[Constant, ...]) -> list[slice]:
+    ends = np.cumsum([len(each.names) for each in errors]).tolist()
+    return [slice(end - len(each.names), end) for each, end in zip(errors, ends, strict=True)]
+
+
+def _columns(
+    here: Replay, changed: Callable[[FloatArray], Replay], steps: FloatArray, theta: FloatArray
+) -> list[FloatArray]:
+    """Derivatives of the innovations in their standard deviations."""
+    return [
+        (changed(theta + step * unit).standard - here.standard) / step
+        for step, unit in zip(steps, np.eye(theta.size), strict=True)
+    ]
+
+
+def _step(
+    here: Replay, columns: list[FloatArray], errors: tuple[Constant, ...], theta: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Gauss-Newton: the move, the covariance after it, and the gain that it promises."""
+    prior = np.concatenate([np.full(len(each.names), each.prior**-2) for each in errors])
+    J = np.stack([each.ravel() for each in columns], axis=1)
+    z = here.standard.ravel()
+    seen = np.isfinite(z) & np.all(np.isfinite(J), axis=1)
+    J, z = J[seen], z[seen]
+    score = J.T @ z + prior * theta
+    covariance = np.linalg.inv(J.T @ J + np.diag(prior))
+    move = -covariance @ score
+    return move, covariance, float(-0.5 * score @ move)
+
+
+def difference(replay: Replay, base: Replay) -> float:
+    """Gain of the log-likelihood; -inf if the filter diverges."""
+    if not np.isfinite(replay.log_likelihood):
+        return -np.inf
+    return replay.log_likelihood - base.log_likelihood

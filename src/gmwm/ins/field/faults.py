@@ -1,0 +1,274 @@
+"""The fault that a log shows: looked for before the sensor models are blamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.notices import Notice, Severity
+from gmwm.ins import tuning
+from gmwm.ins.field.explanations import (
+    LEVEL,
+    Candidate,
+    Explanation,
+    constant_errors,
+    cost,
+    far_heading,
+)
+from gmwm.ins.field.noises import coloured, fix_noise, outliers, sensor_noise
+from gmwm.ins.field.replay import Replay
+
+_CONSTANT = frozenset({"time-offset", "lever-arm", "heading"})
+
+
+@dataclass(frozen=True, eq=False)
+class Faults:
+    """What explains the innovations of a log better than that all is right.
+
+    Attributes
+    ----------
+    found : tuple of Explanation
+        Each given those before it; empty if there is none.
+    alternatives : tuple of str
+        Codes that explain the log nearly as well as the first.
+    explained : bool
+        Whether the innovations agree with the filter, with these allowed for.
+    replay : Replay
+        The log with these allowed for.
+    resolution : dict
+        Constant error -> its standard error from this motion, s, m, rad.
+    """
+
+    found: tuple[Explanation, ...]
+    alternatives: tuple[str, ...]
+    explained: bool
+    replay: Replay
+    resolution: dict[str, float]
+
+    @classmethod
+    def of(cls, whole: Replay) -> Faults:
+        """Look for faults.
+
+        One after the other, the explanation is taken that makes the fixes most probable, as long as
+        it is more than chance would give.
+
+        Parameters
+        ----------
+        whole : Replay
+        """
+        base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
+        here, found = base, list[Explanation]()
+        alternatives: tuple[str, ...] = ()
+        resolution: dict[str, float] = {}
+        while len(found) < tuning.MOST_FAULTS:
+            first = list(constant_errors(here))
+            alone = {name: e for each in first[:-1] for name, e in each.errors.items()}
+            # Those of stamps and antenna together, for each could be taken for the other.
+            resolution = alone | first[-1].errors
+            known = _CONSTANT & {each.code for each in found}
+            refined = _best(_candidates(here, first, known))
+            if not refined or refined[0][0].excess <= 0.0:
+                break
+            best = refined[0]
+            if not found:
+                alternatives = tuple(
+                    each[0].code for each in refined[1:]
+                    if each[0].excess > max(best[0].excess - tuning.AMBIGUOUS, 0.0)
+                    and each[0].code not in {one.code for one in best}
+                )  # fmt: skip
+                if len(best) == 1 and best[0].code in first[-1].codes and any(
+                    resolution[name] > tuning.SEEN * alone[name] for name in best[0].values
+                ):  # fmt: skip
+                    other = first[-1].codes - {best[0].code}
+                    alternatives = tuple(sorted({*alternatives, *other}))
+            found += best
+            here = found[-1].replay
+        found, here = _cleaned_again(base, found, here)
+        return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
+
+
+def contradicted(replay: Replay) -> bool:
+    """Whether the innovations have another size than expected, or depend on those before."""
+    if not np.isfinite(replay.log_likelihood):
+        return True
+    tests = [replay.test(kind) for kind in replay.kinds()]
+    return any(each.nis.p_value <= LEVEL or each.whiteness <= LEVEL for each in tests)
+
+
+def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str]) -> list[Candidate]:
+    """Those worth a look; the costly ones only where something is wrong."""
+    found = constants
+    cleaned = outliers(here)
+    if cleaned is not None:
+        found.append(cleaned)
+    if contradicted(here) or any(each.gain > cost(1) for each in found):
+        sizes = [here.test(kind).nis.value for kind in here.kinds()]
+        if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
+            found.append(far_heading(here))
+        slow = coloured(here)
+        if slow is not None:
+            found.append(slow)
+        found += [*fix_noise(here), *sensor_noise(here)]
+    return [each for each in found if not each.codes & known]
+
+
+def _best(candidates: list[Candidate]) -> list[tuple[Explanation, ...]]:
+    """The most probable explanations, best first."""
+    promising = [each for each in candidates if each.gain > cost(1)]
+    promising = sorted(promising, key=lambda each: -each.gain)[: tuning.REFINED]
+    refined = [each.refined() for each in promising]
+    return sorted((each for each in refined if each), key=lambda each: -each[0].excess)
+
+
+def _cleaned_again(
+    base: Replay, found: list[Explanation], here: Replay
+) -> tuple[list[Explanation], Replay]:
+    """Outliers anew, where something else was found after them that made good fixes look bad."""
+    codes = [each.code for each in found]
+    if "outliers" not in codes or codes[-1] == "outliers":
+        return found, here
+    others = [each for each in found if each.code != "outliers"]
+    replay = base
+    for each in others:
+        replay = each.change(replay)
+    cleaned = outliers(replay)
+    if cleaned is None:
+        return (others, replay) if not contradicted(replay) else (found, here)
+    (again,) = cleaned.refined()
+    place = codes.index("outliers")
+    return [*others[:place], again, *others[place:]], again.replay
+
+
+# -- words ----------------------------------------------------------------------------------------
+
+_MOTION = {
+    "time offset": ("time-offset", "a time offset of the fixes", "s", 1.0),
+    "forward": ("lever-arm", "a lever arm forward", "m", 1.0),
+    "right": ("lever-arm", "a lever arm to the right", "m", 1.0),
+    "down": ("lever-arm", "a lever arm down", "m", 1.0),
+    "heading": ("heading", "a wrong initial heading", "deg", float(np.degrees(1.0))),
+}
+
+
+def fault_notice(fault: Explanation) -> Notice:
+    """A fault as a notice: ``values`` holds what was estimated, SI, and standard errors."""
+    values = {**fault.values, **{f"{name} error": each for name, each in fault.errors.items()}}
+    text, action = _WORDS[fault.code](fault)
+    return Notice(fault.code, _severity(fault), fault.where, text, values, action)
+
+
+def resolution_notice(faults: Faults) -> Notice:
+    """How small a constant error this motion shows, and which it does not show."""
+    seen: list[tuple[str, float, str]] = []
+    unseen: list[tuple[str, float, str]] = []
+    values: dict[str, float] = {}
+    for name, (_, what, unit, factor) in _MOTION.items():
+        if name not in faults.resolution:
+            continue
+        least = tuning.SEEN * faults.resolution[name]
+        values[name] = faults.resolution[name]
+        usual = tuning.UNSEEN["heading" if name == "heading" else unit]
+        (unseen if least > usual else seen).append((what, least * factor, unit))
+    text = "; ".join(f"{what} of {least:.2g} {unit}" for what, least, unit in seen)
+    text = f"this motion shows {text}" if seen else "this motion shows no constant error"
+    if unseen:
+        text += "; it does not show " + ", ".join(what for what, *_ in unseen)
+    return Notice("resolution", "note", "", text, values)
+
+
+def _severity(fault: Explanation) -> Severity:
+    mild = 1.0 / tuning.MILD < fault.values.get("factor", np.inf) < tuning.MILD
+    return "warning" if fault.code == "fix-noise" and mild else "bad"
+
+
+def _time(fault: Explanation) -> tuple[str, str]:
+    offset = fault.values["time offset"]
+    text = (
+        f"the fixes are stamped {abs(offset):.3g} s too {'late' if offset > 0.0 else 'early'} "
+        f"(standard error {fault.errors['time offset']:.1g} s)"
+    )
+    return text, "subtract it from their times" if offset > 0.0 else "add it to their times"
+
+
+def _arm(fault: Explanation) -> tuple[str, str]:
+    parts = ", ".join(
+        f"{fault.values[name]:.2f} m {name} ({fault.errors[name]:.1g})"
+        for name in ("forward", "right", "down")
+    )
+    arm = ",".join(f"{each:.2f}" for each in np.asarray(fault.replay.aiding.lever_arm))
+    return (
+        f"the antenna is off the lever arm by {parts}, standard errors in brackets",
+        f"give the lever arm {arm}, or measure it",
+    )
+
+
+def _heading(fault: Explanation) -> tuple[str, str]:
+    by, yaw = np.degrees(fault.values["heading"]), np.degrees(fault.replay.state.rpy[2]) % 360.0
+    return (
+        f"the heading that the filter started with is wrong by {by:.1f} deg (standard error "
+        f"{np.degrees(fault.errors['heading']):.1g} deg): the IMU is mounted rotated, or drives "
+        "backwards",
+        f"give the heading {yaw:.1f} deg, or turn the axes to forward, right, down",
+    )
+
+
+def _outliers(fault: Explanation) -> tuple[str, str]:
+    count = int(fault.values["count"])
+    share = f"{100.0 * fault.values['fraction']:.2g} %"
+    return (
+        f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
+        "leave them out",
+    )
+
+
+def _coloured(fault: Explanation) -> tuple[str, str]:
+    size = ", ".join(f"{fault.values[name]:.2g}" for name in ("north", "east", "down"))
+    return (
+        f"the errors of the fixes are coloured: {size} m (north, east, down) with a correlation "
+        f"time of {fault.values['tau']:.2g} s, beside white noise of {fault.values['factor']:.2g} "
+        "times their standard deviations",
+        "the filter is too sure of its position by that; let it estimate the coloured error",
+    )
+
+
+def _fix_noise(fault: Explanation) -> tuple[str, str]:
+    factor = fault.values["factor"]
+    return (
+        f"the fixes are {_times(factor)} their standard deviations",
+        f"multiply those by {factor:.2g}",
+    )
+
+
+def _white(fault: Explanation) -> tuple[str, str]:
+    factor = fault.values["factor"]
+    return (
+        f"white noise is {_times(factor)} the model's",
+        f"the sensor model is wrong: multiply N by {factor:.2g}, or calibrate again; vibration "
+        "adds to it",
+    )
+
+
+def _slow(fault: Explanation) -> tuple[str, str]:
+    factor = fault.values["factor"]
+    return (
+        f"slow errors and biases are {_times(factor)} the model's",
+        "the sensor model or the bias is wrong: calibrate again, or give the bias",
+    )
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.2g} times"
+
+
+_WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {
+    "time-offset": _time,
+    "lever-arm": _arm,
+    "heading": _heading,
+    "outliers": _outliers,
+    "coloured": _coloured,
+    "fix-noise": _fix_noise,
+    "sensor-white-noise": _white,
+    "sensor-slow-errors": _slow,
+}

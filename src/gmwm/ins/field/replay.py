@@ -1,0 +1,190 @@
+"""A log ready for the filter, to be filtered again under other assumptions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import norm
+
+from gmwm._core.typing import FloatArray
+from gmwm.ins.field.alignment import Alignment, started
+from gmwm.ins.field.measured import Measured
+from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
+from gmwm.ins.geometry import matrix_from_rpy, offset
+from gmwm.ins.imu import AXES, Imu, SensorModels
+from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
+from gmwm.ins.trajectory import NavState
+from gmwm.process import Model, Process
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What a filter of real data starts from.
+
+    Attributes
+    ----------
+    imu : Imu
+        From the first epoch of the filter on.
+    state : NavState
+        At that epoch.
+    sd : InitialSd
+    models : SensorModels
+    aiding : Aiding
+        On the time of ``imu``.
+    """
+
+    imu: Imu
+    state: NavState
+    sd: InitialSd
+    models: SensorModels
+    aiding: Aiding
+
+    @classmethod
+    def of(cls, measured: Measured, alignment: Alignment) -> Replay:
+        """Real data from where they are aligned.
+
+        Parameters
+        ----------
+        measured : Measured
+        alignment : Alignment
+        """
+        imu, aiding = started(measured.imu, measured.aiding, alignment)
+        models = measured.sensors
+        if alignment.gyro_bias_sd is not None:
+            known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
+            models = replace(models, bias_sd={**models.bias_sd, **known})
+        return cls(imu, alignment.state, alignment.sd, models, aiding)
+
+    # -- what comes of it -------------------------------------------------------------------------
+
+    def solution(self, interval: float, before: tuple[float, ...] = ()) -> Solution:
+        """The filter's solution every ``interval`` (s), and ``before`` the fixes of some times."""
+        return navigate(
+            self.imu, self.state, self.models, self.aiding, initial_sd=self.sd, interval=interval,
+            before=before,
+        )  # fmt: skip
+
+    @cached_property
+    def innovations(self) -> FilterInnovations:
+        """Of all fixes."""
+        return self.solution(self.imu.n * self.imu.dt).innovations
+
+    @cached_property
+    def standard(self) -> FloatArray:
+        """Innovations in their expected standard deviations, (E, 3)."""
+        return self.innovations.standard
+
+    @cached_property
+    def log_likelihood(self) -> float:
+        """Of all fixes by their innovations, but for a constant; -inf if the filter diverged.
+
+        The innovations of a filter that is right are white, so that the density of the fixes is the
+        product of theirs (Schweppe 1965, *IEEE Trans. Inf. Theory* 11, 61-70).
+        """
+        standard = self.standard
+        if np.any(np.all(np.isnan(standard), axis=1)):
+            return -np.inf
+        return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(self.innovations.sd)))
+
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of fixes that there are, whose innovations are judged."""
+        return tuple(dict.fromkeys(
+            each.kind for each in self.aiding.fixes if each.time.size and each.kind != "standstill"
+        ))  # fmt: skip
+
+    def test(self, kind: str | None = None) -> InnovationTest:
+        """Size and whiteness of the innovations of a kind, or of all; see `innovation_sizes`."""
+        return innovation_sizes(self.innovations, kind)
+
+    # -- other assumptions ------------------------------------------------------------------------
+
+    def later(self, seconds: float) -> Replay:
+        """Fixes with stamps as much later."""
+        fixes = tuple(replace(each, time=each.time + seconds) for each in self.aiding.fixes)
+        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+
+    def with_arm_longer(self, by: FloatArray) -> Replay:
+        """A lever arm longer by a vector, m."""
+        arm = np.asarray(self.aiding.lever_arm) + by
+        lla = offset(self.state.lla, -matrix_from_rpy(self.state.rpy) @ by)
+        return replace(
+            self, state=replace(self.state, lla=lla), aiding=replace(self.aiding, lever_arm=arm)
+        )
+
+    def turned(self, by: float, sd: float | None = None) -> Replay:
+        """An initial heading farther by an angle, rad, known to ``sd``."""
+        rpy = self.state.rpy + np.array([0.0, 0.0, by])
+        heading = self.sd.heading if sd is None else sd
+        return replace(
+            self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
+        )
+
+    def with_fixes_scaled(self, factor: float, kind: str) -> Replay:
+        """Standard deviations of the fixes of a kind times ``factor``, the first one's too."""
+        sd = self.sd
+        if kind == "position":
+            sd = replace(sd, position=factor * sd.position)
+        fixes = tuple(
+            replace(each, sd=factor * each.sd) if each.kind == kind else each
+            for each in self.aiding.fixes
+        )
+        return replace(self, sd=sd, aiding=replace(self.aiding, fixes=fixes))
+
+    def coloured(self, sd: FloatArray, tau: float) -> Replay:
+        """Positions with a Gauss-Markov error."""
+        return replace(self, aiding=replace(self.aiding, coloured_sd=sd, coloured_tau=tau))
+
+    def with_sensors_scaled(self, factor: float, kind: str, white: bool) -> Replay:
+        """White noise, or else all slow terms and the constant, of a kind of sensors scaled."""
+        models, bias = dict(self.models.models), dict(self.models.bias_sd)
+        for axis in AXES:
+            if axis.startswith(kind):
+                terms = models[axis].terms
+                models[axis] = Model(tuple(
+                    _scaled(term, factor) if term.is_white is white else term for term in terms
+                ))  # fmt: skip
+                bias[axis] *= 1.0 if white else factor
+        return replace(self, models=SensorModels(models, bias))
+
+    def without(self, rejected: dict[str, npt.NDArray[np.bool_]]) -> Replay:
+        """Without some fixes; a mask for each kind."""
+        fixes = tuple(
+            each.part(~rejected[each.kind]) if each.kind in rejected else each
+            for each in self.aiding.fixes
+        )
+        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+
+    def within(self, margin: float, longest: float) -> Replay:
+        """Without fixes near the ends and what comes after ``longest`` (s); no fix is rejected."""
+        n = min(self.imu.n, round(longest / self.imu.dt))
+        imu = Imu(self.imu.dt, self.imu.rotation[:n], self.imu.velocity[:n])
+        end = n * imu.dt - margin
+        fixes = tuple(
+            each.part((each.time > margin) & (each.time < end)) for each in self.aiding.fixes
+        )
+        return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes, gate=None))
+
+
+def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:
+    """Size and whiteness of the innovations of a kind, or of all together."""
+    found = [KINDS[kind]] if kind else list(np.unique(innovations.kind))
+    found = [each for each in found if each != KINDS["standstill"]]
+    parts = [innovations.standard[innovations.kind == each] for each in found]
+    seen = np.concatenate([part[np.isfinite(part)] for part in parts])
+    products = np.concatenate([(part[1:] * part[:-1]).ravel() for part in parts])
+    products = products[np.isfinite(products)]
+    scale = float(np.sqrt(np.sum(products**2)))
+    whiteness = 2.0 * norm.sf(abs(np.sum(products)) / scale) if scale > 0.0 else float("nan")
+    return InnovationTest(chi_square_ratio(seen**2, 1), float(whiteness))
+
+
+def _scaled(term: Process, factor: float) -> Process:
+    """A term with ``factor`` times the standard deviation."""
+    linear = term.linear_parameter
+    if linear is None:
+        return term
+    value = float(term.values[linear.name] or 0.0) * factor ** (2.0 / linear.power)
+    return term.with_values(**{linear.name: value})

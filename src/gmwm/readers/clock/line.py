@@ -1,0 +1,57 @@
+"""The robust straight line through time stamps."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm.readers import tuning
+
+
+def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> float:
+    """Sampling interval: slope of the line through the stamps over their sample numbers.
+
+    From the median slope of rows half of the record apart, least squares with the residuals bounded
+    at three robust standard deviations: a stamp that comes late has no more weight than one of the
+    usual jitter. From independent errors of the stamps of s intervals the slope has a relative
+    error of ``s sqrt(12 / n^3)``, that from the first to the last stamp ``s sqrt(2) / n``.
+
+    Parameters
+    ----------
+    stamps : (n,) ndarray
+    number : (n,) ndarray of int
+    starts : (n,) ndarray of bool
+        Where a part begins whose clock has an offset of its own.
+
+    Returns
+    -------
+    float
+        In the unit of the stamps.
+    """
+    edges = [0, *np.flatnonzero(starts), stamps.size]
+    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
+    rows = np.asarray(number - number[0], dtype=float)
+    half = max(max(part.stop - part.start for part in parts) // 2, 1)
+    ends = [(part.start, part.stop - half) for part in parts]
+    first = np.concatenate([np.arange(a, b) for a, b in ends if b > a])
+    between = stamps[first + half] - stamps[first]
+    slope = float(np.median(between / (rows[first + half] - rows[first])))
+    lever = rows.copy()
+    for part in parts:
+        lever[part] -= np.mean(lever[part])
+    scale = float(lever @ lever)
+    if not scale > 0.0:
+        return 0.0
+    late = np.empty(stamps.size)
+    for _ in range(tuning.ROUNDS_OF_LINE):
+        for part in parts:
+            late[part] = stamps[part] - stamps[part.start] - slope * rows[part]
+            late[part] -= np.median(late[part])
+        bound = 3.0 * 1.4826 * float(np.median(np.abs(late)))
+        change = float(lever @ np.clip(late, -bound, bound)) / scale
+        slope += change
+        if abs(change) < tuning.LINE_SETTLED * abs(slope):
+            break
+    return slope

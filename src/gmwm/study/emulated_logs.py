@@ -1,0 +1,155 @@
+"""Logs of an IMU and GNSS with a known truth, right or with a fault, as users have them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins import (
+    Aiding,
+    Fixes,
+    Imu,
+    Measured,
+    SensorModels,
+    Trajectory,
+    car_drive,
+    emulate,
+    fixed_wing_loiter,
+    gnss,
+    helicopter_mapping,
+)
+from gmwm.process import GaussMarkov, WhiteNoise
+
+VEHICLES: dict[str, Callable[..., Trajectory]] = {
+    "car": car_drive,
+    "helicopter": helicopter_mapping,
+    "loiter": fixed_wing_loiter,
+}
+
+FAULTS = ("coloured", "stamps", "lever arm", "off-grid", "one far", "outliers", "mounting")
+"""Coloured GNSS; stamps 0.2 s late; lever arm left out; fixes between samples; one fix 500 m off;
+3 % outliers of 50 m; IMU turned by 90 deg about its vertical axis."""
+
+LEVER_ARM = (1.0, 0.3, -1.0)
+_DEGREE_HOUR, _MICRO_G = np.radians(1.0 / 3600.0), 9.80665e-6
+_BIAS = {"gyro": 1.7e-3, "accel": 0.1}
+_OFF_GRID = 4  # parts of a sampling interval
+
+
+def sensors(
+    *, gyro: float = 1.0, accel: float = 1.0, slow: float = 1.0, tau: float = 100.0
+) -> SensorModels:
+    """Sensors of a small tactical IMU, with factors on white noise and on slow errors.
+
+    Parameters
+    ----------
+    gyro, accel, slow : float, optional
+        Factors on N of the gyros, N of the accelerometers, and sigma of all.
+    tau : float, optional
+        Correlation time of the slow errors, s.
+    """
+    return SensorModels.of(
+        {
+            "gyro": WhiteNoise(gyro * 20.0 * _DEGREE_HOUR)
+            + GaussMarkov(slow * 20.0 * _DEGREE_HOUR, tau),
+            "accel": WhiteNoise(accel * 100.0 * _MICRO_G)
+            + GaussMarkov(slow * 100.0 * _MICRO_G, tau),
+        },
+        _BIAS,
+    )
+
+
+def emulated_log(
+    seed: int,
+    vehicle: str = "car",
+    *,
+    duration: float = 600.0,
+    rate: float = 25.0,
+    velocity: bool = True,
+    faults: tuple[str, ...] = (),
+    truth: SensorModels | None = None,
+    believed: SensorModels | None = None,
+) -> tuple[Measured, Trajectory]:
+    """A log, and the trajectory that was driven or flown.
+
+    Parameters
+    ----------
+    seed : int
+    vehicle : {"car", "helicopter", "loiter"}, optional
+    duration, rate : float, optional
+        s; Hz, of the IMU. Fixes come once a second, with 1, 1 and 1.5 m.
+    velocity : bool, optional
+        Whether the fixes have velocities too.
+    faults : tuple of str, optional
+        Of `FAULTS`.
+    truth, believed : SensorModels, optional
+        Of the errors, and of the filter; by default `sensors`, both.
+
+    Raises
+    ------
+    InputError
+        For an unknown fault.
+    """
+    for fault in faults:
+        if fault not in FAULTS:
+            raise InputError(f"fault {fault!r}: write one of {', '.join(FAULTS)}")
+    rng = np.random.default_rng(seed)
+    finer = _OFF_GRID if "off-grid" in faults else 1
+    fine, ideal = _world(vehicle, duration, rate * finer)
+    imu = Imu(1.0 / rate, *(_summed(each, finer) for each in (ideal.rotation, ideal.velocity)))
+    errors = (truth or sensors()).simulate(imu.n, imu.dt, rng).total
+    imu = imu.with_errors(errors[:, :3], errors[:, 3:])
+    late = fine.dt if finer > 1 else 0.0
+    aiding = gnss(
+        fine.segment(late, duration), velocity_sd=(0.1, 0.1, 0.15) if velocity else None,
+        lever_arm=LEVER_ARM, coloured_sd=(2.0, 2.0, 3.0) if "coloured" in faults else (0, 0, 0),
+        coloured_tau=60.0, imu=_part(ideal, round(late / fine.dt)),
+    ).noisy(rng)  # fmt: skip
+    aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
+    by = late + (0.2 if "stamps" in faults else 0.0)
+    aiding = replace(aiding, fixes=tuple(_later(each, by, duration) for each in aiding.fixes))
+    aiding = _with_outliers(aiding, faults, rng)
+    if "lever arm" in faults:
+        aiding = replace(aiding, lever_arm=(0.0, 0.0, 0.0))
+    if "mounting" in faults:
+        turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        imu = Imu(imu.dt, imu.rotation @ turn.T, imu.velocity @ turn.T)
+    models = believed or truth or sensors()
+    return Measured(imu, aiding, models, title=f"{vehicle}, seed {seed}"), fine
+
+
+@lru_cache(maxsize=4)
+def _world(vehicle: str, duration: float, rate: float) -> tuple[Trajectory, Imu]:
+    truth = VEHICLES[vehicle](duration=duration, dt=1.0 / rate)
+    return truth, emulate(truth)
+
+
+def _summed(increments: FloatArray, count: int) -> FloatArray:
+    return increments.reshape(-1, count, 3).sum(axis=1)
+
+
+def _part(imu: Imu, first: int) -> Imu:
+    return Imu(imu.dt, imu.rotation[first:], imu.velocity[first:])
+
+
+def _later(fixes: Fixes, by: float, duration: float) -> Fixes:
+    later = replace(fixes, time=fixes.time + by)
+    return later.part(later.time <= duration)
+
+
+def _with_outliers(aiding: Aiding, faults: tuple[str, ...], rng: np.random.Generator) -> Aiding:
+    position, *others = aiding.fixes
+    by = np.zeros((position.time.size, 3))
+    if "one far" in faults:
+        by[position.time.size // 2, 0] = 500.0
+    if "outliers" in faults:
+        far = rng.random(position.time.size) < 0.03
+        angle = rng.uniform(0.0, 2.0 * np.pi, position.time.size)
+        by[far, 0], by[far, 1] = 50.0 * np.cos(angle[far]), 50.0 * np.sin(angle[far])
+    moved = replace(position, value=position.moved(by))
+    return replace(aiding, fixes=(moved, *others))

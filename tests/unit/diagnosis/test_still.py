@@ -1,0 +1,111 @@
+"""Stretches at rest of a field log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm.diagnosis import find_still, rest_of
+from gmwm.errors import InputError
+from gmwm.process import WhiteNoise
+
+RATE = 100.0
+GYRO, ACCEL = 1e-4, 1e-3  # u/sqrt(Hz)
+
+
+def log(*phases, seed=1, rate=RATE):
+    """A recording of phases ("rest", "idle" or "move", s), and the stretches at rest."""
+    rng = np.random.default_rng(seed)
+    bias, force = rng.normal(0.0, 2e-3, 3), np.array([0.1, -0.2, 9.79])
+    parts, rest, begin = [], [], 0.0
+    for what, length in phases:
+        t = np.arange(round(length * rate))[:, None] / rate
+        samples = np.column_stack([bias + 0.0 * t, force + 0.0 * t])
+        if what != "rest":  # an engine: a line, and broad vibration
+            size = 0.05 if what == "idle" else 0.5
+            samples[:, 3:] += size * np.sin(6.28 * 23.0 * t + rng.uniform(0.0, 6.0, 3))
+            samples[:, 3:] += 0.3 * size * rng.normal(size=(t.size, 3))
+            samples[:, :3] += 0.05 * size * np.sin(6.28 * 23.0 * t + rng.uniform(0.0, 6.0, 3))
+        if what == "move":
+            samples[:, :3] += 0.3 * np.sin(6.28 * 0.2 * t + [0.0, 1.0, 2.0])
+            samples[:, 3:] += 1.5 * np.sin(6.28 * 0.1 * t)
+        if what == "rest":
+            rest.append((begin, begin + length))
+        parts.append(samples)
+        begin += length
+    values = np.concatenate(parts)
+    values += rng.normal(size=values.shape) * np.sqrt(rate) * np.repeat([GYRO, ACCEL], 3)
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    return gmwm.Recording.from_arrays(dict(zip(names, values.T, strict=True)), rate, units), rest
+
+
+FLIGHT = (("rest", 40.3), ("idle", 12.0), ("move", 50.0), ("idle", 8.0), ("rest", 30.0))
+STOPS = (("rest", 25.0), ("move", 20.0), ("rest", 15.7), ("move", 25.0), ("rest", 12.0))
+DRIVE = (*STOPS, ("idle", 30.0))
+
+
+@pytest.mark.parametrize("phases", [FLIGHT, DRIVE, FLIGHT[::-1], DRIVE[::-1]])
+@pytest.mark.parametrize(("seed", "rate"), [(1, 100.0), (2, 200.0), (3, 63.0)])
+def test_stretches_are_found_to_a_second(phases, seed, rate):
+    recording, rest = log(*phases, seed=seed, rate=rate)
+    found = find_still(recording)
+    assert len(found.stretches) == len(rest)
+    assert np.max(np.abs(np.array(found.stretches) - rest)) < 1.0
+    assert found.longest == pytest.approx(max(b - a for a, b in rest), abs=1.0)
+
+
+def test_an_engine_is_no_rest_though_it_is_the_quietest_there_is():
+    recording, _ = log(("idle", 40.0), ("move", 30.0), ("idle", 20.0))
+    found = find_still(recording)
+    assert found.stretches == ()
+    assert len(found.vibrating) == 2
+    assert found.timeline[0] == found.timeline[-1] == "~"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_static_is_left_whole(seed):
+    recording, _ = log(("rest", 120.0), seed=seed)
+    assert rest_of(recording) is None
+
+
+def test_a_shock_does_not_cut_a_stretch():
+    recording, _ = log(*FLIGHT)
+    recording["accel_x"].values[2000:2020] += 3.0
+    assert len(find_still(recording).stretches) == 2
+
+
+def test_a_boat_is_never_at_rest():
+    recording, _ = log(("rest", 120.0))
+    t = np.arange(recording.n) / RATE
+    recording["gyro_x"].values[:] += 0.02 * np.cos(6.28 * 0.1 * t)
+    recording["accel_y"].values[:] += 9.8 * 0.02 / 0.628 * np.sin(6.28 * 0.1 * t)
+    assert find_still(recording).stretches == ()
+
+
+def test_they_are_calibrated_jointly():
+    recording, rest = log(*FLIGHT)
+    recording = replace(recording, channels=recording.channels[::5])
+    cal = gmwm.calibrate(recording, WhiteNoise())
+    for name, fit in cal.items():
+        low, high = fit.interval(0.999)["N"]
+        assert low < (GYRO if name.startswith("gyro") else ACCEL) < high
+        assert len(fit.wv.parts) == 2
+        assert fit.valid
+    (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
+    assert notice.values["stretches"] == 2
+    assert notice.values["longest"] == pytest.approx(40.0, abs=1.0)
+    assert notice.values["total"] == pytest.approx(sum(b - a for a, b in rest), abs=3.0)
+    assert cal.n * recording.dt == pytest.approx(notice.values["total"], abs=0.1)
+
+
+def test_a_log_without_rest_is_refused_with_the_longest_stretch():
+    recording, _ = log(("move", 40.0), ("rest", 6.0), ("move", 30.0))
+    with pytest.raises(InputError, match=r"longest stretch at rest has 5\.\d+ s") as caught:
+        gmwm.calibrate(recording, WhiteNoise())
+    assert caught.value.code == "no-rest"
+    one = replace(recording, channels=recording.channels[:1])
+    assert gmwm.calibrate(one, WhiteNoise(), still=False).n == recording.n

@@ -1,0 +1,97 @@
+"""Sensor models compared on logs whose truth is known but not used."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.ins import compare
+from gmwm.ins.field.alignment import align
+from gmwm.ins.field.replay import Replay
+from gmwm.ins.field.smoother import smooth
+from gmwm.ins.geometry import ned_difference
+from gmwm.study.emulated_logs import emulated_log, sensors
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return emulated_log(21, duration=500.0, rate=20.0)
+
+
+def replay_of(log):
+    alignment = align(log.imu, log.aiding, log.sensors)
+    return Replay.of(log, alignment), alignment
+
+
+def test_the_smoothed_position_is_as_good_as_it_claims_and_better_than_the_filter(drive):
+    log, truth = drive
+    replay, alignment = replay_of(log)
+    times = np.arange(30.3, 480.0, 15.0)
+    smoothed = smooth(replay, times)
+    epochs = np.rint(times / log.imu.dt).astype(int) + alignment.epoch
+    error = ned_difference(smoothed.lla, truth.lla[epochs])
+    standard = error / np.sqrt(np.einsum("kii->ki", smoothed.covariance))
+    # Fixes 15 s apart are nearly independent: 90 draws, four of their standard deviations.
+    assert np.mean(standard**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / standard.size))
+    index = [int(np.argmin(np.abs(smoothed.solution.time - each))) for each in times]
+    forward = ned_difference(smoothed.solution.lla[index], truth.lla[epochs])
+    assert np.mean(error**2) < 0.5 * np.mean(forward**2)
+    assert np.all(
+        np.einsum("kii->ki", smoothed.covariance)
+        < np.einsum("kii->ki", smoothed.solution.covariance[index, :3, :3])
+    )
+
+
+def test_at_the_last_fix_the_smoother_is_the_filter(drive):
+    replay, _ = replay_of(drive[0])
+    last = replay.imu.n * replay.imu.dt
+    smoothed = smooth(replay, np.array([last]))
+    assert np.allclose(ned_difference(smoothed.lla[0], smoothed.solution.lla[-1]), 0.0, atol=1e-6)
+    ratio = smoothed.covariance[0] / smoothed.solution.covariance[-1, :3, :3]
+    assert np.diag(ratio) == pytest.approx(1.0, rel=0.02)
+
+
+def test_models_that_are_much_worse_are_named(drive):
+    found = compare(drive[0], {"right": sensors(), "loose": sensors(slow=30.0, gyro=20.0)})
+    verdict = found.verdict
+    assert (verdict.code, verdict.where) in {("better", "right"), ("more-honest", "right")}
+    pair = found.pairs["right", "loose"]
+    assert pair.ratio < 0.9
+    assert pair.lower < pair.ratio < pair.upper
+    assert found.pairs["loose", "right"].ratio == pytest.approx(1.0 / pair.ratio)
+    assert max(map(len, str(found).splitlines())) <= 80
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_an_overconfident_model_with_the_same_errors_is_less_honest(drive):
+    found = compare(drive[0], {"right": sensors(), "sure": sensors(slow=0.3)})
+    assert found.outcomes["sure"].nees.value > found.outcomes["right"].nees.value
+    assert found.pairs["right", "sure"].score < 0.0
+
+
+def test_equal_models_are_a_tie(drive):
+    found = compare(drive[0], {"a": sensors(), "b": sensors(), "c": sensors(slow=1.01)})
+    assert found.verdict.code == "tie"
+    assert found.pairs["a", "b"].ratio == 1.0
+    assert 0.0 < found.resolved < 1.0
+
+
+def test_errors_against_the_smoother_are_those_against_the_truth(drive):
+    """The reference's own uncertainty is added to the mean square, not forgotten."""
+    log, _ = drive
+    outcome = compare(log, {"a": sensors(), "b": sensors(slow=2.0)}, 10.0).outcomes["a"]
+    assert outcome.rms["horizontal"] ** 2 == pytest.approx(
+        np.mean(np.sum(outcome.error[:, :2] ** 2, axis=1)) + np.sum(outcome.reference_variance[:2])
+    )
+    assert 0.5 < outcome.nees.value < 2.0
+
+
+def test_what_cannot_be_compared_is_refused(drive):
+    log, _ = drive
+    with pytest.raises(InputError, match="two sensor models or more"):
+        compare(log, {"a": sensors()})
+    with pytest.raises(InputError, match="enough for 7 outages of 60 s: 8 are needed"):
+        compare(log, {"a": sensors(), "b": sensors()}, 60.0)
+    with pytest.raises(InputError, match="600 s or less"):
+        compare(log, {"a": sensors(), "b": sensors()}, 1e4)

@@ -1,0 +1,114 @@
+"""Text files as the usual programs export them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gmwm.errors import InputError
+from gmwm.readers import read
+from gmwm.readers.names import CANONICAL
+
+N = 100
+SI = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+@pytest.fixture
+def rows():
+    found = np.round(np.random.default_rng(4).normal(size=(N, 6)), 4) * 0.01
+    found[:, 5] += 9.81
+    return np.round(found, 6)
+
+
+@pytest.fixture
+def save(tmp_path):
+    def _save(name, head, table):
+        path = tmp_path / name
+        lines = [",".join(map(str, row)) for row in table]
+        path.write_text("\n".join([*head, *lines, ""]))
+        return path
+
+    return _save
+
+
+def values(recording):
+    return np.column_stack([recording[name].values for name in CANONICAL if name in recording])
+
+
+XSENS = ["// General information:", "//  MT Manager version: 2020.0", "//  Update Rate: 100.0Hz",
+         "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"]  # fmt: skip
+
+
+@pytest.mark.parametrize("start", [1000, 2**32 - 4000, 65536 - 3000])
+def test_xsens(save, rows, start):
+    ticks = (start + 100 * np.arange(N)) % 2 ** (16 if start < 2**31 and start > 2000 else 32)
+    table = [[i, t, *row[3:], *row[:3]] for i, (t, row) in enumerate(zip(ticks, rows, strict=True))]
+    table[50][2] = ""
+    found = read(save("mt.txt", XSENS, table), units=SI)
+    rows[50, 3] = np.nan
+    np.testing.assert_array_equal(values(found), rows)
+    assert found.rate == pytest.approx(100.0, rel=1e-9)
+    codes = {notice.code for notice in found.notices}
+    assert ("clock-wraps" in codes) == (start > 1000)
+
+
+@pytest.mark.parametrize(("sensor", "first"), [("Gyroscope", 0), ("TotalAcceleration", 3)])
+def test_android_sensor_logger(save, rows, sensor, first):
+    stamps = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(N)
+    table = [[t, 0.01 * i, *row[first : first + 3][::-1]]
+             for i, (t, row) in enumerate(zip(stamps, rows, strict=True))]  # fmt: skip
+    found = read(save(f"{sensor}.csv", ["time,seconds_elapsed,z,y,x"], table))
+    np.testing.assert_array_equal(values(found), rows[:, first : first + 3])
+    assert found.rate == pytest.approx(100.0, rel=1e-6)
+
+
+BLACKBOX = ['"Product","Blackbox flight data recorder by Nicholas Sherlock"',
+            '"firmwareType","Cleanflight"', '"gyro_scale","0x3089705f"', '"acc_1G","2048"',
+            '"vbatcellvoltage","33,35,43"']  # fmt: skip
+BLACKBOX_NAMES = ('"loopIteration","time","axisP[0]","gyroADC[0]","gyroADC[1]","gyroADC[2]",'
+                  '"accSmooth[0]","accSmooth[1]","accSmooth[2]"')  # fmt: skip
+
+
+def test_betaflight_blackbox(save):
+    rng = np.random.default_rng(5)
+    gyro, steps = rng.integers(-3, 4, (N, 3)), rng.integers(-20, 20, (N, 3))
+    steps[:, 2] += 2048
+    table = [[i, 500 * i, 7, *gyro[i], *steps[i]] for i in range(N)]
+    found = read(save("btfl.csv", [*BLACKBOX, BLACKBOX_NAMES], table))
+    assert found.rate == pytest.approx(2000.0, rel=1e-9)
+    expected = np.column_stack([np.radians(gyro), steps / 2048.0 * 9.80665])
+    np.testing.assert_allclose(values(found), expected, rtol=1e-15)
+
+
+def test_a_blackbox_log_without_its_header(save):
+    with pytest.raises(InputError, match="preamble of a blackbox log but no line that begins"):
+        read(save("btfl.csv", BLACKBOX, [[1, 2, 3]]))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+        "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
+        '"Time (ns)","Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)",'
+        '"Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)"',
+    ],
+    ids=["EuRoC and TUM-VI", "phyphox"],
+)
+def test_units_in_the_header(save, rows, head):
+    stamps = 1_520_000_000_000_000_000 + 5_000_000 * np.arange(N)
+    table = [[t, *row] for t, row in zip(stamps, rows, strict=True)]
+    found = read(save("data.csv", [head], table))
+    np.testing.assert_array_equal(values(found), rows)
+    assert found.rate == pytest.approx(200.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "head", "width"), [
+    ("mt.txt", XSENS, 8), ("Gyroscope.csv", ["time,seconds_elapsed,z,y,x"], 5),
+    ("btfl.csv", [*BLACKBOX, BLACKBOX_NAMES], 9),
+])  # fmt: skip
+def test_a_line_that_is_cut_off(save, name, head, width):
+    table = [[i * 100, *np.full(width - 1, i * 100)] for i in range(N)]
+    table[-1] = table[-1][:-2]
+    with pytest.raises(InputError, match=f"{width - 2} fields where {width} were expected"):
+        read(save(name, head, table), units=SI)

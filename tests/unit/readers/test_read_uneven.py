@@ -1,0 +1,192 @@
+"""Clocks as they are: bursts, copies, jitter, backward steps, jumps and losses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm.errors import InputError
+from gmwm.readers import read
+from gmwm.readers.clock.uneven import followed
+
+N = 6000
+
+
+class Simulated:
+    """Stamps of a recorder, and the sample number of each row that it wrote."""
+
+    def __init__(self, seed, rate, n=N):
+        self.rng, self.rate = np.random.default_rng(seed), rate
+        self.number = np.arange(n)
+        self.stamps = 12.0 + self.number / rate
+
+    def jitter(self, share):
+        self.stamps = self.stamps + self.rng.uniform(-share, share, self.number.size) / self.rate
+
+    def bursts(self, size):
+        self.stamps = self.stamps[self.number // size * size + size - 1]
+
+    def lose(self, share):
+        kept = self.rng.random(self.number.size) >= share
+        kept[[0, -1]] = True
+        self.number, self.stamps = self.number[kept], self.stamps[kept]
+
+    def copy(self, share):
+        times = 1 + (self.rng.random(self.number.size) < share)
+        self.number, self.stamps = (np.repeat(each, times) for each in (self.number, self.stamps))
+
+    def step(self, by):
+        row = self.number.size // 3
+        self.stamps = self.stamps + by * (np.arange(self.number.size) >= row)
+
+    @property
+    def same(self):
+        return np.diff(self.number, prepend=-1) == 0
+
+
+def made(kind, seed, rate):
+    clock = Simulated(seed, rate)
+    if kind == "bursts of four":
+        clock.bursts(4)
+    elif kind == "losses":
+        clock.lose(0.01)
+    elif kind == "jitter":
+        clock.jitter(0.4)
+    elif kind == "jitter and losses":
+        clock.jitter(0.4)
+        clock.lose(0.01)
+    elif kind == "copies":
+        clock.lose(0.01)
+        clock.copy(0.001)
+    elif kind == "backward steps":
+        clock.lose(0.01)
+        clock.step(-0.3)
+    elif kind == "a clock that is set":
+        clock.jitter(0.3)
+        clock.step(1.6e9)
+    return clock
+
+
+KINDS = (
+    "bursts of four", "losses", "jitter", "jitter and losses", "copies", "backward steps",
+    "a clock that is set",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("rate", "seed"), [(63.0, 1), (200.0, 2), (200.0, 3), (1000.0, 4)])
+def test_every_row_has_its_number(kind, rate, seed):
+    clock = made(kind, seed, rate)
+    found = followed(clock.stamps, clock.same)
+    assert np.array_equal(np.cumsum(found.advance), clock.number - clock.number[0])
+    assert found.interval * rate == pytest.approx(1.0, abs=1e-5)
+    assert np.count_nonzero(found.is_set) == (kind in ("backward steps", "a clock that is set"))
+    assert found.burst == (4 if kind == "bursts of four" else 1)
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Write noise with these stamps; the recording, and the samples, NaN where one is missing."""
+
+    def _recorded(clock):
+        noise = np.random.default_rng(9).normal(size=N)
+        path = tmp_path / "log.npz"
+        np.savez(path, time_s=clock.stamps, gx=noise[clock.number])
+        truth = np.full(clock.number[-1] + 1, np.nan)
+        truth[clock.number] = noise[clock.number]
+        return read(path, units={"gyro": "rad/s"}), truth
+
+    return _recorded
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_variances_are_those_of_the_truth(recorded, kind):
+    found, truth = recorded(made(kind, 5, 200.0))
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    ours = gmwm.wavelet_variance(found["gyro_x"])
+    theirs = gmwm.wavelet_variance(truth, dt=1.0 / 200.0)
+    np.testing.assert_allclose(ours.variance, theirs.variance, rtol=1e-13)
+    np.testing.assert_allclose(ours.tau, theirs.tau, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "key"),
+    [
+        ("bursts of four", "stamps-in-bursts", "rows"),
+        ("copies", "rows-repeated", "count"),
+        ("backward steps", "clock-set", "count"),
+        ("a clock that is set", "clock-set", "count"),
+        ("jitter and losses", "clock-jumps", "missing"),
+    ],
+)
+def test_it_is_reported(recorded, kind, code, key):
+    clock = made(kind, 6, 200.0)
+    expected = {
+        "stamps-in-bursts": 4,
+        "rows-repeated": np.count_nonzero(clock.same),
+        "clock-set": 1,
+        "clock-jumps": N - clock.number.size,
+    }[code]
+    found, _ = recorded(clock)
+    (notice,) = [each for each in found.notices if each.code == code]
+    assert notice.values[key] == expected > 0
+
+
+def test_by_how_much_a_clock_was_set(recorded):
+    found, _ = recorded(made("backward steps", 7, 200.0))
+    (notice,) = [each for each in found.notices if each.code == "clock-set"]
+    assert notice.severity == "warning"
+    assert notice.values["largest"] == pytest.approx(-0.295, abs=0.006)
+
+
+def test_rows_that_only_look_alike_are_no_copies(recorded):
+    clock = made("bursts of four", 8, 200.0)
+    coarse = np.round(np.random.default_rng(2).normal(size=N))
+    same = np.r_[False, (np.diff(coarse) == 0.0) & (np.diff(clock.stamps) == 0.0)]
+    found = followed(clock.stamps, same)
+    assert np.all(found.advance[1:] == 1)
+
+
+@pytest.mark.parametrize("rate", [1100.0, 1300.0, 2000.0, 4000.0])
+def test_stamps_in_whole_milliseconds_repeat(recorded, rate):
+    clock = Simulated(3, rate)
+    clock.stamps = np.floor(1e3 * clock.stamps) / 1e3
+    found, truth = recorded(clock)
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    assert found.rate == pytest.approx(rate, rel=1e-5)
+
+
+def test_coarse_stamps_with_a_loss_are_refused_as_without(recorded):
+    clock = Simulated(3, 700.0)
+    clock.lose(0.002)
+    clock.stamps = np.round(clock.stamps, 3)
+    with pytest.raises(InputError, match="rounded too coarsely"):
+        recorded(clock)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_stamps_in_no_order_are_refused(recorded, seed):
+    clock = Simulated(seed, 200.0)
+    clock.rng.shuffle(clock.stamps)
+    with pytest.raises(InputError, match=r"goes back, and .* no even clock fits") as caught:
+        recorded(clock)
+    assert caught.value.code == "clock"
+    assert "sort the rows" in caught.value.mend
+
+
+def test_a_stopped_clock_is_refused(recorded):
+    clock = Simulated(1, 200.0)
+    clock.stamps[2000:] = clock.stamps[2000]
+    with pytest.raises(InputError, match="repeats the one before"):
+        recorded(clock)
+
+
+def test_a_host_that_stalls_loses_nothing(recorded):
+    clock = Simulated(1, 200.0)
+    for row in (900, 2500, 4000):
+        clock.stamps[row : row + 20] = clock.stamps[row + 20]
+    found, truth = recorded(clock)
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    (notice,) = [each for each in found.notices if each.code == "stamps-astray"]
+    assert notice.values["largest"] == pytest.approx(0.1, rel=0.05)
