@@ -5,7 +5,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+import yaml
+from click.testing import CliRunner
 
+from gmwm.cli.navigate import navigate
 from gmwm.errors import InputError
 from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
@@ -374,3 +377,24 @@ def test_each_outage_is_drawn_with_its_band_and_what_the_next_fix_showed(tmp_pat
         time = north.lines[0].get_xdata()
         assert length in np.round(time, 6) and not np.any((time > 0.1) & (time < length - 0.1))
         plt.close(figure)
+
+
+def test_the_options_of_the_command(underway, tmp_path):
+    log = Log(underway, 2)
+    log.imu(tmp_path, stamped=False, names=("a", "b", "c", "d", "e", "f"))
+    log.fixes(tmp_path, iso, "time")
+    file = tmp_path / "run.yaml"
+    file.write_text(yaml.safe_dump({"sensors": SENSORS, "bias": BIAS}))
+    roll, pitch, yaw = np.degrees(underway.rpy[int(RATE)])
+    arguments = [
+        file, "--imu", tmp_path / "imu.csv", "--gnss", tmp_path / "fixes.csv", "--rate", RATE,
+        "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--imu-start", f"{log.stamps[0]:.6f}",
+        "--attitude", f"{roll},{pitch},{yaw}", "--gate", "1e-5", "-o", tmp_path / "out",
+        *(f"--channel={name}={column}" for name, column in zip(NAMES, "abcdef", strict=True)),
+    ]  # fmt: skip
+    done = CliRunner().invoke(navigate, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "roll, pitch and yaw as given" in done.output
+    assert (tmp_path / "out" / "report.html").exists()
+    with pytest.raises(InputError, match="write ROLL,PITCH,YAW in degrees"):
+        CliRunner().invoke(navigate, ["--attitude", "1,2"], catch_exceptions=False)
