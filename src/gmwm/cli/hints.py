@@ -18,7 +18,7 @@ HINTS = {
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
     "heading-unknown": "--heading DEG, or heading: in the file",
-    "layout": "--layout LAYOUT, one of those that gmwm calibrate --help lists",
+    "layout": "--layout LAYOUT, one of those in the help of gmwm calibrate",
     "memory": "--channel gyro_x=COLUMN for each of some channels",
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
     "no-rest": "--all to take everything as static",

@@ -142,14 +142,18 @@ def find_motion(recording: Recording) -> Motion:
 
 
 def _channels(recording: Recording, sensor: str) -> list[Channel]:
-    """Those of a sensor of which most samples are there."""
+    """Those of a sensor of which most samples are there, and in the range of sensors."""
     return [
         channel
         for channel in recording.inertial
-        if channel.quantity == sensor
-        and 2 * channel.missing <= channel.n
-        and not np.any(np.isinf(channel.values))
+        if channel.quantity == sensor and is_moved_with(channel)
     ]
+
+
+def is_moved_with(channel: Channel) -> bool:
+    """Whether motion can be seen in a channel: one that no sensor gives says nothing of it."""
+    largest = np.fmax.reduce(np.abs(channel.values), initial=0.0)
+    return 2 * channel.missing <= channel.n and bool(largest < tuning.LARGEST_OF_SENSOR)
 
 
 def _means(recording: Recording, sensor: str, size: int) -> FloatArray:
@@ -172,7 +176,8 @@ def _smooth(means: FloatArray) -> FloatArray:
 def _white(values: FloatArray, size: int) -> float:
     """Standard deviation of a mean of ``size`` samples if their fast noise is all there is."""
     steps = np.diff(values)
-    steps = steps[~np.isnan(steps)]
+    # Equal neighbours are of a channel that is dead for a while, or coarse: not of its noise.
+    steps = steps[~np.isnan(steps) & (steps != 0.0)]
     if not steps.size:
         return 0.0
     return float(np.median(np.abs(steps))) / (norm.ppf(0.75) * np.sqrt(2.0 * size))

@@ -20,7 +20,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion
+from gmwm.diagnosis.motion import find_motion, is_moved_with
 from gmwm.readers import Channel, Recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
@@ -100,7 +100,7 @@ def find_still(recording: Recording) -> Still:
     channels = [
         channel
         for channel in recording.inertial
-        if 2 * channel.missing <= channel.n and channel.is_of_a_sensor
+        if channel.is_of_a_sensor and is_moved_with(channel)
     ]
     count = recording.n // size
     if not channels or count < tuning.FEWEST_STILL:
@@ -157,13 +157,13 @@ def _floor(scatter: FloatArray) -> FloatArray:
     windows = np.lib.stride_tricks.sliding_window_view(logs, width)
     median = np.median(windows, axis=1)  # NaN where a block is missing
     first = int(np.nanargmin(median)) if not np.all(np.isnan(median)) else 0
-    floor = np.nanmedian(scatter[first : first + width], axis=0)
+    floor = np.maximum(np.nanmedian(scatter[first : first + width], axis=0), least)
     for _ in range(tuning.ROUNDS_OF_FLOOR):
         quiet = _quiet(scatter, floor)
         if np.count_nonzero(quiet) < width:
             break
-        floor = np.median(scatter[quiet], axis=0)
-    return np.maximum(floor, least)
+        floor = np.maximum(np.median(scatter[quiet], axis=0), least)
+    return floor
 
 
 def _quiet(scatter: FloatArray, floor: FloatArray) -> BoolArray:

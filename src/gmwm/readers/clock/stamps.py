@@ -185,9 +185,8 @@ class Clock:
         if np.any(repeats):
             same[1:] = repeats & self.same()[1:]
         found = None
-        if float(np.spacing(np.max(np.abs(self.stamps)))) < 0.1 * np.median(
-            np.abs(steps[~repeats])
-        ):
+        finest = float(np.spacing(np.max(np.abs(self.stamps))))
+        if not np.all(repeats) and finest < 0.1 * np.median(np.abs(steps[~repeats])):
             found = followed(self.stamps, same)
         if found is None or not found.is_a_clock:
             raise self._no_clock(steps)
