@@ -108,7 +108,11 @@ def find_still(recording: Recording) -> Still:
     means, scatter = _moments(channels, size, count)
     floor = _floor(scatter)
     gyro = [channel.quantity == "gyro" for channel in channels]
-    runs = _runs(_quiet(scatter, floor), count, means[:, gyro])
+    quiet_blocks = _quiet(scatter, floor)
+    # A turn may begin between two blocks.
+    turns = np.maximum(tuning.TURNS, tuning.BEYOND_WHITE * np.sqrt(floor[gyro] / size))
+    quiet_blocks[1:] &= np.all(np.abs(np.diff(means[:, gyro], axis=0)) < turns, axis=1)
+    runs = _runs(quiet_blocks, count, means[:, gyro])
     runs = _of_one_level(runs, means, floor, channels, size)
     quiet = [run for run in runs if run[1] - run[0] >= 2]
     length = size * recording.dt
