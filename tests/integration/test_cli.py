@@ -627,9 +627,9 @@ def test_stretches_at_rest_of_a_log_that_moves(run, turned_file):
     code, printed, told = run("calibrate", turned_file, *RATE, *FIELD, "--model", "N")
     assert (code, told) == (0, "")
     shown = " ".join(printed.split())
-    assert "at rest from 0 to 29.75, 60.25 to 120 s |###" in shown
+    assert "at rest from 0 to 29.75, 60.5 to 120 s |###" in shown
     assert "no averaging time is longer than the longest of them" in shown
-    assert "8,950 samples a channel" in shown
+    assert "8,925 samples a channel" in shown
     rows = np.loadtxt(turned_file, delimiter=",", skiprows=1)
     rows += 30.0 * np.sin(np.arange(len(rows)) / 70.0)[:, None] * [1, 1, 1, 0, 0, 0]
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]

@@ -107,7 +107,12 @@ def find_still(recording: Recording) -> Still:
         return Still((), 0.0, (), recording.duration)
     means, scatter = _moments(channels, size, count)
     floor = _floor(scatter)
-    runs = _runs(_quiet(scatter, floor), count)
+    gyro = [channel.quantity == "gyro" for channel in channels]
+    quiet_blocks = _quiet(scatter, floor)
+    # A turn may begin between two blocks.
+    turns = np.maximum(tuning.TURNS, tuning.BEYOND_WHITE * np.sqrt(floor[gyro] / size))
+    quiet_blocks[1:] &= np.all(np.abs(np.diff(means[:, gyro], axis=0)) < turns, axis=1)
+    runs = _runs(quiet_blocks, count, means[:, gyro])
     runs = _of_one_level(runs, means, floor, channels, size)
     quiet = [run for run in runs if run[1] - run[0] >= 2]
     length = size * recording.dt
@@ -175,7 +180,7 @@ def _quiet(scatter: FloatArray, floor: FloatArray) -> BoolArray:
     )
 
 
-def _runs(quiet: BoolArray, count: int) -> list[tuple[int, int]]:
+def _runs(quiet: BoolArray, count: int, rate: FloatArray) -> list[tuple[int, int]]:
     """Begin and end of quiet stretches, a shock in them bridged, a block less at either end."""
     edges = np.flatnonzero(np.diff(quiet, prepend=False, append=False))
     runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -183,7 +188,9 @@ def _runs(quiet: BoolArray, count: int) -> list[tuple[int, int]]:
     for a, b in runs:
         if joined and a - joined[-1][1] <= tuning.BLOCKS_OF_SHOCK:
             before = joined[-1][1] - joined[-1][0]
-            if min(before, b - a) >= tuning.BLOCKS_OF_FLOOR:
+            change = np.median(rate[a:b], axis=0) - np.median(rate[slice(*joined[-1])], axis=0)
+            same = bool(np.all(np.abs(change) < tuning.TURNS))
+            if same and min(before, b - a) >= tuning.BLOCKS_OF_FLOOR:
                 joined[-1] = (joined[-1][0], b)
                 continue
         joined.append((a, b))
