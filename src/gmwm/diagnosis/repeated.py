@@ -66,8 +66,11 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     channel : Channel
     """
     values = np.asarray(channel.values, dtype=float)
-    bends = np.abs(np.diff(values, 2))
-    bends = bends[~np.isnan(bends)]
+    steps = np.diff(values)
+    bends = np.abs(np.diff(steps))
+    # A value that is held, of a sensor that is stuck, is on no line between others.
+    is_held = (steps[1:] == 0.0) & (steps[:-1] == 0.0)
+    bends = bends[~np.isnan(bends) & ~is_held]
     if bends.size < tuning.FEWEST_KNOWN:
         return None
     size = float(np.quantile(bends, tuning.BENT))
