@@ -633,7 +633,7 @@ def test_stretches_at_rest_of_a_log_that_moves(run, turned_file):
     rows = np.loadtxt(turned_file, delimiter=",", skiprows=1)
     rows += 30.0 * np.sin(np.arange(len(rows)) / 70.0)[:, None] * [1, 1, 1, 0, 0, 0]
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
-    write_csv("moving.csv", dict(zip(names, rows.T, strict=True)))
+    write_csv(Path("moving.csv"), dict(zip(names, rows.T, strict=True)))
     code, _, told = run("calibrate", "moving.csv", *RATE, *FIELD, "--model", "N")
     assert code == 2
     assert told.startswith("gmwm: moving.csv is not static, and its longest stretch at rest has ")
