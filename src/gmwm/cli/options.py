@@ -25,14 +25,14 @@ _OPTIONS = (
                       "accel_z=5; repeat. By default roles are guessed from the column names."),
     click.option("--time", "time_column", metavar="COLUMN",
                  help="Time column by name or number; 'none' to ignore it."),
-    click.option("--layout", metavar="LAYOUT",
-                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
-                      "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
-                      "[,rates][,little|big]."),
 )  # fmt: skip
 
 
 _PART = (
+    click.option("--layout", metavar="LAYOUT",
+                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
+                      "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
+                      "[,rates][,little|big]."),
     click.option("--topic", "topics", multiple=True, metavar="NAME",
                  help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
                       "for gyros and accelerometers in topics of their own."),

@@ -14,7 +14,7 @@ JITTER, LARGE_JITTER = 0.1, 0.3
 # -- motion ---------------------------------------------------------------------------------------
 
 LARGEST_OF_SENSOR = 1e6
-"""rad/s or m/s^2: beyond the range of any gyro or accelerometer, shock sensors of 1e5 g included."""
+"""rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
 
 MOTION_BLOCK, FEWEST_OF_MOTION = 1.0, 16
 """s, and samples at least, of the means in which motion is looked for: handling is slower, fast

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 
 _DEPTH = 8  # hypotheses that are followed at a time
@@ -13,7 +13,7 @@ _ALONE = 3.0  # samples lost together that cost as much as if each were lost alo
 _UNLIKELY = 24.0  # cost beyond that of the best at which a hypothesis is dropped
 
 
-@njit(cache=True, nogil=True)
+@compiled()
 def follow(
     x: FloatArray,
     same: BoolArray,
