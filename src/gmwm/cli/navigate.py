@@ -135,7 +135,7 @@ def navigate(
     Examples:
       gmwm navigate study.yaml -o out
       gmwm navigate --trajectory car --truth cal.json --filter GMWM=cal.json \\
-        --filter AV=av.json --outage 600:60 --outage 900:40
+        --filter NK=small/calibration.json --outage 600:60 --outage 900:40
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors out/calibration.json
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors A=a.json \\
         --sensors B=b.json --outages auto
