@@ -69,15 +69,16 @@ def follow(
     rows = min(n, chunk + _AHEAD)
     parent = np.zeros((rows, _DEPTH), dtype=np.int8)
     step = np.zeros((rows, _DEPTH), dtype=np.int64)
-    # Per hypothesis: sample number, clock there, interval, cost.
+    # Per hypothesis: sample number, clock there, interval, cost, rows that tell the phase.
     number = np.zeros(_DEPTH, dtype=np.int64)
+    phased, new_phased = np.full(_DEPTH, float(n)), np.zeros(3 * _DEPTH)
     clock, interval, cost = np.zeros(_DEPTH), np.ones(_DEPTH), np.zeros(_DEPTH)
     most = 3 * _DEPTH
     new_number = np.zeros(most, dtype=np.int64)
     new_clock, new_interval, new_cost = np.zeros(most), np.zeros(most), np.zeros(most)
     new_parent, new_step = np.zeros(most, dtype=np.int8), np.zeros(most, dtype=np.int64)
     saved_number, saved_clock = number.copy(), clock.copy()
-    saved_interval = interval.copy()
+    saved_interval, saved_phased = interval.copy(), phased.copy()
     order = np.zeros(most, dtype=np.int64)
     start, alive = 1, 1
     clock[0] = start_at
@@ -94,6 +95,10 @@ def follow(
             count = 0
             for h in range(alive):
                 ahead = (x[k] - clock[h]) / interval[h]
+                # The phase after a set clock is that of its first rows: no better than their mean,
+                # and sooner forgotten than the interval, which outlasts it.
+                pull = max(gain, 1.0 / (phased[h] + 1.0))
+                width = sigma * np.sqrt(1.0 + 1.0 / phased[h])
                 for way in range(4):
                     # the next one, samples lost, a repetition, a clock that was set
                     by = 1.0
@@ -114,12 +119,12 @@ def follow(
                     error = x[k] - (clock[h] + by * interval[h])
                     if way == 3:
                         error = 0.0
-                    total = cost[h] + extra + min(0.5 * (error / sigma) ** 2, costs[3])
+                    total = cost[h] + extra + min(0.5 * (error / width) ** 2, costs[3])
                     here = number[h] + np.int64(by)
                     # What is far from the clock moves it the less.
-                    far = max(abs(error) / (3.0 * sigma), 1.0)
+                    far = max(abs(error) / (3.0 * width), 1.0)
                     bounded = error / far**2
-                    base = x[k] if way == 3 else clock[h] + by * interval[h] + gain * bounded
+                    base = x[k] if way == 3 else clock[h] + by * interval[h] + pull * bounded
                     rate = interval[h] + slow * bounded
                     # One hypothesis for each sample number and state of the clock.
                     slot = count
@@ -135,6 +140,7 @@ def follow(
                         continue
                     new_number[slot], new_clock[slot] = here, base
                     new_interval[slot], new_cost[slot] = rate, total
+                    new_phased[slot] = 1.0 if way == 3 else phased[h] + 1.0
                     new_parent[slot] = h
                     new_step[slot] = -1 if way == 3 else np.int64(by)
                     count = max(count, slot + 1)
@@ -160,19 +166,21 @@ def follow(
                     continue
                 number[kept], clock[kept] = new_number[each], new_clock[each]
                 interval[kept], cost[kept] = new_interval[each], new_cost[each] - best
+                phased[kept] = new_phased[each]
                 parent[k - start, kept] = new_parent[each]
                 step[k - start, kept] = new_step[each]
                 kept += 1
             alive = kept
             if k == stop - 1:
                 saved_number, saved_clock = number.copy(), clock.copy()
-                saved_interval = interval.copy()
+                saved_interval, saved_phased = interval.copy(), phased.copy()
         # The best at the end decides; from its state at the end of the chunk the next one goes on.
         h = 0
         for k in range(end - 1, start - 1, -1):
             if k == stop - 1:
                 number[0], clock[0] = saved_number[h], saved_clock[h]
                 interval[0], cost[0] = saved_interval[h], 0.0
+                phased[0] = saved_phased[h]
                 alive = 1
             if k < stop:
                 by_step = step[k - start, h]
