@@ -26,6 +26,7 @@ _DEFINITIONS = (
     "nano- = 1e-9 = n-",
     "micro- = 1e-6 = u- = µ-",
     "milli- = 1e-3 = m-",
+    "centi- = 1e-2 = c-",
     "kilo- = 1e3 = k-",
     "radian = [angle] = rad",
     "degree = 0.017453292519943295 * radian = deg",

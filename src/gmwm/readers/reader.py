@@ -153,10 +153,10 @@ def _part(
     unit_of, unit_notices = channel_units(table, roles, units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
+    _check_size(table, roles, arrays)
     start = 0.0
     if roles.time is not None:
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
-    _check_size(table, roles, arrays)
     used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.

@@ -18,6 +18,7 @@ READING = frozenset(
     {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
+    | {"rate-unlikely"}
     | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
     | {"partial-record", "still-stretches"}

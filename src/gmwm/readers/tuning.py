@@ -56,6 +56,17 @@ RATES_AGREE = 0.01
 """Relative difference of two rates that are meant to be the same: sensors' clocks are off by less
 than one per cent, and stated rates are rounded."""
 
+MOST_OFF_GRID = 0.01
+"""Of the rows, that come a fraction of a step late: more, and the steps are not those of the
+sensor. A logger that restarts does so a few times an hour."""
+
+FEWEST_BURSTS, LONGEST_BURST, BURSTS_ALIKE = 20, 32, 0.9
+"""Bursts of rows from which they are one, rows of a burst, and the fraction of them that are alike:
+lost rows have no rhythm. Longer ones are a logger that loses a row with each block."""
+
+RATES_OF_SENSORS = (1.0, 2e4)
+"""Hz, beyond which a stated unit of time is more likely wrong than right."""
+
 LEAST_STEP, LARGEST_STEP = 1e-5, 0.5
 """s: steps of a column without a unit that are taken as seconds. No IMU is faster than 100 kHz, and
 a step of 1 is more often a millisecond than a second."""

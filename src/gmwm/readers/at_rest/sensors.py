@@ -21,7 +21,7 @@ from gmwm.readers.recording import Recording
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _EARTH = 7.292115e-5  # rad/s, WGS 84
 _DENSITY = factor("deg/s", SI_UNIT["gyro"])  # rad/s/sqrt(Hz) in deg/s/sqrt(Hz)
-_ACCEL_UNITS = ("m/s^2", "g", "mg", "ug")
+_ACCEL_UNITS = ("m/s^2", "g", "mg", "ug", "cm/s^2")
 _GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
 
 
@@ -110,12 +110,10 @@ def _is_gravity(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> bool
 
 
 def _gravity_units(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> list[str]:
-    """Units in which a number of the file is gravity."""
-    return [
-        unit
-        for unit in _ACCEL_UNITS
-        if _is_gravity(length * factor(unit, SI_UNIT["accel"]), tolerance)
-    ]
+    """Units in which a number of the file is gravity, the nearest first."""
+    sizes = {unit: length * factor(unit, SI_UNIT["accel"]) for unit in _ACCEL_UNITS}
+    likely = [unit for unit, size in sizes.items() if _is_gravity(size, tolerance)]
+    return sorted(likely, key=lambda unit: abs(sizes[unit] - _GRAVITY))
 
 
 def _swapped(
@@ -151,7 +149,16 @@ def _gravity(
         return ()
     in_file = force.size / factor(force.unit, SI_UNIT["accel"])
     likely = _gravity_units(in_file)
-    if _is_gravity(force.size) or not likely:
+    if _is_gravity(force.size):
+        return ()
+    if not likely and _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
+        text = (
+            f"the mean of the accelerometer, {in_file:.4g} {force.unit}, is gravity over one "
+            "sampling interval: increments of velocity, read as accelerations"
+        )
+        action = "divide them, and those of the gyro, by the sampling interval"
+        return (Notice("gravity", "bad", "accel", text, {"norm": force.size}, action),)
+    if not likely:
         return ()
     text = (
         f"the mean of the accelerometer is {in_file:.4g} {force.unit} long, which is gravity in "

@@ -61,6 +61,16 @@ class Jumps:
         return int(np.count_nonzero(_off_grid(self.steps, self.missing)))
 
     @property
+    def are_bursts(self) -> bool:
+        """Whether rows come in bursts of equal length with stamps close together."""
+        length = np.diff(self.rows)
+        if length.size < tuning.FEWEST_BURSTS:
+            return False
+        usual = int(np.median(length))
+        alike = (length == usual) & (self.missing[1:] == np.median(self.missing))
+        return usual <= tuning.LONGEST_BURST and bool(np.mean(alike) > tuning.BURSTS_ALIKE)
+
+    @property
     def are_rounding(self) -> bool:
         """Whether they look like stamps rounded to a coarse unit rather than like missing rows.
 

@@ -166,6 +166,11 @@ class Clock:
             notices.append(self._notice_of_change(change, seconds, rate))
         if uneven is not None:
             notices += self._notices_of_uneven(uneven, jumps, seconds)
+        slowest, fastest = tuning.RATES_OF_SENSORS
+        if not slowest <= rate <= fastest:
+            text = f"{rate:.6g} Hz is a rate that inertial sensors hardly have"
+            action = "check the unit of the time column"
+            notices.append(Notice("rate-unlikely", "warning", "", text, {"rate": rate}, action))
         return Timing(rate, jumps, tuple(notices), jitter)
 
     def _check_complete(self) -> None:
@@ -248,6 +253,21 @@ class Clock:
                 _WAY_OUT,
             )
         n = self.stamps.size
+        if jumps.off_grid > tuning.MOST_OFF_GRID * n:
+            raise InputError(
+                f"{self.place}: {jumps.off_grid:,} of {n:,} steps are not near a whole number of "
+                f"the usual one of {jumps.interval:.6g}, so that the sampling rate is not known",
+                "clock",
+                _WAY_OUT,
+            )
+        if jumps.are_bursts:
+            raise InputError(
+                f"{self.place}: every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by "
+                f"{jumps.steps[0]:.3g} of the usual steps: rows come in bursts, and stamps say "
+                "when they were written, not when they were sampled",
+                "clock",
+                _WAY_OUT,
+            )
         if jumps.total > n:
             row = int(jumps.rows[jumps.longest])
             raise InputError(

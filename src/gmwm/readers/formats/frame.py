@@ -127,7 +127,7 @@ def open_frame(data: Any) -> FrameTable:
             table = table.rename_columns(["" if n in unnamed else n for n in table.column_names])
         else:
             table = data.to_arrow() if hasattr(data, "to_arrow") else pa.table(data)
-    except (pa.ArrowException, TypeError, AttributeError) as error:
+    except (pa.ArrowException, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"{source} is not a table of numbers: {error}") from error
     return _table(source, table.schema, table.num_rows, table.column)
 

@@ -1,0 +1,79 @@
+"""Clocks and units that are more likely wrong than what they say."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm.errors import InputError
+
+pd = pytest.importorskip("pandas")
+N = 4000
+
+
+def frame(time, name="time_s", accel=(0.0, 0.0, 9.81)):
+    rng = np.random.default_rng(3)
+    columns = {name: np.asarray(time, dtype=float)}
+    columns |= {f"gyro_{a} [rad/s]": 1e-3 * rng.normal(size=len(time)) for a in "xyz"}
+    columns |= {
+        f"accel_{a} [m/s^2]": g * (1.0 + 1e-3 * rng.normal(size=len(time))) + 1e-4
+        for a, g in zip("xyz", accel, strict=True)
+    }
+    return pd.DataFrame(columns)
+
+
+def codes(recording):
+    return {notice.code for notice in recording.notices}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kept", [0.3, 0.4])
+def test_most_rows_lost_at_random_invent_no_rate(seed, kept):
+    time = 0.01 * np.flatnonzero(np.random.default_rng(seed).random(4 * N) < kept)
+    try:
+        found = gmwm.read(frame(time))
+    except InputError as error:
+        assert "time" in str(error)
+    else:
+        assert found.rate == pytest.approx(100.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("rows", [3, 5, 8])
+def test_bursts_with_stamps_close_together_are_no_losses(rows):
+    k = np.arange(N)
+    time = 0.01 * rows * (k // rows) + 0.005 * (k % rows)
+    with pytest.raises(InputError, match="rows come in bursts"):
+        gmwm.read(frame(time))
+
+
+def test_rows_that_are_lost_now_and_then_in_a_rhythm_are_lost():
+    k = np.arange(N)
+    found = gmwm.read(frame(0.01 * k[k % 102 < 100]))
+    assert found["gyro_x"].missing == 2 * (N // 102)
+
+
+@pytest.mark.parametrize(("name", "step"), [("time [s]", 10.0), ("time_ms", 0.01)])
+def test_a_stated_unit_that_no_sensor_has(name, step):
+    assert "rate-unlikely" in codes(gmwm.read(frame(step * np.arange(N), name)))
+    assert "rate-unlikely" not in codes(gmwm.read(frame(0.01 * np.arange(N))))
+
+
+def test_increments_read_as_accelerations():
+    found = gmwm.read(frame(0.01 * np.arange(N), accel=(0.0, 0.0, 0.0981)))
+    (notice,) = [each for each in found.notices if each.code == "gravity"]
+    assert "increments" in notice.text
+    assert notice.severity == "bad"
+
+
+def test_the_nearest_unit_of_gravity_is_named():
+    with pytest.raises(InputError, match=r"gravity in cm/s\^2"):
+        gmwm.read(frame(0.01 * np.arange(N), accel=(0.0, 0.0, 980.7)))
+    with pytest.raises(InputError, match="gravity in mg"):
+        gmwm.read(frame(0.01 * np.arange(N), accel=(0.0, 0.0, 1000.0)))
+
+
+def test_frames_without_rows_or_with_names_twice():
+    with pytest.raises(InputError, match="has 0 samples"):
+        gmwm.read(frame(np.zeros(0)))
+    twice = pd.concat([frame(0.01 * np.arange(N))] * 2, axis=1)
+    with pytest.raises(InputError, match="Duplicate"):
+        gmwm.read(twice)
