@@ -337,13 +337,15 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
         names = max(map(len, self))
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
             group = self.of(quantity)
-            columns = tuple(next(iter(group.values()))._columns())
+            # Errors are known of some axes only.
+            columns = max((tuple(each._columns()) for each in group.values()), key=len)
             title = f"{quantity or 'channel'} [{SI_UNIT.get(quantity, 'u')}, s]"
             names = max(names, len(title))
             lines += ["", f"{title:<{names}}" + "".join(f" {column:>11}" for column in columns)]
             for name, each in group.items():
-                values = each._columns().values()
-                lines.append(f"{name:<{names}}" + "".join(f" {value:>11.4g}" for value in values))
+                known = each._columns()
+                cells = [f"{known[key]:.4g}" if key in known else "-" for key in columns]
+                lines.append(f"{name:<{names}}" + "".join(f" {cell:>11}" for cell in cells))
         if first.predicted:
             lines += ["", *wrapped(
                 "NEES: predicted, per degree of freedom, after a time without aiding; sd: "

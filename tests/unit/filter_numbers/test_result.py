@@ -1,7 +1,7 @@
 """Filter numbers as a result: values, tables, files."""
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -96,6 +96,16 @@ def test_text_names_units_and_every_number():
         assert part in text
     assert "<pre>" in SENSOR._repr_html_()
     assert repr(SENSOR) == "<SensorNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
+
+
+@pytest.mark.parametrize("order", [("known", "none"), ("none", "known")])
+def test_columns_stand_under_their_names_where_some_axes_have_no_errors(order):
+    axes = {"none": WALK, "known": replace(WALK, stderr={"N": 1e-6, "K": 2e-7})}
+    text = str(SensorNumbers({name: axes[name] for name in order}))
+    head, *rows = [line for line in text.splitlines() if line.startswith(("gyro", "none", "known"))]
+    ends = [head.index(name) + len(name) for name in ("N +-", "K +-", "NEES 60 s", "sd 600 s")]
+    cells = {row.split()[0]: [row[:end].split()[-1] for end in ends] for row in rows}
+    assert cells == {"none": ["-", "-", "0.91", "1.4"], "known": ["1e-06", "2e-07", "0.91", "1.4"]}
 
 
 def test_table():
