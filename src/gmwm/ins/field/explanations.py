@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
@@ -122,8 +123,7 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
     """Stamps, antenna, heading: five runs of the filter and one."""
     columns = {
         each.code: _columns(
-            base, lambda x, each=each: each.change(base, x), _steps((each,)),  # type: ignore[misc]
-            np.zeros(len(each.names)),
+            base, partial(each.change, base), _steps((each,)), np.zeros(len(each.names))
         )
         for each in (_CLOCK, _ARM, _HEADING)
     }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,7 +43,9 @@ def has_sensors(table: Table) -> bool:
     return not roles.isdisjoint(CANONICAL) or "temperature" not in roles
 
 
-def shares(tables: Sequence[Table], channels: object) -> list[tuple[Table, Collection[str] | None]]:
+def shares(
+    tables: Sequence[Table], channels: Mapping[str, str | int] | Iterable[str] | None
+) -> list[tuple[Table, Collection[str] | None]]:
     """Which of the channels that the caller names are in which table; those without any go.
 
     Raises
@@ -59,7 +61,7 @@ def shares(tables: Sequence[Table], channels: object) -> list[tuple[Table, Colle
             f"{source}: columns are given for channels, and {len(tables)} topics are read: name "
             'the channels alone, e.g. channels=["gyro"], or choose one topic'
         )
-    wanted = [channels] if isinstance(channels, str) else list(channels)  # type: ignore[call-overload]
+    wanted = [channels] if isinstance(channels, str) else list(channels)
     found: list[tuple[Table, Collection[str] | None]] = []
     for table in tables:
         roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
