@@ -99,7 +99,7 @@ def contradicted(replay: Replay) -> bool:
 
 def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str]) -> list[Candidate]:
     """Those worth a look; the costly ones only where something is wrong."""
-    found = constants
+    found = [*constants]
     cleaned = outliers(here)
     if cleaned is not None:
         found.append(cleaned)

@@ -138,6 +138,15 @@ def test_a_wrong_sensor_model_is_still_named(kind, factor):
     assert fault.values["factor"] == pytest.approx(1.0 / factor, rel=0.4)
 
 
+def test_what_is_compared_with_the_arm_is_not_what_was_tried_last():
+    """The joint fit of stamps and arm stays what it is when sensor noises are tried after it."""
+    coarse = {"gyro": 30.0, "accel": 100.0}
+    believed = sensors(gyro=3.0, accel=100.0)
+    navigated = found(1000, vehicle="helicopter", truth=sensors(**coarse), believed=believed)
+    assert codes(navigated)[0].startswith("sensor-")
+    assert not navigated.faults.alternatives
+
+
 def test_straight_flight_at_constant_speed_shows_no_lever_arm():
     """It moves the track as a whole; nothing is found, and that it would not be is reported."""
     truth = perform([Straight(200.0)], start=(0.8, 0.1, 500.0), heading=0.4, speed=20.0, dt=0.05)
