@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -22,6 +22,8 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
+from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
 from gmwm.calibration.summary import sentence
@@ -31,7 +33,7 @@ from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process, model_from_list
 from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.selection import Selection, select, wider_ranges
-from gmwm.variance import MIN_SAMPLES, wavelet_variance
+from gmwm.variance import MIN_SAMPLES
 
 if TYPE_CHECKING:
     import pandas
@@ -239,6 +241,7 @@ def calibrate(
     *,
     screening: Collection[str] = SCREENING,
     still: bool = True,
+    remove_departures: bool = False,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -270,6 +273,10 @@ def calibrate(
     still : bool, optional
         Whether only the stretches at rest of a log that is not static are used, as several
         recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
+    remove_departures : bool, optional
+        Whether evident steps, transients at the start and slow periods are subtracted, the samples
+        at which a step may be left out, and what is left is fitted again, three times at most; what
+        their estimated sizes take of the noise is given back to the wavelet variances.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter do in turns; -1 is one per core.
@@ -316,13 +323,24 @@ def calibrate(
     def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
         try:
-            parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
-            data = parts[0] if len(parts) == 1 else parts
-            given_model = _model_of(name, model)
-            if given_model is not None:
-                return with_departures(estimated(given_model, data), sources[name]), None
-            selection = select(data, extra=offered[name])
-            return with_departures(selection.fit, sources[name]), selection
+            channels, given_model = alive[name], _model_of(name, model)
+            removed: list[tuple[Departure, ...]] = [()] * len(channels)
+            for rounds in range(tuning.REMOVALS + 1):
+                parts = [
+                    variance_without(channel, gone, robust=name in robust)
+                    for channel, gone in zip(channels, removed, strict=True)
+                ]
+                data = parts[0] if len(parts) == 1 else parts
+                selection: Selection | None = None
+                if given_model is None:
+                    selection = select(data, extra=offered[name])
+                fit = selection.fit if selection else estimated(cast("Model", given_model), data)
+                there = [departures(fit, part) for part in parts]
+                evident = [tuple(each for each in some if each.is_evident) for some in there]
+                if not (remove_departures and any(evident)) or rounds == tuning.REMOVALS:
+                    break
+                removed = [gone + more for gone, more in zip(removed, evident, strict=True)]
+            return with_departures(fit, sources[name], there, removed), selection
         except InputError as error:
             return error  # of this channel; the others go on
         finally:

@@ -75,6 +75,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--all", "everything", is_flag=True,
               help="Take everything as static; by default only the stretches at rest of a log "
                    "that moves are used.")  # fmt: skip
+@click.option("--remove-departures", is_flag=True,
+              help="Subtract steps, transients at the start and slow periods that are found, and "
+                   "calibrate what is left.")  # fmt: skip
 @click.option(
     "--export",
     "target",
@@ -92,6 +95,7 @@ def calibrate(
     models: tuple[str, ...],
     left: tuple[str, ...],
     everything: bool,
+    remove_departures: bool,
     target: str | None,
     datasheet: Path | None,
     jobs: int,
@@ -140,8 +144,9 @@ def calibrate(
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = run(
-                recordings, model, screening=chosen, still=not everything, jobs=jobs, progress=bar
-            )
+                recordings, model, screening=chosen, still=not everything,
+                remove_departures=remove_departures, jobs=jobs, progress=bar,
+            )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 else None
@@ -180,7 +185,7 @@ def show(result: Calibration) -> None:
         for notice in fit.notices:
             if notice.code in _OF_RECORDING:
                 continue
-            console.print(f"- {name}: {notice}", highlight=False)
+            console.print(f"- {name}: {with_option(notice)}", highlight=False)
 
 
 def _is_shown(notice: Notice) -> bool:
