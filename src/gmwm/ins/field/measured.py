@@ -14,9 +14,9 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import standstills
 from gmwm.ins.field.fix_file import read_fix_log, read_heights
 from gmwm.ins.field.imu_file import ImuLog, read_imu_log
+from gmwm.ins.field.start import standstills
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.spec import (
@@ -234,9 +234,7 @@ def _with_barometer(
     inside = np.isfinite(height) & (time > -0.5 * log.imu.dt)
     inside &= time < (log.imu.n + 0.5) * log.imu.dt
     time, height = time[inside], height[inside]
-    first = next(
-        (each for each in aiding.fixes if each.kind == "position" and each.time.size), None
-    )
+    first = aiding.of("position")
     near = np.abs(time - (np.nan if first is None else first.time[0])) <= tuning.CHORD
     if first is None or not np.any(near):
         raise InputError(

@@ -254,7 +254,7 @@ def test_a_heading_beside_an_attitude_is_refused(underway, tmp_path):
 def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
     underway, tmp_path, velocity, monkeypatch
 ):
-    monkeypatch.setattr("gmwm.ins.field.alignment._steady", lambda imu: None)
+    monkeypatch.setattr("gmwm.ins.field.start.alignment.steady", lambda imu: None)
     squares = []
     for seed in range(3):
         log = Log(underway, seed, velocity=velocity)
@@ -270,7 +270,7 @@ def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
 
 
 def test_motion_without_acceleration_shows_no_heading(tmp_path, monkeypatch):
-    monkeypatch.setattr("gmwm.ins.field.alignment._steady", lambda imu: None)
+    monkeypatch.setattr("gmwm.ins.field.start.alignment.steady", lambda imu: None)
     straight = Log(car_drive(duration=110.0, dt=1.0 / RATE).segment(0.0, 18.0))
     straight.imu(tmp_path)
     straight.fixes(tmp_path)
