@@ -289,7 +289,7 @@ LOUDER_THAN_REST = 1.5
 noise that is 22 % larger."""
 
 BLOCKS_OF_LEVEL = 4
-"""Blocks (1 s) of a mean of the logarithms of the scatter, in which sudden changes are looked for."""
+"""Blocks (1 s) of a mean of the logarithms of the scatter, whose sudden changes are found."""
 
 HARMFUL_SCATTER = 0.05
 """Share that loud stretches add to the variance of an axis: 2.5 % of its white noise."""

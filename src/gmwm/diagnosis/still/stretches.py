@@ -69,8 +69,8 @@ class Still:
         listed = ", ".join(f"{start:.4g} to {stop:.4g}" for start, stop in self.stretches[:8])
         more = f" and {len(self.stretches) - 8} more" if len(self.stretches) > 8 else ""
         text = (
-            f"in motion or vibrating for a part of its {self.duration:.4g} s; at rest from {listed} s{more} "
-            f"|{self.timeline}|: these {self.total:.4g} s are used, and no averaging time is "
+            f"in motion or vibrating for a part of its {self.duration:.4g} s; at rest from "
+            f"{listed} s{more} |{self.timeline}|: these {self.total:.4g} s are used, and no averaging time is "
             f"longer than the longest of them, {self.longest:.4g} s"
         )
         values = {
