@@ -291,6 +291,10 @@ noise that is 22 % larger."""
 BLOCKS_OF_LEVEL = 4
 """Blocks (1 s) of a mean of the logarithms of the scatter, whose sudden changes are found."""
 
+FEW_SECONDS = 3.0
+"""Over the root of their number: how much larger a change must be (a minute: 1.4 times, for noise
+with resonances and outliers that is static: benchmarks/still_stretches.py)."""
+
 HARMFUL_SCATTER = 0.05
 """Share that loud stretches add to the variance of an axis: 2.5 % of its white noise."""
 

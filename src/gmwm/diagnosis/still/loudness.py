@@ -90,7 +90,9 @@ def _changes(logs: FloatArray) -> list[int]:
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, lag), axis=1)
     change = smooth[lag:] - smooth[:-lag]
     scale = float(np.quantile(np.abs(change), tuning.QUIET)) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
-    far = norm.isf(0.5 * tuning.FALSE_ALARM / seconds.size) * tuning.BEYOND_NOISE
+    # The scale is known the less, the shorter the recording.
+    unsure = 1.0 + tuning.FEW_SECONDS / np.sqrt(seconds.size)
+    far = norm.isf(0.5 * tuning.FALSE_ALARM / seconds.size) * tuning.BEYOND_NOISE * unsure
     sign = np.sign(change) * (np.abs(change) > max(np.log(tuning.LOUDER_THAN_REST), far * scale))
     edges = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
     ends = [0]

@@ -70,8 +70,8 @@ class Still:
         more = f" and {len(self.stretches) - 8} more" if len(self.stretches) > 8 else ""
         text = (
             f"in motion or vibrating for a part of its {self.duration:.4g} s; at rest from "
-            f"{listed} s{more} |{self.timeline}|: these {self.total:.4g} s are used, and no averaging time is "
-            f"longer than the longest of them, {self.longest:.4g} s"
+            f"{listed} s{more} |{self.timeline}|: these {self.total:.4g} s are used, and no "
+            f"averaging time is longer than the longest of them, {self.longest:.4g} s"
         )
         values = {
             "stretches": len(self.stretches),
