@@ -6,10 +6,11 @@ A worker that ends before its work does loses nothing: what it was at is done ag
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing
+from contextlib import contextmanager
 from functools import cache
 from threading import Thread
 from time import sleep
@@ -88,7 +89,7 @@ def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> 
         suspect = next((item for item in left if ended[item] >= _TOGETHER), None)
         group = list(left) if suspect is None else [suspect]
         try:
-            with closing(_in_processes(work, group, jobs)) as found:
+            with _quietly_closing(_in_processes(work, group, jobs)) as found:
                 for item, result in found:
                     del left[item]
                     yield item, result
@@ -100,6 +101,17 @@ def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> 
             if suspect is not None and ended[suspect] >= ENDED:
                 del left[suspect]
                 yield suspect, lost(suspect)
+
+
+@contextmanager
+def _quietly_closing(found: Done[T, R]) -> Iterator[Done[T, R]]:
+    """Close it at the end; who interrupts work knows that some of it is not done."""
+    try:
+        yield found
+    finally:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*have been cancelled", UserWarning)
+            found.close()
 
 
 def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]:
