@@ -40,6 +40,7 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
+from .fleet import Fleet as Fleet, fleet as fleet
 from .process import (
     AR as AR,
     ARIMA as ARIMA,
