@@ -3,6 +3,7 @@
 from gmwm.study.appendix import converge, convergence_table
 from gmwm.study.choice import choice_study, choice_table
 from gmwm.study.demo import compare, simulated_imu
+from gmwm.study.demo_files import write_demo_files
 from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
@@ -29,4 +30,5 @@ __all__ = [
     "sensors",
     "simulated_imu",
     "summarise",
+    "write_demo_files",
 ]
