@@ -9,6 +9,7 @@ analyses.
 from __future__ import annotations
 
 import sys
+import warnings
 
 import numpy as np
 
@@ -93,6 +94,34 @@ def length() -> None:
             )  # fmt: skip
             print(f"{name:<12}{hours:>6}" + "".join(f"{cell:>12}" for cell in cells)
                   + "   " + nees, flush=True)  # fmt: skip
+
+
+def errors() -> None:
+    """Whether the standard errors of N and K are right, from 100 records of each sensor."""
+    runs = 100
+    print(f"{runs} records: with standard errors; over the numbers of the truth their median, and the")
+    print("mean and the spread (68 %) of what is found; share of 95 % intervals that hold the truth")
+    print(f"{'truth':<14}{'hours':>6}{'with':>6}" + "".join(
+        f"{f'{key}: {head}':>11}" for key in "NK" for head in ("error", "mean", "spread", "held")
+    ))  # fmt: skip
+    for name, hours in (("1 GM", 1), ("2 GM", 1), ("walk + GM", 1), ("demo gyro", 16), ("3 GM", 16)):
+        truth = TRUTHS[name]
+        right = gmwm.bound(truth, dt=0.1)
+        found = []
+        for seed in range(runs):
+            series = truth.simulate(hours * 36_000, 0.1, 1000 + seed)
+            each = gmwm.bound(gmwm.fit(truth.opened(), series, 0.1))
+            if each.stderr:
+                found.append([[getattr(each, key), each.stderr[key]] for key in "NK"])
+        cells = []
+        for key, (value, error) in zip("NK", np.array(found).transpose(1, 2, 0), strict=True):
+            true = getattr(right, key)
+            low, high = np.quantile(value, [0.16, 0.84])
+            held = np.abs(value - true) < 1.96 * error
+            cells += [np.median(error) / true, np.mean(value) / true, 0.5 * (high - low) / true,
+                      np.mean(held)]  # fmt: skip
+        print(f"{name:<14}{hours:>6}{len(found):>6}" + "".join(f"{cell:>11.3g}" for cell in cells),
+              flush=True)  # fmt: skip
 
 
 def tightness() -> None:
@@ -257,8 +286,9 @@ def real(folder: str) -> None:
 
 
 if __name__ == "__main__":
+    warnings.simplefilter("ignore", gmwm.FitWarning)
     if sys.argv[1:2] == ["real"]:
         real(sys.argv[2])
     else:
         for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
-            {"length": length, "tightness": tightness, "rules": rules, "flight": flight}[part]()
+            globals()[part]()
