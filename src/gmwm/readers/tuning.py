@@ -148,6 +148,15 @@ ASTRAY = 2.0
 MOST_OF_ONE_STAMP = 1024
 """Rows with one stamp that a full buffer holds, or a host that stalls writes."""
 
+BEATS, IN_BEAT, MOST_IN_BEAT = (0.125, 0.42), 0.1, 0.9
+"""Intervals by which stamps are early and late in turns: less is the jitter of any clock, more are
+bursts of two rows. How near to the short or the long step they are, and how many of them."""
+
+ROWS_OF_SHIFT, LEAST_SHIFT, SHIFT_ERRORS = 100, 0.3, 8.0
+"""Rows of a median of the distance from the clock, change of it in intervals from the rows before to
+those after others that is a shift (with jitter of 40 % its error is 0.04), and how many times the
+usual one."""
+
 # -- binary files ---------------------------------------------------------------------------------
 
 LARGEST_OF_BINARY = 60.0
