@@ -365,8 +365,9 @@ class Clock:
         row, by = max(found, key=lambda each: abs(each[1]))
         count = f"at {len(found)} places, farthest" if len(found) > 1 else ""
         text = (
-            f"the clock shifts {count} by {by * jumps.interval * seconds:+.3g} s ({by:+.2g} sampling "
-            f"intervals) near {self.where(row)}: the samples were taken as evenly spaced there"
+            f"the clock shifts {count} by {by * jumps.interval * seconds:+.3g} s ({by:+.2g} "
+            f"sampling intervals) near {self.where(row)}: the samples were taken as evenly "
+            "spaced there"
         )
         values = {"count": len(found), "largest": by * jumps.interval * seconds, "row": row}
         action = "if samples are missing there, use the part before or after"
