@@ -6,6 +6,7 @@ from .calibration import (
     load as load,
     without_departures as without_departures,
 )
+from .comparison import SensorComparison as SensorComparison, compare as compare
 from .diagnosis import Health as Health, Still as Still, find_still as find_still, health as health
 from .errors import (
     FitWarning as FitWarning,

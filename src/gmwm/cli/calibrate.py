@@ -230,7 +230,7 @@ def write_files(
 ) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
-    from gmwm.export import export
+    from gmwm.export import TARGETS, export
 
     names = ["calibration.json", "report.html"]
     for name in (*names, "imu.yaml"):
@@ -244,6 +244,8 @@ def write_files(
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
+                lines = [f"imu.yaml has N and K for {TARGETS['kalibr'].horizon:g} s without aiding; "
+                         "gmwm export --horizon S for others"]  # fmt: skip
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     kalibr = folder / "imu.yaml"
