@@ -24,7 +24,6 @@ from gmwm.selection.ranking import (
     candidate_of,
     rank,
     rank_key,
-    rank_structures,
 )
 from gmwm.selection.ties import loses_at_a_level, ramp_or_walk, ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
@@ -247,32 +246,6 @@ def select(
     chosen, fitted = _chosen(ranking, wv)
     if slope is not None and not _has_ramp(chosen.model):
         fitted = replace(fitted, notices=(*fitted.notices, ramp_or_walk(fitted, slope)))
-    return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
-
-
-def select_structure(fits: Sequence[Fit]) -> Selection:
-    """The structure among those of several fits that describes all of their recordings best.
-
-    By the criterion of `select`; a ramp is an accident of one recording and in none of them.
-
-    Parameters
-    ----------
-    fits : sequence of Fit
-        One a recording, of one channel at one rate.
-
-    Returns
-    -------
-    Selection
-        Of a `JointFit`.
-
-    Raises
-    ------
-    InputError
-        If the recordings do not belong together.
-    """
-    wv = PooledVariance.of([fitted.wv for fitted in fits])
-    ranking = tuple(rank_structures(wv, fits))
-    chosen, fitted = _chosen(ranking, wv)
     return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
 
 
