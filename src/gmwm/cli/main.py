@@ -12,15 +12,15 @@ import click
 
 from gmwm import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify
 from gmwm.cli.demo import demo
 from gmwm.cli.export import export
+from gmwm.cli.fleet import fleet
 from gmwm.cli.health import health
 from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
-from gmwm.cli.numbers import bound, reduce
+from gmwm.cli.numbers import bound, budget, reduce
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError, printable
 
@@ -37,7 +37,7 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    calibrate, demo, budget, health, bound, reduce, certify, export, navigate, reproduce,
+    calibrate, fleet, demo, budget, health, bound, reduce, certify, export, navigate, reproduce,
 ):  # fmt: skip
     cli.add_command(_command)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, per_axis
+from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import (
     KINDS,
@@ -26,27 +26,7 @@ from gmwm.filter_numbers.spectra import (
 from gmwm.process import Model
 
 
-@overload
-def bound(
-    source: One,
-    form: str = ...,
-    horizon: float = ...,
-    *,
-    level: float | None = ...,
-    bias_sd: Sd = ...,
-    dt: float | None = ...,
-) -> FilterNumbers: ...
-@overload
-def bound(
-    source: Several,
-    form: str = ...,
-    horizon: float = ...,
-    *,
-    level: float | None = ...,
-    bias_sd: Sd = ...,
-    shared: bool = ...,
-    dt: float | None = ...,
-) -> SensorNumbers: ...
+@per_axis
 def bound(
     source: One | Several,
     form: str = "N+K",
@@ -105,15 +85,11 @@ def bound(
     checks.choice("form", form, list(KINDS))
     horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
     axes = Axes.of(source, dt, bias_sd)
-    for axis in axes.axes:
-        if 2.0 * axis.dt > horizon:
-            raise InputError(
-                f"horizon = {horizon:g} s: give two sampling intervals or more, {2.0 * axis.dt:g} s"
-            )
-        if level is not None:
-            _fit(axis)
+    axes.check_interval("horizon", horizon)
     if level is not None:
         level = checks.share("level", level, 0.95)
+        for axis in axes.axes:
+            _fit(axis)
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
         return bound_of(group, form, horizon, level)
@@ -144,7 +120,7 @@ def bound_of(
             horizon=horizon,
             initial_sd=sd,
             method="bound",
-            predicted=predicted(axis, model, sd, (horizon, 10.0 * horizon)),
+            predicted=predicted(axis, axis.chain, model, sd, (horizon, 10.0 * horizon)),
             notices=(*target.notices, *about(axis, level)),
             quantity=axis.quantity,
             stderr=stderr,
@@ -168,10 +144,12 @@ def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
     return float(np.sqrt(variance))
 
 
-def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tuple[Predicted, ...]:
+def predicted(
+    axis: Axis, chain: Chain, model: Model, sd: float, times: Sequence[float]
+) -> tuple[Predicted, ...]:
     """What a filter with these numbers knows of its error after some times without aiding."""
     try:
-        errors = axis.chain.errors(
+        errors = chain.errors(
             axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
         )
     except InputError:

@@ -7,10 +7,10 @@ from gmwm.study.demo_files import write_demo_files
 from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
-from gmwm.study.rotation import reproduce_rotation
 from gmwm.study.runs import run_study
 from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
+from gmwm.study.turns import reproduce_rotation
 
 __all__ = [
     "FAULTS",
