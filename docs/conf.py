@@ -64,8 +64,6 @@ def page(title: str, module: str, names: list[str]) -> str:
 
 def write_reference(app: object) -> None:
     """One page a room of the public face, and one of `gmwm.ins`, in docs/api."""
-    import gmwm.ins
-
     rooms = public_names(SOURCE / "gmwm" / "__init__.pyi")
     pages = {room: page(ROOMS[room], "gmwm", names) for room, names in rooms.items()}
     inside = public_names(SOURCE / "gmwm" / "ins" / "__init__.pyi")
