@@ -17,7 +17,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.comparison import tuning
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import Moments, Scales, weight_root
-from gmwm.process import Model, RateRamp
+from gmwm.process import Model, Process, RateRamp
 
 PARTS = ("short", "Q", "N", "B", "K", "R")
 """Parts of an Allan plot: times of the sensor's filter, then slopes -1, -1/2, 0, +1/2, +1."""
@@ -37,8 +37,7 @@ class Curve:
     variance : (J,) ndarray
         Without a drift where one was removed, u^2.
     relative : (J, J) ndarray
-        Covariance of ``variance`` over the product of the variances, as the recording's own model
-        implies it.
+        Covariance of ``variance`` over the product of the variances, as models imply it.
     """
 
     tau: FloatArray
@@ -46,19 +45,18 @@ class Curve:
     relative: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, *, drifting: bool = False) -> Curve:
+    def of(cls, fit: Fit, noise: Model, *, drifting: bool) -> Curve:
         """The data of a fit, at the levels that are known well enough.
 
         Parameters
         ----------
         fit : Fit
-        drifting : bool, optional
-            Whether a drift is removed, also one that its model does not have.
+        noise : Model
+            Whose spectrum gives the covariances.
+        drifting : bool
+            Whether a drift is removed, also one that the fitted model does not have.
         """
-        terms = tuple(term for term in fit.model.terms if not term.is_drift)
-        if not terms:  # straight lines of the Allan plot may leave a ramp alone
-            return cls(np.empty(0), np.empty(0), np.empty((0, 0)))
-        noise, scales = Model(terms), Scales.of(fit.wv)
+        scales = Scales.of(fit.wv)
         moments = Moments(fit.wv, None, False, scales)
         if drifting:
             moments = Moments.of(fit.wv, noise + RateRamp(), scales).under(noise)
@@ -67,6 +65,24 @@ class Curve:
         known = (moments.target > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)
         first = slice(0, known.size if known.all() else int(np.argmin(known)))
         return cls(fit.wv.tau[first], moments.target[first], relative[first, first])
+
+
+def mean_noise(fits: Sequence[Fit]) -> Model:
+    """A model whose spectrum is the mean of those of the fits, without drifts.
+
+    If the recordings are equal, it is nearer to the truth than each: a walk that one of them misses
+    changes the covariances at long averaging times by half.
+    """
+    terms: list[Process] = []
+    for fit in fits:
+        for term in (term for term in fit.model.terms if not term.is_drift):
+            size = term.linear_parameter
+            if size is None:  # such a process cannot be scaled: that of the first recording
+                return Model(tuple(t for t in fits[0].model.terms if not t.is_drift))
+            amplitude = float(term.values[size.name] or 0.0) ** size.power
+            if amplitude > 0.0:
+                terms.append(term.with_amplitude(amplitude / len(fits)))
+    return Model(tuple(terms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +181,8 @@ class Equality:
         684-688); the common curve is their mean by generalized least squares.
         """
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
-        curves = [Curve.of(fit, drifting=drifting) for fit in fits]
+        noise = mean_noise(fits)
+        curves = [Curve.of(fit, noise, drifting=drifting) for fit in fits]
         levels = sorted(curve.tau.size for curve in curves)[-2]
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
         variance, share = np.full((2, len(curves), levels), np.nan)
