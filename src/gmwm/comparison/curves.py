@@ -16,8 +16,14 @@ from scipy.stats import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.comparison import tuning
 from gmwm.estimate import Fit
-from gmwm.estimate.problem import Moments, Scales, weight_root
-from gmwm.process import Model, Process, RateRamp
+from gmwm.estimate.problem import (
+    Scales,
+    bias_of_detrending,
+    detrended_covariance,
+    gls_slope,
+    weight_root,
+)
+from gmwm.process import Model
 
 PARTS = ("short", "Q", "N", "B", "K", "R")
 """Parts of an Allan plot: times of the sensor's filter, then slopes -1, -1/2, 0, +1/2, +1."""
@@ -45,44 +51,39 @@ class Curve:
     relative: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, noise: Model, *, drifting: bool) -> Curve:
+    def of(cls, fit: Fit, noises: Sequence[Model], *, drifting: bool) -> Curve:
         """The data of a fit, at the levels that are known well enough.
+
+        The covariances are those of the mean spectrum of all recordings. If these are equal, it is
+        nearer to the truth than each: a walk that one of them misses changes the covariances at
+        long averaging times by half.
 
         Parameters
         ----------
         fit : Fit
-        noise : Model
-            Whose spectrum gives the covariances.
+        noises : sequence of Model
+            Those of all recordings, without drifts.
         drifting : bool
             Whether a drift is removed, also one that the fitted model does not have.
         """
-        scales = Scales.of(fit.wv)
-        moments = Moments(fit.wv, None, False, scales)
+        wv, scales, share = fit.wv, Scales.of(fit.wv), 1.0 / len(noises)
+        spectra = [scales.spectrum(noise) for noise in noises]
+        lines = [(f, a * share**0.5) for noise in noises for f, a in noise.lines()]
+
+        def psd(f: FloatArray, dt: float) -> FloatArray:
+            return share * np.sum([each(f, dt) for each in spectra], axis=0)
+
+        covariance, variance = wv.covariance_under(psd, lines), wv.variance
         if drifting:
-            moments = Moments.of(fit.wv, noise + RateRamp(), scales).under(noise)
-        implied = scales.curve(noise)
-        relative = moments.covariance(noise) / np.outer(implied, implied)
-        known = (moments.target > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)
+            slope = gls_slope(wv, psd)
+            means = wv.mean_covariance_under(psd)
+            covariance = detrended_covariance(covariance, means, wv.drift_response, slope)
+            variance = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        implied = share * np.sum([scales.curve(noise) for noise in noises], axis=0)
+        relative = covariance / np.outer(implied, implied)
+        known = (variance > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)
         first = slice(0, known.size if known.all() else int(np.argmin(known)))
-        return cls(fit.wv.tau[first], moments.target[first], relative[first, first])
-
-
-def mean_noise(fits: Sequence[Fit]) -> Model:
-    """A model whose spectrum is the mean of those of the fits, without drifts.
-
-    If the recordings are equal, it is nearer to the truth than each: a walk that one of them misses
-    changes the covariances at long averaging times by half.
-    """
-    terms: list[Process] = []
-    for fit in fits:
-        for term in (term for term in fit.model.terms if not term.is_drift):
-            size = term.linear_parameter
-            if size is None:  # such a process cannot be scaled: that of the first recording
-                return Model(tuple(t for t in fits[0].model.terms if not t.is_drift))
-            amplitude = float(term.values[size.name] or 0.0) ** size.power
-            if amplitude > 0.0:
-                terms.append(term.with_amplitude(amplitude / len(fits)))
-    return Model(tuple(terms))
+        return cls(wv.tau[first], variance[first], relative[first, first])
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +182,9 @@ class Equality:
         684-688); the common curve is their mean by generalized least squares.
         """
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
-        noise = mean_noise(fits)
-        curves = [Curve.of(fit, noise, drifting=drifting) for fit in fits]
+        terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]
+        noises = [Model(each) for each in terms if each]  # lines of an Allan plot may be a ramp
+        curves = [Curve.of(fit, noises, drifting=drifting) for fit in fits]
         levels = sorted(curve.tau.size for curve in curves)[-2]
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
         variance, share = np.full((2, len(curves), levels), np.nan)
