@@ -41,6 +41,7 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
+from .fleet import Fleet as Fleet, fleet as fleet
 from .process import (
     AR as AR,
     ARIMA as ARIMA,
@@ -68,6 +69,7 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
+    StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,

@@ -1,4 +1,4 @@
-"""``gmwm bound``, ``reduce`` and ``budget``: what a calibration means for a filter."""
+"""``gmwm bound``, ``gmwm reduce`` and ``gmwm budget``: what a calibration means for a filter."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.text import wrapped
 from gmwm.cli.console import progress_bar
 from gmwm.cli.options import seconds
 
 if TYPE_CHECKING:
     from gmwm._core.documents import Document
+    from gmwm.filter_numbers import SensorNumbers
 
 _OPTIONS = (
     click.argument("file", type=click.Path(path_type=Path)),
@@ -63,7 +65,7 @@ def bound(
         Calibration.load(file), form, horizon, level=level, shared=shared,
         bias_sd={"gyro": gyro_bias, "accel": accel_bias},
     )  # fmt: skip
-    show(found, output, as_json)
+    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
 
 
 @click.command()
@@ -91,7 +93,7 @@ def reduce(
             calibration, form, times, shared=shared, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
-    show(found, output, as_json)
+    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
 
 
 @click.command()
@@ -119,10 +121,25 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))
 
 
-def show(result: Document, output: Path | None, as_json: bool) -> None:
+def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> str:
+    """A line on the bias at switch-on, of the sensors for which none was given."""
+    given = {"gyro": gyro_bias, "accel": accel_bias}
+    flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
+    if not flags:
+        return ""
+    text = (
+        "initial_sd leaves out the bias at switch-on, which no recording at rest shows: add "
+        f"{' and '.join(flags)} (its standard deviation), or add its square to that of initial_sd"
+    )
+    return "\n".join(wrapped(text, first="- ", indent=2))
+
+
+def show(result: Document, output: Path | None, as_json: bool, remark: str = "") -> None:
     """Save and print a result."""
     if output is not None:
         result.save(output)
     click.echo(json.dumps(result.to_dict(), indent=1) if as_json else str(result))
+    if remark and not as_json:
+        click.echo(remark)
     if output is not None and not as_json:
         click.echo(f"wrote {output}")

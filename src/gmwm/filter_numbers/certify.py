@@ -14,7 +14,6 @@ from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.certificate import Cause, Certificate, Check
-from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.given import Given, in_use
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
@@ -81,12 +80,8 @@ def certify(
         raise InputError("outages: give one length at least, s")
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")
     axes = Axes.of(source, dt, bias_sd)
-    for axis in axes.axes:
-        if 2.0 * axis.dt > min(keyframe, *times):
-            raise InputError(
-                f"keyframe = {keyframe:g} s, outages from {times[0]:g} s: give two sampling "
-                f"intervals or more, {2.0 * axis.dt:g} s"
-            )
+    axes.check_interval("keyframe", keyframe)
+    axes.check_interval("outages", times[0])
     known = Imperfections() if imperfections is None else imperfections
     moved = None if motion is None else Motion.of(motion)
     if known.needs_motion and moved is None:
@@ -120,12 +115,11 @@ def _of_axis(
 ) -> list[Check]:
     """Errors of one axis without aiding, and between keyframes."""
     believed = numbers[axis.name]
-    between = Chain(
-        tuning.KEYFRAME_ORDER[axis.quantity], tuning.KEYFRAME_SD[axis.quantity],
-        tuning.KEYFRAMES * keyframe, keyframe, is_relative=True,
-    )  # fmt: skip
     result = []
-    for consumer, chain, ends in (("free", axis.chain, times), ("keyframes", between, (keyframe,))):
+    for consumer, chain, ends in (
+        ("free", axis.chain, times),
+        ("keyframes", axis.between(keyframe), (keyframe,)),
+    ):
         errors = chain.errors(
             axis.model, believed.model, axis.dt, ends,
             true_sd=axis.bias_sd, believed_sd=believed.initial_sd,
