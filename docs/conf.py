@@ -9,6 +9,7 @@ SOURCE = DOCS.parent / "src"
 sys.path.insert(0, str(SOURCE))
 
 import gmwm  # noqa: E402
+import gmwm.ins  # noqa: E402, F401  # its names are listed
 
 project, author, copyright = "gmwm", "the gmwm authors", "the gmwm authors"
 version = release = gmwm.__version__
@@ -64,8 +65,6 @@ def page(title: str, module: str, names: list[str]) -> str:
 
 def write_reference(app: object) -> None:
     """One page a room of the public face, and one of `gmwm.ins`, in docs/api."""
-    import gmwm.ins
-
     rooms = public_names(SOURCE / "gmwm" / "__init__.pyi")
     pages = {room: page(ROOMS[room], "gmwm", names) for room, names in rooms.items()}
     inside = public_names(SOURCE / "gmwm" / "ins" / "__init__.pyi")

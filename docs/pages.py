@@ -6,9 +6,9 @@
     python docs/pages.py --figures           # and keep the figures that they save, in docs/img
     python docs/pages.py --show              # with what they print
 
-The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose first
-line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->`` or
-``<!-- not run: WHY -->``, leaves it out.
+The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose
+first line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->``
+or ``<!-- not run: WHY -->``, leaves it out.
 """
 
 from __future__ import annotations
