@@ -69,6 +69,7 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
+    StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,

@@ -96,7 +96,8 @@ def fleet(
     if found.failed:
         first = next(iter(found.failed.values()))
         reason = with_hint(InputError(first.text, first.code))
-        click.echo(f"gmwm: {len(found.failed)} files cannot be used; the first: {reason}", err=True)
+        count = "1 file" if len(found.failed) == 1 else f"{len(found.failed)} files"
+        click.echo(f"gmwm: {count} cannot be used; the first: {reason}", err=True)
     if not found.valid:
         click.echo("gmwm: no unit has a valid model, for the reasons in the report", err=True)
         click.get_current_context().exit(NONE_VALID)

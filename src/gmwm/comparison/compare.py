@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate, white_density
 from gmwm.comparison import tuning
@@ -21,7 +21,6 @@ from gmwm.comparison.clock import ClockRatio, clock_ratio, features
 from gmwm.comparison.curves import Equality
 from gmwm.comparison.result import AxisComparison, SensorComparison
 from gmwm.comparison.structure import (
-    AxisNumbers,
     axis_numbers,
     curve_inflation,
     joint_fit,
@@ -254,9 +253,7 @@ def _axis(
     joint = found if isinstance(found, JointFit) else None
     if isinstance(found, Notice):
         notices.append(found)
-    numbers, problems = AxisNumbers({}, None, None, {}), ()
-    if fits:
-        numbers, problems = axis_numbers(name, fits, joint, horizon)
+    numbers, problems = axis_numbers(name, fits, joint, horizon)
     notices += problems
     for label, fit in fits.items():
         codes = [n.code for n in fit.notices if n.severity == "bad"]
@@ -265,7 +262,9 @@ def _axis(
             action = "the curve is compared all the same"
             values = {"reasons": ", ".join(codes)}
             notices.append(Notice("fit-not-valid", "note", name, text, values, action, label))
-    own = curve_inflation(list(fits.values()), joint) if joint else float("nan")
+    own = float("nan")
+    if joint and test and test.tau.size:
+        own = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
     rows = spreads(joint) if joint else ()
     p = p_values.get(name, float("nan"))
     return AxisComparison(name, fits, out, test, p, joint, rows, numbers, own), notices
@@ -282,7 +281,7 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _curves_notice(axis: AxisComparison) -> Notice:
-    severity = "warning" if axis.state == "differ" else "note"
+    severity: Severity = "warning" if axis.state == "differ" else "note"
     worst = axis.main[0] if axis.main else None
     values = {"p_value": axis.p_value}
     if worst is not None:

@@ -57,7 +57,7 @@ class Curve:
         """
         terms = tuple(term for term in fit.model.terms if not term.is_drift)
         if not terms:  # straight lines of the Allan plot may leave a ramp alone
-            return cls(*np.empty((2, 0)), np.empty((0, 0)))
+            return cls(np.empty(0), np.empty(0), np.empty((0, 0)))
         noise, scales = Model(terms), Scales.of(fit.wv)
         moments = Moments(fit.wv, None, False, scales)
         if drifting:

@@ -69,6 +69,12 @@ process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a ha
 (1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
 (NEES 1.07); see docs/filter-numbers.md."""
 
+LOOSE = 1.2
+"""Predicted over true standard deviation at the horizon, above which a bound is called loose."""
+
+WORTH_A_STATE = 1.05
+"""Times less of it that another form has to have."""
+
 # -- reduced numbers ------------------------------------------------------------------------------
 
 LEAST_SHARE = 1e-3
@@ -84,9 +90,9 @@ INERTIA = 1e-3
 """Of the score, for a number's squared distance from the start: what does not matter stays."""
 
 EVENNESS = 20.0
-"""Times the squared logarithm of the NEES at the end of an outage, beside the score there: N+K has a
-NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.76 to 1.09 without, for errors that are 2 % larger
-(mean, at most 9 %): ``python benchmarks/filter_numbers.py balance``."""
+"""Times the squared logarithm of the NEES at the end of an outage, beside the score there: N+K has
+a NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.76 to 1.09 without, and errors that are 2 %
+larger on the mean: ``python benchmarks/filter_numbers.py balance``."""
 
 STEPS = 60
 """Of the search, at most."""
