@@ -9,7 +9,7 @@ SOURCE = DOCS.parent / "src"
 sys.path.insert(0, str(SOURCE))
 
 import gmwm  # noqa: E402
-import gmwm.ins  # noqa: E402, F401  # its names are listed
+import gmwm.ins  # noqa: E402
 
 project, author, copyright = "gmwm", "the gmwm authors", "the gmwm authors"
 version = release = gmwm.__version__
@@ -18,7 +18,8 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
-suppress_warnings = ["myst.xref_ambiguous"]
+# Types such as "(n, 3) ndarray" are looked up as names; those of attributes are there several times.
+suppress_warnings = ["ref.python"]
 default_role = "code"  # `name` in a docstring
 
 napoleon_google_docstring = False

@@ -162,9 +162,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         runner = Runner(Path(scratch), given.slow, given.show)
         for page in given.pages:
-            start = time.perf_counter()
+            start = time.process_time()
             folder = runner.run(page.resolve())
-            print(f"{page.name}: {time.perf_counter() - start:.1f} s", file=sys.stderr)
+            print(
+                f"{page.name}: {time.process_time() - start:.1f} s of the processor",
+                file=sys.stderr,
+            )
             for figure in folder.glob("*.svg") if given.figures else ():
                 shutil.copy(figure, DOCS / "img" / figure.name)
 
