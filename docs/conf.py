@@ -18,7 +18,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
-# Types such as "(n, 3) ndarray" are looked up as names; those of attributes are there several times.
+# "n" in the type "(n, 3) ndarray" is looked up as a name, and found several times.
 suppress_warnings = ["ref.python"]
 default_role = "code"  # `name` in a docstring
 
