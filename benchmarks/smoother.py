@@ -130,16 +130,24 @@ def rules(truth: dict[str, Model]) -> dict[str, dict[str, tuple[float, float, fl
 
 
 def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
-    """NEES of turn and step: of `gmwm.certify`, and the same after as many keyframes as here."""
-    models = {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
-    found = gmwm.certify(truth, models, outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
-    result = [check.nees for check in found.of("keyframes")]
+    """NEES of turn and step by `gmwm.certify`."""
+    found = gmwm.certify(truth, _models(rule), outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
+    return [check.nees for check in found.of("keyframes")]
+
+
+def expected(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
+    """The same after as many keyframes as here."""
+    models, result = _models(rule), []
     for axis in Axes.of(truth, DT, TURN_ON).axes:
         chain = replace(axis.between(1.0), settled=SECONDS - 1.0)
         errors = chain.errors(axis.model, models[axis.name], DT, (1.0,), true_sd=axis.bias_sd,
                               believed_sd=rule[axis.name][2])  # fmt: skip
         result.append(float(errors.nees()[0]))
     return result
+
+
+def _models(rule: dict[str, tuple[float, float, float]]) -> dict[str, Model]:
+    return {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
 
 
 def nees(motion: Motion, truth: SensorModels, rules_: dict, seed: int) -> dict[str, np.ndarray]:
@@ -245,8 +253,8 @@ def main() -> None:
         runs = [nees(motion, truth, by_rule, seed) for seed in range(options.runs)]
         for rule, numbers in by_rule.items():
             *state, turn, step = np.mean([run[rule] for run in runs], axis=0)
-            by_certify = certified(models, numbers)
-            cells = [*state, turn, *by_certify[::2], step, *by_certify[1::2]]
+            turns, steps = zip(certified(models, numbers), expected(models, numbers), strict=True)
+            cells = [*state, turn, *turns, step, *steps]
             print(f"{name:<12}{rule:<12}" + "".join(f"{c:>12.3g}" for c in cells), flush=True)
 
 
