@@ -6,6 +6,7 @@ from .calibration import (
     load as load,
     without_departures as without_departures,
 )
+from .comparison import SensorComparison as SensorComparison, compare as compare
 from .diagnosis import Health as Health, Still as Still, find_still as find_still, health as health
 from .errors import (
     FitWarning as FitWarning,
@@ -40,6 +41,7 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
+from .fleet import Fleet as Fleet, fleet as fleet
 from .process import (
     AR as AR,
     ARIMA as ARIMA,
@@ -67,6 +69,7 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
+    StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,

@@ -16,7 +16,13 @@ import click
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import with_option
 from gmwm.cli.model_text import models_of_channels, written_models
-from gmwm.cli.options import part_options, printing_options, read_recording, reading_options
+from gmwm.cli.options import (
+    estimating_options,
+    part_options,
+    printing_options,
+    read_recording,
+    reading_options,
+)
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +32,7 @@ if TYPE_CHECKING:
     from gmwm.calibration import Calibration
     from gmwm.readers import Recording
 
-_NONE_VALID = 1
+NONE_VALID = 1
 """Exit status."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
@@ -62,19 +68,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @output_option("gmwm-out")
 @reading_options
 @part_options
-@click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
-              help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
-                   "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
-                   "repeat.")  # fmt: skip
-@click.option("--leave", "left", multiple=True,
-              type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
-              metavar="WHAT",
-              help="Leave events, lines, resonances, outliers or all as they are: samples of "
-                   "shocks are masked otherwise, lines and resonances are terms that a model may "
-                   "have, outliers all over it make the variances robust; repeat.")  # fmt: skip
-@click.option("--all", "everything", is_flag=True,
-              help="Take everything as static; by default only the stretches at rest of a log "
-                   "that moves are used.")  # fmt: skip
+@estimating_options
 @click.option(
     "--export",
     "target",
@@ -155,7 +149,7 @@ def calibrate(
         click.echo(written)
     if not any(fit.valid for fit in result.values()):
         click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
-        click.get_current_context().exit(_NONE_VALID)
+        click.get_current_context().exit(NONE_VALID)
 
 
 def show(result: Calibration) -> None:
@@ -236,7 +230,7 @@ def write_files(
 ) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
-    from gmwm.export import export
+    from gmwm.export import TARGETS, export
 
     names = ["calibration.json", "report.html"]
     for name in (*names, "imu.yaml"):
@@ -250,6 +244,8 @@ def write_files(
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
+                lines = [f"imu.yaml has N and K for {TARGETS['kalibr'].horizon:g} s without aiding; "
+                         "gmwm export --horizon S for others"]  # fmt: skip
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     kalibr = folder / "imu.yaml"

@@ -44,6 +44,22 @@ _PART = (
     click.option("--stop", type=float, metavar="S", help="Leave out what is after."),
 )  # fmt: skip
 
+_ESTIMATING = (
+    click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
+                 help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
+                      "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
+                      "repeat."),
+    click.option("--leave", "left", multiple=True,
+                 type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
+                 metavar="WHAT",
+                 help="Leave events, lines, resonances, outliers or all as they are: samples of "
+                      "shocks are masked otherwise, lines and resonances are terms that a model "
+                      "may have, outliers all over it make the variances robust; repeat."),
+    click.option("--all", "everything", is_flag=True,
+                 help="Take everything as static; by default only the stretches at rest of a log "
+                      "that moves are used."),
+)  # fmt: skip
+
 _PRINTING = (
     click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, in SI units."),
     click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
@@ -60,6 +76,11 @@ def part_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _with(command, _PART)
 
 
+def estimating_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What is fitted, and to which samples."""
+    return _with(command, _ESTIMATING)
+
+
 def printing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """How results are printed."""
     return _with(command, _PRINTING)
@@ -72,18 +93,7 @@ def _with(command: Callable[..., Any], options: Sequence[Any]) -> Callable[..., 
 
 
 def read_recording(
-    file: Path,
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    layout: str | None = None,
-    topics: tuple[str, ...] = (),
-    clock: str = CLOCKS[0],
-    only: str | None = None,
-    start: float | None = None,
-    stop: float | None = None,
+    file: Path, start: float | None = None, stop: float | None = None, **options: Any
 ) -> Recording:
     """Read a recording as the options say.
 
@@ -94,18 +104,38 @@ def read_recording(
     """
     from gmwm.readers import read
 
-    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    recording = read(
-        file,
-        rate=rate,
-        units=units,
-        channels=_chosen(roles(channels), only),
-        time=time_reference(time_column),
-        layout=layout,
-        topic=topics,
-        clock=clock,
-    )
+    recording = read(file, **arguments_of_read(**options))
     return recording.part(0.0 if start is None else start, stop)
+
+
+def arguments_of_read(
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+    layout: str | None = None,
+    topics: tuple[str, ...] = (),
+    clock: str = CLOCKS[0],
+    only: str | None = None,
+) -> dict[str, Any]:
+    """What `gmwm.read` is given for the options.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used.
+    """
+    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    return {
+        "rate": rate,
+        "units": units,
+        "channels": _chosen(roles(channels), only),
+        "time": time_reference(time_column),
+        "layout": layout,
+        "topic": topics,
+        "clock": clock,
+    }
 
 
 def _chosen(

@@ -8,6 +8,7 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 from gmwm._core.units import AUXILIARY
 from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
 from gmwm.readers.csv_table import CsvTable
+from gmwm.readers.dates import DATE, seconds_of
 from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
@@ -17,6 +18,7 @@ from gmwm.readers.table import label
 __all__ = [
     "AUXILIARY",
     "AXES",
+    "DATE",
     "READING",
     "TIME",
     "Channel",
@@ -30,6 +32,7 @@ __all__ = [
     "label",
     "meaning",
     "read",
+    "seconds_of",
     "stated_seconds",
     "turning_gravity",
 ]

@@ -13,6 +13,7 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,10 +23,14 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, number, split_line
+from gmwm.readers.dates import DATE, seconds_of
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
 from gmwm.readers.text_file import blocks, content_size
+
+if TYPE_CHECKING:
+    import pyarrow
 
 _HEAD = 1 << 18
 
@@ -185,15 +190,38 @@ def _parse_with_arrow(
             ),
             convert_options=csv.ConvertOptions(
                 include_columns=wanted,
-                column_types=dict.fromkeys(wanted, pyarrow.float64()),
+                column_types={
+                    name: _arrow_type(layout.dates.get(i))
+                    for i, name in zip(columns, wanted, strict=True)
+                },
                 null_values=_NULLS,
                 decimal_point=layout.decimal,
             ),
         )
     except pyarrow.ArrowInvalid:
         return None
-    found: list[FloatArray] = [table.column(name).to_numpy() for name in wanted]
+    found: list[FloatArray] = [
+        _since_1970(table.column(name)) if i in layout.dates else table.column(name).to_numpy()
+        for i, name in zip(columns, wanted, strict=True)
+    ]
     return found if all(map(usable, found)) else None
+
+
+def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:
+    """Of a column of numbers, or of dates with or without a zone."""
+    import pyarrow
+
+    if has_zone is None:
+        return pyarrow.float64()
+    return pyarrow.timestamp("ns", tz="UTC" if has_zone else None)
+
+
+def _since_1970(column: pyarrow.ChunkedArray) -> FloatArray:
+    """Seconds; the float is good to a quarter of a microsecond."""
+    import pyarrow
+
+    whole: FloatArray = column.cast(pyarrow.int64()).to_numpy() * 1e-9
+    return whole
 
 
 def _single_blanks(block: bytes) -> bytes:
@@ -220,6 +248,8 @@ def _parse_by_field(
         cells = _cells(table, place, text)
         for values, column in zip(found, columns, strict=True):
             value = number(cells[column], layout.decimal)
+            if value is None and column in layout.dates:
+                value = _date(cells[column])
             if value is None:
                 raise InputError(
                     f"{table.source}, {place}, column {label(table.names, column)}: "
@@ -230,6 +260,15 @@ def _parse_by_field(
                 infinite.add(f"{place}, column {label(table.names, column)}", cells[column])
             values.append(value)
     return [np.array(values) for values in found]
+
+
+def _date(cell: str) -> float | None:
+    """Seconds since 1970, ``None`` where the field is no date."""
+    found = DATE.fullmatch(cell)
+    try:
+        return seconds_of(found) if found else None
+    except ValueError:
+        return None
 
 
 def _cells(table: CsvTable, place: str, text: str) -> list[str]:

@@ -7,6 +7,7 @@ from gmwm.variance.gaps import Runs
 from gmwm.variance.modwt import Modwt, imodwt, modwt
 from gmwm.variance.pilot import pilot_psd
 from gmwm.variance.pooled import PooledVariance
+from gmwm.variance.streaming import StreamingVariance
 from gmwm.variance.wavelet import WaveletVariance
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Modwt",
     "PooledVariance",
     "Runs",
+    "StreamingVariance",
     "WaveletVariance",
     "as_channel",
     "as_wavelet_variance",

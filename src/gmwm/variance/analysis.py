@@ -11,8 +11,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
-from gmwm.variance import tuning
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.cumulant import fourth_cumulant
 from gmwm.variance.gaps import Runs
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
@@ -111,25 +111,22 @@ def wavelet_variance(
         efficiency=efficiency,
         driftless=driftless,
         gaps=levels.effects(),
-        fourth_cumulant=0.0 if robust else fourth_cumulant(values),
+        fourth_cumulant=0.0 if robust else _fourth_cumulant(values),
         data_covariance=found,
     )
 
 
-def fourth_cumulant(values: FloatArray) -> float:
-    """Of the independent part of a series, from its first differences, u^4; 0 if not above chance.
-
-    Cumulants of independent samples add up, so that the differences have twice that of the samples.
-    """
+def _fourth_cumulant(values: FloatArray) -> float:
+    """Of a series, NaN where samples are missing."""
     differences = np.diff(values)
     square = differences[~np.isnan(differences)] ** 2
     mean = float(np.mean(square))
-    excess = float(np.mean((square / mean) ** 2)) - 3.0 if mean > 0.0 else 0.0
-    chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / square.size)
-    return 0.5 * mean**2 * excess if excess > chance else 0.0
+    # Relative to the mean, which may be so small that its square is none.
+    return fourth_cumulant(mean, mean**2 * float(np.mean((square / mean) ** 2)), square.size)
 
 
-def _where(channel: Channel) -> str:
+def where_of(channel: Channel) -> str:
+    """How messages call a channel."""
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
@@ -142,7 +139,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
         If they are no series of numbers, too few, infinite, constant or of no sensor's size, or
         the sampling interval is none.
     """
-    where = _where(channel)
+    where = where_of(channel)
     checks.sampling_interval(channel.dt)
     values = np.ascontiguousarray(checks.real_numbers(channel.values, where))
     if values.ndim != 1 or values.size < MIN_SAMPLES:
@@ -161,22 +158,34 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
             f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
             "can be determined of its noise"
         )
+    check_varies(channel)
+    return values, runs
+
+
+def check_varies(channel: Channel) -> None:
+    """Refuse a channel that is constant or varies by what no sensor does.
+
+    Raises
+    ------
+    InputError
+    """
+    where = where_of(channel)
     if channel.is_constant:
         raise InputError(
-            f"{where} is constant ({np.nanmin(values):g}): a dead channel has no noise model"
+            f"{where} is constant ({np.nanmin(channel.values):g}): a dead channel has no noise "
+            "model"
         )
     if not channel.is_of_a_sensor:
         raise InputError(
             f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
         )
-    return values, runs
 
 
 def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
     width = known_wavelet(wavelet).width(1)
     if width > runs.longest:
         raise InputError(
-            f"{_where(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
             "take a shorter wavelet, e.g. haar"
         )
 

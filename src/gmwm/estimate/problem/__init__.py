@@ -25,7 +25,7 @@ from gmwm.estimate.problem.ramp import (
     ols_slope,
     slope_p_value,
 )
-from gmwm.estimate.problem.scales import Scales
+from gmwm.estimate.problem.scales import Scales, is_plain
 from gmwm.estimate.problem.simulation import Simulation
 from gmwm.estimate.problem.targets import FittedMoments, Moments
 from gmwm.estimate.problem.whitening import chi_square, weight_root
@@ -48,6 +48,7 @@ __all__ = [
     "frequency_nodes",
     "gls_slope",
     "in_model_order",
+    "is_plain",
     "keys_by_term",
     "objectives_with",
     "ols_slope",

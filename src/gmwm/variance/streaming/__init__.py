@@ -1,0 +1,5 @@
+"""Wavelet variance of streams: one pass over blocks of samples, at constant memory."""
+
+from gmwm.variance.streaming.streaming import StreamingVariance
+
+__all__ = ["StreamingVariance"]
