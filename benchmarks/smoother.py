@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
+from textwrap import fill
 
 import gtsam
 import numpy as np
@@ -52,8 +53,8 @@ TRUTHS = {
     },
 }  # fmt: skip
 LINE = 1000.0  # s, where the line of slope +1/2 touches an Allan deviation
-JUDGED = ("orientation", "velocity", "position", "gyro bias", "accel bias", "turn", "step")
-"""At the last keyframe, and of the pose a second later relative to it, with the velocity there."""
+HEADS = ("attit.", "veloc.", "posit.", "gyro b", "acc. b",
+         "turn", "cert.", "here", "step", "cert.", "here")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,11 @@ def _models(rule: dict[str, tuple[float, float, float]]) -> dict[str, Model]:
 
 
 def nees(motion: Motion, truth: SensorModels, rules_: dict, seed: int) -> dict[str, np.ndarray]:
-    """Normalised errors squared per degree of freedom, in the order of `JUDGED`, by rule."""
+    """Normalised errors squared per degree of freedom, by rule.
+
+    Of attitude, velocity, position and biases at the last keyframe, and of the turn and of the
+    step with the velocity to the next.
+    """
     rng = np.random.default_rng(seed)
     seconds = len(motion.states) - 1
     errors = truth.simulate(PER * seconds, DT, rng)
@@ -236,17 +241,14 @@ def main() -> None:
     options = parser.parse_args()
     motion = Motion.of(SECONDS, options.free)
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
-    print(
-        f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom at the last keyframe, and"
+    text = (
+        f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
+        "of the next pose relative to it (turn; step and velocity), which the IMU alone gives; "
+        f"beside, that of gmwm.certify, of an axis after {KEYFRAMES} keyframes, and after the "
+        f"{SECONDS - 1} here. Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}."
     )
-    print("of the next pose relative to it (turn; step and velocity), which the IMU alone gives,")
-    print(f"beside that of gmwm.certify, after {KEYFRAMES} keyframes, and that after {SECONDS - 1}")
-    print(f"Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}")
-    heads = [
-        *JUDGED[:5],
-        *(h for each in JUDGED[5:] for h in (each, "certified", f"after {SECONDS - 1}")),
-    ]
-    print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>12}" for head in heads))
+    print(fill(text, 96))
+    print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))
     for name, models in TRUTHS.items():
         by_rule = rules(models)
         truth = SensorModels.of(models, TURN_ON)
@@ -255,7 +257,7 @@ def main() -> None:
             *state, turn, step = np.mean([run[rule] for run in runs], axis=0)
             turns, steps = zip(certified(models, numbers), expected(models, numbers), strict=True)
             cells = [*state, turn, *turns, step, *steps]
-            print(f"{name:<12}{rule:<12}" + "".join(f"{c:>12.3g}" for c in cells), flush=True)
+            print(f"{name:<12}{rule:<12}" + "".join(f"{c:>8.3g}" for c in cells), flush=True)
 
 
 if __name__ == "__main__":
