@@ -1,6 +1,6 @@
 """A factor graph of GTSAM with numbers by several rules: its NEES beside the certified one.
 
-Run with ``python benchmarks/smoother.py [--runs 40] [--free]``; the tables of
+Run with ``python benchmarks/smoother.py [--runs 40] [--free] [--gravity 9.81]``; the tables of
 docs/filter-numbers.md. An IMU at 100 Hz, moved as by hand, and a relative pose every second for a
 minute (``KEYFRAME_SD``). All are smoothed at once, with combined preintegration between keyframes.
 The trajectory is what the graph's own integration makes of error-free samples: no error is left
@@ -67,10 +67,10 @@ class Motion:
     states: list[gtsam.NavState]
 
     @classmethod
-    def of(cls, seconds: int, free: bool) -> Motion:
+    def of(cls, seconds: int, free: bool, gravity: float = GRAVITY) -> Motion:
         """By hand, or none."""
         t = DT * (np.arange(PER * seconds) + 0.5)[:, None]
-        gravity = 0.0 if free else GRAVITY
+        gravity = 0.0 if free else gravity
         size = 0.0 if free else 1.0
         rate = size * 0.7 * np.sin(np.array([2.1, 1.7, 1.3]) * t + np.array([0.0, 1.0, 2.0]))
         moved = size * 1.5 * np.sin(np.array([1.9, 2.3, 1.1]) * t + np.array([0.5, 1.5, 2.5]))
@@ -238,8 +238,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--free", action="store_true")
+    parser.add_argument("--gravity", type=float, default=GRAVITY)
     options = parser.parse_args()
-    motion = Motion.of(SECONDS, options.free)
+    motion = Motion.of(SECONDS, options.free, options.gravity)
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
     text = (
         f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
