@@ -6,7 +6,12 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY
-from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
+from gmwm.readers.at_rest import (
+    TurningGravity,
+    block_means,
+    steady_turn,
+    turning_gravity,
+)
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
@@ -31,5 +36,6 @@ __all__ = [
     "meaning",
     "read",
     "stated_seconds",
+    "steady_turn",
     "turning_gravity",
 ]
