@@ -99,7 +99,9 @@ def length() -> None:
 
 def errors() -> None:
     """Whether the standard errors of N and K are right, from many records of each sensor."""
-    print("records, and those with standard errors; over the numbers of the truth: median of these,")
+    print(
+        "records, and those with standard errors; over the numbers of the truth: median of these,"
+    )
     print("mean and spread (68 %) of what is found; share of 95 % intervals that hold the truth")
     print(f"{'truth':<14}{'hours':>6}{'runs':>6}{'with':>6}" + "".join(
         f"{f'{key}: {head}':>11}" for key in "NK" for head in ("error", "mean", "spread", "held")
@@ -120,13 +122,15 @@ def errors() -> None:
             held = np.abs(value - true) < 1.96 * error
             cells += [np.median(error) / true, np.mean(value) / true, 0.5 * (high - low) / true,
                       np.mean(held)]  # fmt: skip
-        print(f"{name:<14}{hours:>6}{runs:>6}{len(found):>6}" + "".join(f"{cell:>11.3g}" for cell in cells),
-              flush=True)  # fmt: skip
+        print(f"{name:<14}{hours:>6}{runs:>6}{len(found):>6}"
+              + "".join(f"{cell:>11.3g}" for cell in cells), flush=True)  # fmt: skip
 
 
 def balance() -> None:
     """What it costs that the NEES of reduced numbers is even."""
-    print("N+K by gmwm.reduce for 10, 30 and 60 s, all truths as gyro_x, accel_x and gyro_z: NEES by")
+    print(
+        "N+K by gmwm.reduce for 10, 30 and 60 s, all truths as gyro_x, accel_x and gyro_z: NEES by"
+    )
     print("weight of its evenness; true error at 60 s over that of a filter with the full model")
     print(f"{'weight':>6}{'10 s':>16}{'30 s':>16}{'60 s':>16}{'error: mean':>14}{'most':>8}")
     for weight in (0.0, 5.0, 10.0, 20.0, 40.0):
@@ -224,6 +228,18 @@ def flight() -> None:
     for name, truth in (("demo sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
         print(f"INS/GNSS on a loiter, {name}, at the end of outages")
         _flown(truth)
+    print("after 30 s of the last, N+K for some axes and the full model for the others")
+    numbers, scenario = gmwm.bound(QUIET.models), loiter_with_outages(OUTAGES, DT)
+    for some in ({"gyro_x", "gyro_y"}, {"gyro_z"}, {"accel_x", "accel_y", "accel_z"}):
+        believed = SensorModels.of(
+            {axis: numbers[axis].model if axis in some else model
+             for axis, model in QUIET.models.items()},
+            {axis: numbers[axis].initial_sd for axis in some},
+        )  # fmt: skip
+        analysis = covariance_analysis(scenario, QUIET, believed)
+        at = analysis.index(scenario.outages[1].end)
+        true, own = (np.hypot(*sd[at, :2]) for sd in (analysis.sd, analysis.predicted_sd))
+        print(f"{', '.join(sorted(some)):<32}{true:>10.4g}{own:>10.4g}", flush=True)
 
 
 def _flown(truth: SensorModels) -> None:

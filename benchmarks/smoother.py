@@ -1,17 +1,18 @@
 """A factor graph of GTSAM with numbers by several rules: its NEES beside the certified one.
 
-Run with ``python benchmarks/smoother.py [--runs 40] [--still]``; the table of
+Run with ``python benchmarks/smoother.py [--runs 40] [--free] [--gravity 9.81]``; the tables of
 docs/filter-numbers.md. An IMU at 100 Hz, moved as by hand, and a relative pose every second for a
 minute (``KEYFRAME_SD``). All are smoothed at once, with combined preintegration between keyframes.
 The trajectory is what the graph's own integration makes of error-free samples: no error is left
-but those of the sensors. ``--still`` is an IMU at rest without gravity, where axes do not mix.
+but those of the sensors. ``--free`` is an IMU that floats, without gravity or motion, where each
+axis is alone, as in a certificate.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from textwrap import fill
 
 import gtsam
 import numpy as np
@@ -20,7 +21,8 @@ from scipy.spatial.transform import Rotation
 
 import gmwm
 from gmwm import GaussMarkov, Model, RandomWalk, WhiteNoise
-from gmwm.filter_numbers.tuning import KEYFRAME_SD
+from gmwm.filter_numbers.axes import Axes
+from gmwm.filter_numbers.tuning import KEYFRAME_SD, KEYFRAMES
 from gmwm.ins import SensorModels
 from gmwm.ins.imu.sensors import AXES
 
@@ -51,8 +53,8 @@ TRUTHS = {
     },
 }  # fmt: skip
 LINE = 1000.0  # s, where the line of slope +1/2 touches an Allan deviation
-JUDGED = ("orientation", "velocity", "position", "gyro bias", "accel bias", "turn", "step")
-"""At the last keyframe, and of the pose a second later relative to it, with the velocity there."""
+HEADS = ("attit.", "veloc.", "posit.", "gyro b", "acc. b",
+         "turn", "cert.", "here", "step", "cert.", "here")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,11 @@ class Motion:
     states: list[gtsam.NavState]
 
     @classmethod
-    def of(cls, seconds: int, still: bool) -> Motion:
-        """By hand, or at rest in free fall."""
+    def of(cls, seconds: int, free: bool, gravity: float = GRAVITY) -> Motion:
+        """By hand, or none."""
         t = DT * (np.arange(PER * seconds) + 0.5)[:, None]
-        gravity = 0.0 if still else GRAVITY
-        size = 0.0 if still else 1.0
+        gravity = 0.0 if free else gravity
+        size = 0.0 if free else 1.0
         rate = size * 0.7 * np.sin(np.array([2.1, 1.7, 1.3]) * t + np.array([0.0, 1.0, 2.0]))
         moved = size * 1.5 * np.sin(np.array([1.9, 2.3, 1.1]) * t + np.array([0.5, 1.5, 2.5]))
         moved[:, 2] += gravity
@@ -80,7 +82,9 @@ class Motion:
         params = parameters(dict.fromkeys(AXES, (1e-4, 1e-6)), gravity)
         state, states = gtsam.NavState(), [gtsam.NavState()]
         for k in range(seconds):
-            state = preintegrated(params, rate, force, k).predict(state, gtsam.imuBias.ConstantBias())
+            state = preintegrated(params, rate, force, k).predict(
+                state, gtsam.imuBias.ConstantBias()
+            )
             states.append(state)
         return cls(rate, force, gravity, states)
 
@@ -109,9 +113,8 @@ def preintegrated(params, rate: np.ndarray, force: np.ndarray, k: int):
 
 def rules(truth: dict[str, Model]) -> dict[str, dict[str, tuple[float, float, float]]]:
     """N, K and the standard deviation of the bias at the start of each kind, by rule."""
-    sd = partial(gmwm.bound, form="N+K", horizon=1.0, bias_sd=TURN_ON)
-    safe = sd(truth)
-    small = gmwm.reduce(truth, outages=(1.0,), bias_sd=TURN_ON)
+    safe = gmwm.bound(truth, horizon=1.0, bias_sd=TURN_ON)
+    small = gmwm.reduce(truth, keyframe=1.0, bias_sd=TURN_ON)
     tau = DT * 2.0 ** np.arange(24)
     lines = {}
     for kind, model in truth.items():
@@ -127,15 +130,33 @@ def rules(truth: dict[str, Model]) -> dict[str, dict[str, tuple[float, float, fl
     }
 
 
-def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]):
-    """NEES that `gmwm.certify` has of the turn, and of the step with the velocity."""
-    models = {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
-    found = gmwm.certify(truth, models, outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
+def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
+    """NEES of turn and step by `gmwm.certify`."""
+    found = gmwm.certify(truth, _models(rule), outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
     return [check.nees for check in found.of("keyframes")]
 
 
+def expected(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
+    """The same after as many keyframes as here."""
+    models, result = _models(rule), []
+    for axis in Axes.of(truth, DT, TURN_ON).axes:
+        chain = replace(axis.between(1.0), settled=SECONDS - 1.0)
+        errors = chain.errors(axis.model, models[axis.name], DT, (1.0,), true_sd=axis.bias_sd,
+                              believed_sd=rule[axis.name][2])  # fmt: skip
+        result.append(float(errors.nees()[0]))
+    return result
+
+
+def _models(rule: dict[str, tuple[float, float, float]]) -> dict[str, Model]:
+    return {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
+
+
 def nees(motion: Motion, truth: SensorModels, rules_: dict, seed: int) -> dict[str, np.ndarray]:
-    """Normalised errors squared per degree of freedom, in the order of `JUDGED`, by rule."""
+    """Normalised errors squared per degree of freedom, by rule.
+
+    Of attitude, velocity, position and biases at the last keyframe, and of the turn and of the
+    step with the velocity to the next.
+    """
     rng = np.random.default_rng(seed)
     seconds = len(motion.states) - 1
     errors = truth.simulate(PER * seconds, DT, rng)
@@ -149,7 +170,9 @@ def nees(motion: Motion, truth: SensorModels, rules_: dict, seed: int) -> dict[s
     rate, force = motion.rate + errors.total[:, :3], motion.force + errors.total[:, 3:]
     found = {}
     for name, rule in rules_.items():
-        params = parameters({axis: rule[axis.partition("_")[0]][:2] for axis in AXES}, motion.gravity)
+        params = parameters(
+            {axis: rule[axis.partition("_")[0]][:2] for axis in AXES}, motion.gravity
+        )
         sd = np.repeat([rule["accel"][2], rule["gyro"][2]], 3)
         graph = _graph(params, rate, force, seen, start, sd)
         values = gtsam.Values()
@@ -214,24 +237,28 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=40)
-    parser.add_argument("--still", action="store_true")
+    parser.add_argument("--free", action="store_true")
+    parser.add_argument("--gravity", type=float, default=GRAVITY)
     options = parser.parse_args()
-    motion = Motion.of(SECONDS, options.still)
-    print(f"smoother, {SECONDS} s, {options.runs} runs: NEES per degree of freedom at the end, and of")
-    print("the next pose relative to the last, with the certified one; +- is a standard error")
-    print(f"{'truth':<13}{'numbers':<13}" + "".join(f"{head:>15}" for head in JUDGED)
-          + f"{'certified turn':>16}{'step':>7}")  # fmt: skip
+    motion = Motion.of(SECONDS, options.free, options.gravity)
+    se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
+    text = (
+        f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
+        "of the next pose relative to it (turn; step and velocity), which the IMU alone gives; "
+        f"beside, that of gmwm.certify, of an axis after {KEYFRAMES} keyframes, and after the "
+        f"{SECONDS - 1} here. Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}."
+    )
+    print(fill(text, 96))
+    print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))
     for name, models in TRUTHS.items():
         by_rule = rules(models)
         truth = SensorModels.of(models, TURN_ON)
         runs = [nees(motion, truth, by_rule, seed) for seed in range(options.runs)]
         for rule, numbers in by_rule.items():
-            values = np.array([run[rule] for run in runs])
-            error = values.std(axis=0, ddof=1) / np.sqrt(options.runs)
-            cells = [f"{m:.3g} +-{e:5.2g}" for m, e in zip(values.mean(axis=0), error, strict=True)]
-            turn, step = certified(models, numbers)
-            print(f"{name:<13}{rule:<13}" + "".join(f"{cell:>15}" for cell in cells)
-                  + f"{turn:>16.3g}{step:>7.3g}", flush=True)  # fmt: skip
+            *state, turn, step = np.mean([run[rule] for run in runs], axis=0)
+            turns, steps = zip(certified(models, numbers), expected(models, numbers), strict=True)
+            cells = [*state, turn, *turns, step, *steps]
+            print(f"{name:<12}{rule:<12}" + "".join(f"{c:>8.3g}" for c in cells), flush=True)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ from places import REPOSITORY
 
 pytest.importorskip("hatchling", reason="hatchling builds the archives")
 
-TEMPLATES = ("template.html", "report.css", "report.js", "validation.html", "comparison.html")
+TEMPLATES = ("template.html", "report.css", "report.js", "validation.html", "comparison.html",
+             "fleet.html")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,14 @@ import click
 
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import with_option
-from gmwm.cli.model_text import models_of_channels, written_models
 from gmwm.cli.options import (
     estimating_options,
+    models_of_channels,
     part_options,
     printing_options,
     read_recording,
     reading_options,
+    written_models,
 )
 from gmwm.errors import InputError
 
@@ -282,8 +283,8 @@ def write_files(
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
-                lines = [f"imu.yaml has N and K for {TARGETS['kalibr'].horizon:g} s without aiding; "
-                         "gmwm export --horizon S for others"]  # fmt: skip
+                horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
+                lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     kalibr = folder / "imu.yaml"

@@ -13,13 +13,13 @@ import click
 from gmwm.cli.calibrate import NONE_VALID
 from gmwm.cli.console import progress_bar
 from gmwm.cli.hints import with_hint
-from gmwm.cli.model_text import written_models
 from gmwm.cli.options import (
     arguments_of_read,
     estimating_options,
     part_options,
     printing_options,
     reading_options,
+    written_models,
 )
 
 
@@ -96,7 +96,8 @@ def fleet(
     if found.failed:
         first = next(iter(found.failed.values()))
         reason = with_hint(InputError(first.text, first.code))
-        click.echo(f"gmwm: {len(found.failed)} files cannot be used; the first: {reason}", err=True)
+        count = "1 file" if len(found.failed) == 1 else f"{len(found.failed)} files"
+        click.echo(f"gmwm: {count} cannot be used; the first: {reason}", err=True)
     if not found.valid:
         click.echo("gmwm: no unit has a valid model, for the reasons in the report", err=True)
         click.get_current_context().exit(NONE_VALID)

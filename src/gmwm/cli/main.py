@@ -14,6 +14,7 @@ from gmwm import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify
+from gmwm.cli.compare import compare
 from gmwm.cli.demo import demo
 from gmwm.cli.export import export
 from gmwm.cli.fleet import fleet
@@ -37,7 +38,8 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    calibrate, fleet, demo, budget, health, bound, reduce, certify, export, navigate, reproduce,
+    calibrate, fleet, compare, demo, budget, health, bound, reduce, certify, export, navigate,
+    reproduce,
 ):  # fmt: skip
     cli.add_command(_command)
 

@@ -94,7 +94,7 @@ class AxisComparison:
 
     @property
     def quantity(self) -> str:
-        """ "gyro", "accel", or empty."""
+        """The kind of sensor: gyro, accel, or nothing."""
         return next(iter(self.fits.values())).wv.quantity or "" if self.fits else ""
 
     @property
@@ -139,12 +139,12 @@ class AxisComparison:
             text = f"{words} {', '.join(parts)}"
         return f"{text}; without {out}" if out else text
 
-    def number_text(self, letter: str, value: float) -> str:
-        """An N or a K in the unit of the field."""
+    def number_text(self, letter: str, value: float) -> tuple[str, str]:
+        """An N or a K in the unit of the field, and that unit."""
         known = field_units(_UNITS[letter], self.quantity)
-        if not known:
-            return f"{value:.3g} {si_parameter_unit(_UNITS[letter], self.quantity)}"
-        return f"{value * known[0].per_si:.3g} {known[0].unit}"
+        unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
+        text = f"{value * (known[0].per_si if known else 1.0):.3g}"
+        return (f"{float(text):,.0f}" if "e+" in text else text), unit
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
@@ -173,6 +173,7 @@ class AxisComparison:
                 "each": {label: each.row() for label, each in self.numbers.each.items()},
                 "joint": self.numbers.joint.row() if self.numbers.joint else None,
                 "covering": self.numbers.covering.row() if self.numbers.covering else None,
+                "nees": {label: plain(value) for label, value in self.numbers.nees.items()},
                 "upper_bounds": dict(self.numbers.upper),
                 "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
             },
@@ -258,7 +259,8 @@ class SensorComparison(Mapping[str, AxisComparison]):
             if np.isfinite(value):
                 sign = "<= " if letter in axis.numbers.upper else ""
                 times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
-                found.append(f"{letter} {sign}{axis.number_text(letter, value)}{times}")
+                shown = " ".join(axis.number_text(letter, value))
+                found.append(f"{letter} {sign}{shown}{times}")
         own = len(axis.numbers.each)
         few = f" (of {own} only)" if own < len(self.labels) else ""
         return (", ".join(found) or "none") + few
@@ -268,9 +270,9 @@ class SensorComparison(Mapping[str, AxisComparison]):
         """What the covering numbers promise, and what they do not."""
         return (
             "They are never too optimistic for any of the recordings compared, each with its "
-            "fitted model; the uncertainty of these fits is not covered. A further unit of the "
-            f"same kind has a larger N with a probability of 1/{len(self.labels) + 1}, "
-            "and so for K."
+            "fitted model; the uncertainty of these fits is not covered. A further recording of "
+            f"the same kind exceeds the largest N of {len(self.labels)} with a probability of "
+            f"1/{len(self.labels) + 1}, and likewise the largest K."
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -16,7 +16,9 @@ from gmwm.errors import InputError
 from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.problem import Scales
 from gmwm.filter_numbers import FilterNumbers, bound
-from gmwm.selection import select_structure
+from gmwm.process import Process
+from gmwm.selection import select
+from gmwm.variance import WaveletVariance
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,9 @@ class AxisNumbers:
         The bound of the joint model.
     covering : FilterNumbers or None
         One pair of numbers that bounds the models of all recordings.
+    nees : dict of str to float
+        Recording -> predicted normalised error squared of a filter with the covering numbers after
+        that time; 1 is right, below 1 cautious.
     upper : dict of str to float
         Letters that no recording determines -> the largest of their 95 % upper bounds.
     """
@@ -66,6 +71,7 @@ class AxisNumbers:
     each: Mapping[str, FilterNumbers]
     joint: FilterNumbers | None
     covering: FilterNumbers | None
+    nees: Mapping[str, float]
     upper: Mapping[str, float]
 
     def value(self, letter: str) -> float:
@@ -82,21 +88,32 @@ class AxisNumbers:
 
 
 def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
-    """The structure of theirs that describes all recordings best, fitted jointly; or why not."""
+    """The model selected for all recordings of a channel, or why there is none."""
     dt = fits[0].wv.dt
-    # Of nearly the same rate: the same averaging times.
-    same = [
-        replace(fit, wv=replace(fit.wv, dt=dt, tau=fit.wv.tau * (dt / fit.wv.dt)))
-        if fit.wv.dt != dt
-        else fit
-        for fit in fits
-    ]
     try:
-        found = select_structure(same).fit
+        found = select([_at(fit.wv, dt) for fit in fits], extra=_extra(fits)).fit
     except InputError as error:
         return Notice("no-joint-model", "warning", fits[0].wv.name, str(error))
     assert isinstance(found, JointFit)
     return found
+
+
+def _at(wv: WaveletVariance, dt: float) -> WaveletVariance:
+    """The same at the averaging times of another recording of nearly the same rate."""
+    return wv if wv.dt == dt else replace(wv, dt=dt, tau=wv.tau * (dt / wv.dt))
+
+
+def _extra(fits: Sequence[Fit]) -> tuple[Process, ...]:
+    """The largest line and the largest resonance in the models, with a free amplitude."""
+    found: dict[str, tuple[float, Process]] = {}
+    for term in (term for fit in fits for term in fit.model.terms):
+        size = term.linear_parameter
+        if size is None or "frequency" not in term.values:
+            continue
+        kind, amplitude = type(term).__name__, term.values[size.name] or 0.0
+        if kind not in found or amplitude > found[kind][0]:
+            found[kind] = amplitude, term.with_values(**{size.name: None})
+    return tuple(found[kind][1] for kind in sorted(found))
 
 
 def spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
@@ -143,15 +160,21 @@ def axis_numbers(
             each[label] = bound(fit, horizon=horizon)
         except InputError as error:
             notices.append(Notice("no-numbers", "warning", name, str(error), source=label))
+    if not each:
+        return AxisNumbers({}, None, None, {}, {}), tuple(notices)
     whole = covering = None
+    nees: dict[str, float] = {}
     try:
         whole = None if joint is None else bound(joint, horizon=horizon)
         # By names that end as the channel does, which says whether its gyro turns a heading.
         group = {f"{place} {name}": fits[label] for place, label in enumerate(each)}
-        covering = next(iter(bound(group, horizon=horizon, shared=True).values()))
-    except (InputError, StopIteration) as error:
+        found = bound(group, horizon=horizon, shared=True)
+        covering = next(iter(found.values()))
+        own = (numbers.nees[horizon] for numbers in found.values())
+        nees = dict(zip(each, own, strict=True))
+    except InputError as error:
         notices.append(Notice("no-numbers", "warning", name, str(error)))
-    return AxisNumbers(each, whole, covering, _upper(fits, covering)), tuple(notices)
+    return AxisNumbers(each, whole, covering, nees, _upper(fits, covering)), tuple(notices)
 
 
 def _upper(fits: Mapping[str, Fit], covering: FilterNumbers | None) -> dict[str, float]:
@@ -171,15 +194,14 @@ def _upper(fits: Mapping[str, Fit], covering: FilterNumbers | None) -> dict[str,
     return found
 
 
-def curve_inflation(fits: Sequence[Fit], joint: Fit) -> float:
+def curve_inflation(fits: Sequence[Fit], joint: Fit, longest: float) -> float:
     """By how much the joint model's amplitudes must grow to cover the curves of all recordings.
 
     Largest ratio of the Allan deviation of a recording's own model to that of the joint model, from
-    0.1 s (or ten samples) to the longest averaging time of the shortest recording; at least one.
+    0.1 s (or ten samples) to ``longest`` (s); at least one.
     """
     low = max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * joint.wv.dt)
-    longest = min(float(fit.wv.tau[-1]) for fit in fits)
-    tau = joint.wv.tau[(joint.wv.tau >= low) & (joint.wv.tau <= longest * (1.0 + 1e-6))]
+    tau = joint.wv.tau[(joint.wv.tau >= low) & (joint.wv.tau <= longest)]
     if tau.size == 0:
         return float("nan")
     curves = [_variance(fit, tau) for fit in fits]

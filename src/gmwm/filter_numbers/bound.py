@@ -16,6 +16,7 @@ from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import (
     KINDS,
+    TIGHTEST,
     Estimated,
     Problem,
     Target,
@@ -112,7 +113,17 @@ def bound_of(
     fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
-    sd = max(_start(group, each, model) for each in (*targets, *region))
+    dominated = (*targets, *region)
+    sd = max(_start(group, each, model) for each in dominated)
+    times = (horizon, 10.0 * horizon)
+    errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
+    if form != TIGHTEST and any(found[0].tightness > tuning.LOOSE for found in errors):
+        other = dominating(problem, TIGHTEST)
+        start = max(_start(group, each, other) for each in dominated)
+        tight = [predicted(axis, axis.chain, other, start, times[:1])[0] for axis in group]
+        looseness = [_loose(found[0], best) for found, best in zip(errors, tight, strict=True)]
+    else:
+        looseness = [()] * len(group)
     return [
         FilterNumbers(
             form=form,
@@ -120,13 +131,40 @@ def bound_of(
             horizon=horizon,
             initial_sd=sd,
             method="bound",
-            predicted=predicted(axis, axis.chain, model, sd, (horizon, 10.0 * horizon)),
-            notices=(*target.notices, *about(axis, level)),
+            predicted=found,
+            notices=(*target.notices, *_optimistic(found), *loose, *about(axis, level)),
             quantity=axis.quantity,
             stderr=stderr,
         )
-        for axis, target in zip(group, targets, strict=True)
+        for axis, target, found, loose in zip(group, targets, errors, looseness, strict=True)
     ]
+
+
+def _optimistic(found: Sequence[Predicted]) -> tuple[Notice, ...]:
+    """Where what the numbers leave out is too large for that."""
+    worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
+    if not worst.nees > tuning.OPTIMISTIC:
+        return ()
+    text = (
+        f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding; what "
+        "the numbers leave out is not small here"
+    )
+    values = {"nees": worst.nees, "time": worst.time}
+    mend = "estimate it as a state, or take it off the data"
+    return (Notice("optimistic", "warning", "", text, values, mend),)
+
+
+def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
+    """Where another form is worth its state."""
+    if found.tightness <= tuning.LOOSE or best.tightness > found.tightness / tuning.WORTH_A_STATE:
+        return ()
+    text = (
+        f"after {found.time:g} s without aiding errors are believed {found.tightness:.3g} times as "
+        f"large as they are; with {TIGHTEST}, {best.tightness:.3g} times"
+    )
+    values = {"tightness": found.tightness, "with_state": best.tightness}
+    mend = f"use {TIGHTEST} where the filter has a state for it"
+    return (Notice("loose-form", "note", "", text, values, mend),)
 
 
 def _fit(axis: Axis) -> Fit:

@@ -19,10 +19,10 @@ from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.runs import results
 from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm._core.units import field_units
-from gmwm._core.workers import results
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
 from gmwm.fleet import tuning
@@ -137,10 +137,16 @@ class Fleet(Mapping[str, Calibration | Notice]):
         for axis in self.structures:
             if axis.different:
                 most = next(iter(axis.counts))
-                text = f"{axis.channel}: {axis.counts[most]} units have {most}, {axis.different} "
-                lines += wrapped(f"{text}another structure", first="- ", indent=2)
+                text = (
+                    f"{axis.channel}: {axis.counts[most]} of {sum(axis.counts.values())} units are "
+                    f"{most}, {axis.different} of another structure"
+                )
+                lines += wrapped(text, first="- ", indent=2)
+            if axis.invalid:
+                text = f"{axis.channel}: not valid in {some(axis.invalid)}"
+                lines += wrapped(text, first="- ", indent=2)
         for each in self.spreads:
-            for outlier in each.outliers if each.parameter in DERIVED else ():
+            for outlier in each.outliers:
                 lines += wrapped(
                     f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
                     f"{outlier.value / each.median:.3g} times the median", first="- ", indent=2,
@@ -307,6 +313,9 @@ def _task(
     models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
     for name in screening:
         checks.choice("screening", name, SCREENING)
+    for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
+        if not checks.is_number(given):
+            raise InputError(f"{name} = {checks.shown(given)}: give seconds")
     return Task(
         reading=dict(reading),
         start=float(start),
@@ -332,12 +341,13 @@ def _left_over(names: Sequence[str]) -> list[Notice]:
         return []
     text = (
         f"the folder holds {len(names)} calibrations of other recordings, which are not counted: "
-        f"{_some(names)}"
+        f"{some(names)}"
     )
     return [Notice("left-over", "note", "", text, {"units": len(names)})]
 
 
-def _some(names: Sequence[str]) -> str:
+def some(names: Sequence[str]) -> str:
+    """The first names of a list."""
     return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
@@ -348,6 +358,14 @@ def _about(units: Collection[Unit]) -> list[Notice]:
     return [*notices, *_copies(units), *_unlike(done)]
 
 
+def _have(names: Sequence[str]) -> str:
+    return "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+
+
+def _channels(calibration: Calibration) -> tuple[str, ...]:
+    return (*calibration, *calibration.skipped)
+
+
 def _copies(units: Collection[Unit]) -> Iterator[Notice]:
     same: dict[str, list[str]] = {}
     for unit in units:
@@ -355,7 +373,7 @@ def _copies(units: Collection[Unit]) -> Iterator[Notice]:
             same.setdefault(unit.digest, []).append(unit.name)
     for names in same.values():
         if len(names) > 1:
-            text = f"the same recording: {_some(names)}"
+            text = f"the same recording: {some(names)}"
             yield Notice("same-recording", "warning", "", text, {"units": len(names)},
                          "each is counted; leave copies out")  # fmt: skip
 
@@ -367,15 +385,18 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
     median = sorted(each.rate for each in done.values())[len(done) // 2]
     other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
     if other:
-        text = f"{len(other)} units have another sampling rate than {median:g} Hz: {_some(other)}"
+        text = f"{_have(other)} another sampling rate than {median:g} Hz: {some(other)}"
         yield Notice("rates-differ", "warning", "", text, {"units": len(other), "rate": median},
                      "make sure that they are of one kind")  # fmt: skip
-    every = dict.fromkeys(name for each in done.values() for name in (*each, *each.skipped))
-    for channel in every:
-        lacking = [n for n, each in done.items() if channel not in (*each, *each.skipped)]
-        if lacking:
-            text = f"{len(lacking)} units have no such channel: {_some(lacking)}"
-            yield Notice("channels-differ", "warning", channel, text, {"units": len(lacking)})
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for channel in dict.fromkeys(name for each in done.values() for name in _channels(each)):
+        names = tuple(name for name, each in done.items() if channel not in _channels(each))
+        lacking.setdefault(names, []).append(channel)
+    for names, channels in lacking.items():
+        if names:
+            text = f"{_have(names)} no such channel: {some(names)}"
+            values = {"units": len(names)}
+            yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
     lengths = {name: each.duration for name, each in done.items()}
     longest, shortest = max(lengths.values()), min(lengths.values())
     if longest > tuning.LENGTHS * shortest:

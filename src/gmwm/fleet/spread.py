@@ -197,12 +197,12 @@ def spreads_of(rows: Sequence[Row]) -> tuple[Spread, ...]:
         groups.setdefault((row["channel"], row["parameter"], of), []).append(row)
     having = Counter(channel for channel, _ in {(row["channel"], row["device"]) for row in valid})
     made = (_spread(key, of_group, having[key[0]]) for key, of_group in groups.items())
-    order = list(DERIVED)
+    order, channels = list(DERIVED), list(dict.fromkeys(row["channel"] for row in valid))
     return tuple(sorted(
         (each for each in made if each.n),
         key=lambda s: (
             order.index(s.parameter) if s.parameter in order else len(order),
-            s.parameter, s.of, s.channel,
+            s.parameter, s.of, channels.index(s.channel),
         ),
     ))  # fmt: skip
 

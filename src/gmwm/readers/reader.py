@@ -14,6 +14,7 @@ import numpy as np
 from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
@@ -31,6 +32,7 @@ from gmwm.readers.formats import (
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
+from gmwm.readers.sentinels import without_sentinels
 from gmwm.readers.table import Table, label
 
 
@@ -150,6 +152,12 @@ def _part(
     start = 0.0
     if roles.time is not None:
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
+    odd: list[Notice] = []
+    for name, index in roles.channels.items():
+        unit = unit_of[name]
+        largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
+        arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
+        odd += found
     used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
@@ -159,7 +167,7 @@ def _part(
         rate=used_rate,
         units=unit_of,
         source=table.source,
-        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices),
+        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]

@@ -42,6 +42,14 @@ on it shows a wrong unit; units differ by a factor of 57 and more."""
 LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 """u: fourth powers of the data must not overflow."""
 
+BEYOND_SENSORS = 1e6
+"""rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
+
+SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
+"""Samples that give the range of most, and by how many times the width of 90 % of them a number is
+away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of the
+samples are no exception."""
+
 BYTES_PER_SAMPLE = 20
 """Of memory while a file is read: a column as it is read, the same in SI units, and one of the
 others joined from its blocks."""
@@ -147,6 +155,14 @@ ASTRAY = 2.0
 
 MOST_OF_ONE_STAMP = 1024
 """Rows with one stamp that a full buffer holds, or a host that stalls writes."""
+
+BEATS, IN_BEAT, MOST_IN_BEAT = (0.125, 0.42), 0.1, 0.9
+"""Intervals by which stamps are early and late in turns: less is the jitter of any clock, more are
+bursts of two rows. How near to the short or the long step they are, and how many of them."""
+
+ROWS_OF_SHIFT, LEAST_SHIFT, SHIFT_ERRORS = 100, 0.3, 8.0
+"""Rows of a median of the distance from the clock; its change, in intervals and in usual changes,
+that is a shift: with jitter of 40 % a median has an error of 0.04."""
 
 # -- binary files ---------------------------------------------------------------------------------
 

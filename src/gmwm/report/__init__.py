@@ -2,8 +2,9 @@
 
 from gmwm.report.calibration import fragment, write_report
 from gmwm.report.datasheet import read_datasheet
-from gmwm.report.fleet import fleet_fragment, write_fleet_report
 from gmwm.report.navigated import write_comparison_report, write_navigated_report
+from gmwm.report.several.compared import write_sensor_comparison_report
+from gmwm.report.several.fleet import fleet_fragment, write_fleet_report
 from gmwm.report.text import duration_text
 from gmwm.report.validation import write_validation_report
 
@@ -16,5 +17,6 @@ __all__ = [
     "write_fleet_report",
     "write_navigated_report",
     "write_report",
+    "write_sensor_comparison_report",
     "write_validation_report",
 ]

@@ -1,11 +1,10 @@
 """Which model: a ranking of candidates, what ties, what is chosen."""
 
-from gmwm.selection.select import Selection, select, select_structure
+from gmwm.selection.select import Selection, select
 from gmwm.selection.ties import wider_ranges
 
 __all__ = [
     "Selection",
     "select",
-    "select_structure",
     "wider_ranges",
 ]

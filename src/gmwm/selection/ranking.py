@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
@@ -39,7 +39,6 @@ from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
 from gmwm.variance import PooledVariance, WaveletVariance
 
 MAX_GAUSS_MARKOV = 5
-_TEXTBOOK = (WhiteNoise, QuantizationNoise, RandomWalk, GaussMarkov, RateRamp)
 
 
 @dataclass(frozen=True)
@@ -198,31 +197,6 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
         elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
     return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key), ambiguous
-
-
-def rank_structures(wv: PooledVariance, fits: Sequence[Fit]) -> list[Candidate]:
-    """The structures of several fits, best first, for all of their recordings; without ramps."""
-    models: list[Model] = []
-    others: dict[str, Process] = {}
-    for fitted in fits:
-        model = Model(tuple(term for term in fitted.model.terms if not term.is_drift))
-        free = {*fitted.keys, *fitted.upper_bounds} & set(model.params)
-        opened = model.with_params(dict.fromkeys(free))
-        if free and opened not in models:
-            models.append(opened)
-        for term in model.terms:
-            size = term.linear_parameter
-            if size is not None and not isinstance(term, _TEXTBOOK):
-                others.setdefault(type(term).__name__, term.with_values(**{size.name: None}))
-    reference = dictionary_fit(wv, wv.variance, tuple(others.values()))
-    ground = _Ground.of(wv.variance, reference, reference.discrepancy)
-    designs = [Design(model, Scales.of(wv)) for model in models]
-    ranking = [
-        ground.candidate(design, search(Profile(design, ground.target, ground.root)))
-        for design in designs
-        if design.n_free < wv.tau.size
-    ]
-    return sorted(ranking, key=rank_key) or [_fallback(wv, ground)[0]]
 
 
 def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:

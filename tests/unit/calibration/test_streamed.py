@@ -17,7 +17,7 @@ UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("streamed") / "static.csv"
-    truth = gmwm.WhiteNoise(1e-3) + gmwm.RandomWalk(1e-4)
+    truth = gmwm.WhiteNoise(1e-3) + gmwm.RandomWalk(1e-3)
     columns = [gmwm.simulate(truth, n=20_000, dt=0.01, seed=seed) for seed in (1, 2)]
     rows = np.stack([*columns, np.full(20_000, 9.81)], axis=1)
     np.savetxt(path, rows, "%.9g", ",", header="gyro_x,gyro_y,accel_z", comments="")

@@ -33,11 +33,11 @@ _TITLES = {
     "filter_K": "K for a filter",
     "floor_B": "B at the lowest point",
 }
+_MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 _MOST_NAMED = 12  # units in a line of text
 
-_WIDTH, _LEFT, _RIGHT, _ROW, _TOP = 480.0, 74.0, 14.0, 34.0, 20.0  # of a picture, pixels
+_WIDTH, _LEFT, _RIGHT, _ROW, _TOP = 400.0, 60.0, 12.0, 34.0, 8.0  # of a picture, pixels
 _STEPS = (1.0, 2.0, 5.0)
-_FINE_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 
 
@@ -111,7 +111,7 @@ def _verdict(fleet: Fleet) -> dict[str, str]:
         parts.append(f"{len(fleet.failed)} could not be calibrated")
     apart = {outlier.device for each in fleet.spreads for outlier in each.outliers}
     if apart:
-        parts.append(f"{len(apart)} stand apart from the others")
+        parts.append(f"{len(apart)} {'stand' if len(apart) > 1 else 'stands'} apart")
     if not fleet.valid:
         return {"state": "bad", "word": "No valid model", "text": "; ".join(parts)}
     is_good = len(sound) == len(fleet) and not apart
@@ -148,7 +148,9 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
                         "rows": [_row(each) for each in own],
                     }
                 )
-        groups.append({"quantity": quantity or "other channels", "numbers": numbers})
+        is_free = any(row["free"] for number in numbers for row in number["rows"])
+        title = quantity or "other channels"
+        groups.append({"quantity": title, "numbers": numbers, "is_free": is_free})
     return groups
 
 
@@ -180,6 +182,8 @@ def _row(spread: Spread) -> dict[str, Any]:
     if not spread.is_normal:
         remarks.append(f"not normal, p = {spread.normality:.1g}")
     share = spread.of_estimation
+    if share > _MOSTLY:
+        remarks.append(f"{100.0 * min(share, 1.0):.0f} % of the variance is of estimation")
     return {
         "channel": spread.channel,
         "parameter": f"{spread.parameter} of {spread.of}" if spread.of > 1 else spread.parameter,
@@ -301,10 +305,13 @@ def _picture(spreads: Sequence[Spread]) -> dict[str, Any]:
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Round values between two others, from two to six of them."""
-    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
-    for steps in ((1.0,), _STEPS, _FINE_STEPS):
+    """Round values between two others, a few of them."""
+    if high > 10.0 * low:
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+        steps = (1.0,) if high > 1000.0 * low else _STEPS
         ticks = [float(d * s) for d in decades for s in steps if low <= d * s <= high]
-        if len(ticks) >= 3:
-            return ticks[:: -(-len(ticks) // 6)]
-    return [low * 1.02, float(np.sqrt(low * high)), high / 1.02]
+        return ticks[:: -(-len(ticks) // 6)]
+    rough = (high - low) / 4.0
+    unit = 10.0 ** np.floor(np.log10(rough))
+    step = unit * next(s for s in (*_STEPS, 10.0) if s * unit >= rough)
+    return [float(x) for x in np.arange(np.ceil(low / step), np.floor(high / step) + 1.0) * step]
