@@ -15,13 +15,14 @@ import click
 
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import with_option
-from gmwm.cli.model_text import models_of_channels, written_models
 from gmwm.cli.options import (
     estimating_options,
+    models_of_channels,
     part_options,
     printing_options,
     read_recording,
     reading_options,
+    written_models,
 )
 from gmwm.errors import InputError
 

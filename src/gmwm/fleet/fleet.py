@@ -19,10 +19,10 @@ from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.runs import results
 from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm._core.units import field_units
-from gmwm._core.workers import results
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
 from gmwm.fleet import tuning

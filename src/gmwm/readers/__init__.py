@@ -7,8 +7,8 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 
 from gmwm._core.units import AUXILIARY
 from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
+from gmwm.readers.cells import DATE, seconds_of
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.dates import DATE, seconds_of
 from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read

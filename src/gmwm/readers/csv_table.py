@@ -22,8 +22,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, number, split_line
-from gmwm.readers.dates import DATE, seconds_of
+from gmwm.readers.cells import BLANKS, DATE, number, seconds_of, split_line
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable

@@ -18,8 +18,8 @@ from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorCompa
 from gmwm.errors import printable
 from gmwm.estimate import Estimate, Fit
 from gmwm.report.datasheet import Datasheet, read_datasheet
-from gmwm.report.multiples import COLOURS, multiple
 from gmwm.report.page import rendered, resource
+from gmwm.report.several.multiples import COLOURS, multiple
 from gmwm.report.text import duration_text, short
 
 _SIDE_BY_SIDE = 6
