@@ -6,7 +6,7 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.estimate.problem.nonnegative import nonnegative, without
+from gmwm.estimate.problem import nonnegative, without
 
 
 @compiled()

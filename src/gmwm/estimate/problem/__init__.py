@@ -7,7 +7,12 @@ from gmwm.estimate.problem.information import (
     slope_dof,
     spectral_information,
 )
-from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
+from gmwm.estimate.problem.nonnegative import (
+    nonnegative,
+    objectives_with,
+    solve_nonnegative,
+    without,
+)
 from gmwm.estimate.problem.parameters import (
     Coordinates,
     Term,
@@ -50,6 +55,7 @@ __all__ = [
     "in_model_order",
     "is_plain",
     "keys_by_term",
+    "nonnegative",
     "objectives_with",
     "ols_slope",
     "shape_of",
@@ -58,4 +64,5 @@ __all__ = [
     "solve_nonnegative",
     "spectral_information",
     "weight_root",
+    "without",
 ]
