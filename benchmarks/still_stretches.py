@@ -1,7 +1,9 @@
-"""Stretches at rest of emulated flights and drives: found to a second, N within its interval.
+"""Stretches at rest: found to a second, N within its interval; vibration; what is static.
 
-``python benchmarks/still_stretches.py`` prints, for 100 logs, how many stretches were found, how
-far their ends are off, and how often the interval of N holds the truth. ``--logs 10`` does fewer.
+``python benchmarks/still_stretches.py logs`` prints, for 100 emulated flights and drives, how many
+stretches were found, how far their ends are off, and how often the interval of N holds the truth.
+``vibration`` prints how many recordings that vibrate for a part of their time are not taken as
+static, and ``static`` how many are that only have noise of some kind. ``--logs 10`` does fewer.
 """
 
 from __future__ import annotations
@@ -11,9 +13,11 @@ import argparse
 import numpy as np
 
 import gmwm
+from gmwm.diagnosis import rest_of
 
 RATE = 100.0
 GYRO, ACCEL = 1e-4, 1e-3  # N, u/sqrt(Hz)
+SHORTEST = 12.0  # s, of a stretch that is used
 
 
 def noise(rng, n, density):
@@ -63,10 +67,127 @@ def log(kind, seed):
     return gmwm.Recording.from_arrays(arrays, RATE, units, kind), rest
 
 
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--logs", type=int, default=100)
-    logs = parser.parse_args().logs
+STATIC = (
+    "white", "Student t3", "Laplace", "walk", "flicker", "Gauss-Markov", "quantization",
+    "rounding", "line", "beats", "resonance", "warm-up", "noise that swells", "steps", "periods",
+    "shocks", "outliers", "1 % lost",
+)  # fmt: skip
+
+
+def static(kind, rng):
+    """A recording at rest of one to thirty minutes, of noise of a kind."""
+    rate, seconds = (
+        rng.choice([50.0, 100.0, 200.0, 400.0]),
+        rng.choice([60.0, 200.0, 600.0, 1800.0]),
+    )
+    n = round(seconds * min(rate, 100.0))  # faster ones are shorter
+    t, dt = np.arange(n) / rate, 1.0 / rate
+    shocks = [(rng.integers(n), rng.uniform(0.05, 1.0)) for _ in range(1 + n // round(60 * rate))]
+    arrays = {}
+    for sensor, density in (("gyro", GYRO), ("accel", ACCEL)):
+        deviation = density * np.sqrt(rate)
+        for axis in "xyz":
+            x = rng.normal(size=n)
+            if kind == "Student t3":
+                x = rng.standard_t(3, size=n)
+            elif kind == "Laplace":
+                x = rng.laplace(size=n)
+            elif kind == "walk":
+                x += 10.0 ** rng.uniform(-3.0, -0.5) * np.cumsum(rng.normal(size=n))
+                x -= np.linspace(0.0, x[-1], n)
+            elif kind == "flicker":
+                x += gmwm.simulate(gmwm.BiasInstability(3.0), n=n, dt=dt, seed=rng)
+            elif kind == "Gauss-Markov":
+                slow = gmwm.GaussMarkov(5.0, 10.0 ** rng.uniform(-2.0, 2.0))
+                x += gmwm.simulate(slow, n=n, dt=dt, seed=rng)
+            elif kind == "quantization":
+                x = 3.0 * np.diff(rng.uniform(size=n + 1))
+            elif kind == "rounding":
+                step = rng.choice([1.0, 3.0, 6.0])
+                x += 0.01 * np.cumsum(rng.normal(size=n)) + rng.uniform(0.0, step)
+                x = step * np.round(x / step)
+            elif kind == "line":
+                x += rng.uniform(1.0, 10.0) * np.sin(6.28 * rng.uniform(0.2, 0.45 * rate) * t)
+            elif kind == "beats":
+                f, apart = rng.uniform(1.0, 0.4 * rate), 10.0 ** rng.uniform(-2.5, 0.0)
+                x += 2.0 * (np.sin(6.28 * f * t) + np.sin(6.28 * (f + apart) * t))
+            elif kind == "resonance":
+                damping = 10.0 ** rng.uniform(-2.3, -0.5)
+                bump = gmwm.Resonance(rng.uniform(1.0, 6.0), rng.uniform(0.05, 0.4) * rate, damping)
+                x += gmwm.simulate(bump, n=n, dt=dt, seed=rng)
+            elif kind == "warm-up":
+                x *= 1.0 + rng.uniform(0.2, 2.0) * np.exp(-t / rng.uniform(60.0, 600.0))
+            elif kind == "noise that swells":
+                x *= 1.0 + rng.uniform(0.0, 0.6) * np.sin(6.28 * t / rng.uniform(100.0, 1000.0))
+            elif kind == "steps":
+                for at in rng.integers(n, size=5):
+                    x[at:] += 3.0 * rng.normal()
+            elif kind == "periods":
+                x += 5.0 * np.sin(6.28 * t / rng.uniform(20.0, 500.0))
+            elif kind == "shocks":
+                for at, length in shocks:
+                    part = x[at : at + round(length * rate)]
+                    part += 10.0 ** rng.uniform(1.0, 3.0) * rng.normal(size=part.size)
+            elif kind == "outliers":
+                x += 20.0 * rng.normal(size=n) * (rng.random(n) < 0.01)
+            elif kind == "1 % lost":
+                x[rng.random(n) < 0.01] = np.nan
+            arrays[f"{sensor}_{axis}"] = deviation * x + (9.79 if axis == "z" else 0.0) * (
+                sensor == "accel"
+            )
+    return gmwm.Recording.from_arrays(arrays, rate, {"gyro": "rad/s", "accel": "m/s^2"}, kind)
+
+
+def vibrating(seed, size, share, axes, is_line):
+    """Ten minutes at rest that vibrate for a share of their time, and begin and end of that, s."""
+    rng = np.random.default_rng([seed, 5])
+    n = round(600.0 * RATE)
+    t = np.arange(n) / RATE
+    begin = rng.uniform(0.0, 600.0 * (1.0 - share))
+    on = (t >= begin) & (t < begin + 600.0 * share)
+    spin, arrays = rng.uniform(8.0, 45.0), {}
+    for sensor, density in (("gyro", GYRO), ("accel", ACCEL)):
+        for axis in "xyz":
+            x = rng.normal(size=n)
+            wave = np.sqrt(2.0) * np.sin(6.28 * spin * t + rng.uniform(0.0, 6.28))
+            wave = wave if is_line else rng.normal(size=n)
+            if f"{sensor}_{axis}".startswith(axes):
+                x += size * on * wave
+            arrays[f"{sensor}_{axis}"] = density * np.sqrt(RATE) * x
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    return gmwm.Recording.from_arrays(arrays, RATE, units), (begin, begin + 600.0 * share)
+
+
+def print_static(runs):
+    for kind in STATIC:
+        fired = [
+            seed
+            for seed in range(runs)
+            if rest_of(static(kind, np.random.default_rng([seed, STATIC.index(kind), 9])))
+        ]
+        print(f"{kind:18} {len(fired):3} of {runs} not taken as static")
+
+
+def print_vibration(runs):
+    print("vibration, standard deviations of the noise; found, of which ends to 1 s")
+    for axes in ("", "accel", "accel_z"):
+        for size in (1.0, 1.5, 2.0, 3.0, 10.0):
+            row = []
+            for share in (0.05, 0.1, 0.33, 0.6):
+                found = near = 0
+                for seed in range(runs):
+                    recording, ends = vibrating(seed, size, share, axes, seed % 2 == 0)
+                    rest = rest_of(recording)
+                    if rest is not None:
+                        found += 1
+                        gaps = np.array([*rest.stretches]).ravel()
+                        wanted = [e for e in ends if SHORTEST < e < 600.0 - SHORTEST]
+                        near += all(np.min(np.abs(gaps - e), initial=9.0) < 1.0 for e in wanted)
+                row.append(f"{share:4.0%}: {found:3} {near:3}")
+            print(f"{axes or 'all axes':8} x{size:<4g} {'  '.join(row)}")
+
+
+def print_logs(logs):
     for kind in ("flight", "drive"):
         right, off, inside, channels = 0, [], 0, 0
         for seed in range(logs):
@@ -86,6 +207,16 @@ def main():
             f"at most; N in its 95 % interval in {inside} of {channels} channels "
             f"({100 * inside / channels:.1f} %)"
         )
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", choices=("logs", "vibration", "static"), default="logs", nargs="?")
+    parser.add_argument("--logs", type=int, default=100)
+    given = parser.parse_args()
+    {"logs": print_logs, "vibration": print_vibration, "static": print_static}[given.what](
+        given.logs
+    )
 
 
 if __name__ == "__main__":

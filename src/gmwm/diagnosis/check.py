@@ -29,6 +29,7 @@ from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
 from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.still import vibration_notice
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
 
@@ -86,6 +87,8 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
     motion = find_motion(recording)
     whole = [_length(recording), *motion_notices(motion), *read, *_clock(recording)]
+    if not motion.moves and (vibration := vibration_notice(recording)) is not None:
+        whole.append(vibration)
     examined: dict[str, _Examined] = {}
     channels = recording.inertial
     for channel in channels:

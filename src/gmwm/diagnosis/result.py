@@ -95,9 +95,9 @@ class Health(Document):
     ----------
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
-        reader, their codes are "length", "not-static", "tilt", "clock", "gap", "dead", "infinite",
-        "size", "stuck", "saturation", "repeated-samples", "interpolated", "event", "outliers",
-        "heavy-tails", "rounding", "line",
+        reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
+        "infinite", "size", "stuck", "saturation", "repeated-samples", "interpolated", "event",
+        "outliers", "heavy-tails", "rounding", "line",
         "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.

@@ -288,6 +288,19 @@ LOUDER_THAN_REST = 1.5
 """Scatter of an axis over that of the quietest stretch, from which the stretch vibrates: white
 noise that is 22 % larger."""
 
+BLOCKS_OF_LEVEL = 4
+"""Blocks (1 s) of a mean of the logarithms of the scatter, whose sudden changes are found."""
+
+FEW_SECONDS = 3.0
+"""Over the root of their number: how much larger a change must be (a minute: 1.4 times, for noise
+with resonances and outliers that is static: benchmarks/still_stretches.py)."""
+
+HARMFUL_SCATTER = 0.05
+"""Share that loud stretches add to the variance of an axis: 2.5 % of its white noise."""
+
+LEAST_SHAKEN = 0.02
+"""Of the recording that is loud in stretches of less than ten seconds: fewer are shocks."""
+
 POINTS_OF_BAND, PEAK_OF_BAND, SHARE_OF_BAND = 512, 20.0, 0.3
 """Points of a spectrum; its peak over the median within an octave, and the share of the variance in
 it, of a stretch that vibrates: a sensor at rest has lines, but most of its noise is none."""

@@ -14,6 +14,7 @@ import numpy as np
 from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
@@ -31,6 +32,7 @@ from gmwm.readers.formats import (
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
+from gmwm.readers.sentinels import without_sentinels
 from gmwm.readers.table import Table, label
 
 
@@ -138,14 +140,7 @@ def _part(
 ) -> Part:
     """The recording of a table, and when it begins."""
     stated = _stated_rate(table, rate)
-    columns = Columns(table.source, table.names)
-    roles = assign_roles(columns, table.tentative, units, channels, time)
-    if not roles.channels:
-        raise InputError(
-            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
-            'e.g. channels={"gyro_x": 1}',
-            "channel-unknown",
-        )
+    roles = roles_of(table, units, channels, time)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
@@ -157,6 +152,12 @@ def _part(
     start = 0.0
     if roles.time is not None:
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
+    odd: list[Notice] = []
+    for name, index in roles.channels.items():
+        unit = unit_of[name]
+        largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
+        arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
+        odd += found
     used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
@@ -166,7 +167,7 @@ def _part(
         rate=used_rate,
         units=unit_of,
         source=table.source,
-        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices),
+        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
@@ -177,6 +178,35 @@ def _part(
         jitter=timing.jitter if timing is not None else None,
     )
     return Part(recording, start)
+
+
+def roles_of(
+    table: Table,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Roles:
+    """Which column of a table is which channel."""
+    columns = Columns(table.source, table.names)
+    roles = assign_roles(columns, table.tentative, units, channels, time)
+    if not roles.channels:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
+    return roles
+
+
+def read_table(
+    table: Table,
+    rate: float | None,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Recording:
+    """The recording of a table; the arguments are those of `read`."""
+    return _part(table, rate, units, channels, time).recording
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

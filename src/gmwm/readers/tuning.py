@@ -39,8 +39,24 @@ TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
 """Share of the changes of gravity that turning explains, and relative error of the rate, from which
 on it shows a wrong unit; units differ by a factor of 57 and more."""
 
+LEAST_CONE, LAGS_OF_TURN, FEWEST_TURNING = 0.01, (1, 4, 16), 20
+"""rad by which gravity leaves its mean where a sensor turns steadily (at rest by 0.3 deg), seconds
+over which its changes are compared, and how many of these a recording has at least."""
+
+USUAL_BIAS = 0.052
+"""rad/s (3 deg/s): biases at rest of most MEMS gyros are smaller by their data sheets; those of the
+cheapest are not."""
+
 LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 """u: fourth powers of the data must not overflow."""
+
+BEYOND_SENSORS = 1e6
+"""rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
+
+SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
+"""Samples that give the range of most, and by how many times the width of 90 % of them a number is
+away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of the
+samples are no exception."""
 
 BYTES_PER_SAMPLE = 20
 """Of memory while a file is read: a column as it is read, the same in SI units, and one of the
@@ -148,6 +164,14 @@ ASTRAY = 2.0
 MOST_OF_ONE_STAMP = 1024
 """Rows with one stamp that a full buffer holds, or a host that stalls writes."""
 
+BEATS, IN_BEAT, MOST_IN_BEAT = (0.125, 0.42), 0.1, 0.9
+"""Intervals by which stamps are early and late in turns: less is the jitter of any clock, more are
+bursts of two rows. How near to the short or the long step they are, and how many of them."""
+
+ROWS_OF_SHIFT, LEAST_SHIFT, SHIFT_ERRORS = 100, 0.3, 8.0
+"""Rows of a median of the distance from the clock; its change, in intervals and in usual changes,
+that is a shift: with jitter of 40 % a median has an error of 0.04."""
+
 # -- binary files ---------------------------------------------------------------------------------
 
 LARGEST_OF_BINARY = 60.0
@@ -158,3 +182,14 @@ RECORDS_AT_ONCE = 1 << 16
 
 LONGEST_OF_WRAP = 100.0
 """Steps within which a counter that ran over goes on."""
+
+# -- recordings that are read a block at a time ---------------------------------------------------
+
+ROWS_OF_BLOCK = 1 << 18
+"""Of a block: 2 MB a column."""
+
+FEWEST_OF_BLOCK = 4096
+"""Rows of which a clock is seen as well as of a long recording."""
+
+ROWS_BACK_OF_BLOCK = 2
+"""By which stamps may be early at the seam of two blocks: a late row before."""

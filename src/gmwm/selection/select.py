@@ -14,6 +14,7 @@ from gmwm._core.frames import frame
 from gmwm._core.text import wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
+from gmwm.estimate.result import fit_joint
 from gmwm.process import GaussMarkov, Model, Process, WhiteNoise
 from gmwm.selection import tuning
 from gmwm.selection.ranking import (
@@ -254,7 +255,7 @@ def select(
         ranking = tuple(sorted((*ranking, chosen), key=rank_key))
     if slope is not None and not _has_ramp(chosen.model):
         fitted = replace(fitted, notices=(*fitted.notices, ramp_or_walk(fitted, slope)))
-    return Selection(ranking, chosen, fitted)
+    return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
 
 
 def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
@@ -336,11 +337,19 @@ def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
         if not _gauss_markov_is_redundant(fits[-1]):
             break
     ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
-    return Selection(ranking, ranking[0], fits[-1])
+    return Selection(ranking, ranking[0], _of_each(ranking[0], fits[-1], wv))
 
 
 def _fitted(model: Model, wv: WaveletVariance) -> Fit:
-    return estimate(model, wv.parts if isinstance(wv, PooledVariance) else wv)
+    """Of several recordings, to their mean: a choice does not need the fit to each of them."""
+    return estimate(model, wv)
+
+
+def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:
+    """The fit of the chosen model with those to each recording, where there are several."""
+    if not isinstance(wv, PooledVariance):
+        return fitted
+    return fit_joint(chosen.model, wv.parts, estimate, fitted)
 
 
 def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:

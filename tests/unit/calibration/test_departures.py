@@ -8,7 +8,9 @@ import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Departure, departures
 from gmwm.calibration.departure_notices import departure_notice
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
+from gmwm.cli.hints import with_option
 
 DT = 1.0
 N = 7200

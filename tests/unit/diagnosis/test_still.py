@@ -10,7 +10,7 @@ import pytest
 import gmwm
 from gmwm.diagnosis import find_still, rest_of
 from gmwm.errors import InputError
-from gmwm.process import WhiteNoise
+from gmwm.process import Resonance, WhiteNoise
 
 RATE = 100.0
 GYRO, ACCEL = 1e-4, 1e-3  # u/sqrt(Hz)
@@ -72,10 +72,84 @@ def test_what_is_static_is_left_whole(seed):
     assert rest_of(recording) is None
 
 
+def vibrating(size, *stretches, seconds=300.0, seed=1, axes=range(6), line=True):
+    """A recording at rest that vibrates in some stretches, in standard deviations of the noise."""
+    recording, _ = log(("rest", seconds), seed=seed)
+    rng = np.random.default_rng([seed, 1])
+    t = np.arange(recording.n) / RATE
+    on = np.any([(t >= a) & (t < b) for a, b in stretches], axis=0)
+    for axis in axes:
+        channel = recording.channels[axis]
+        deviation = np.sqrt(RATE) * (GYRO if channel.quantity == "gyro" else ACCEL)
+        wave = np.sqrt(2.0) * np.sin(6.28 * 23.0 * t + axis) if line else rng.normal(size=t.size)
+        channel.values[:] += size * deviation * on * wave
+    return recording
+
+
+@pytest.mark.parametrize("line", [True, False])
+@pytest.mark.parametrize("share", [0.05, 0.6])
+@pytest.mark.parametrize("size", [1.5, 3.0, 10.0])
+def test_what_only_vibrates_is_no_rest(size, share, line):
+    begin, end = 100.0, 100.0 + 300.0 * share
+    found = rest_of(vibrating(size, (begin, end), axes=range(3, 6), line=line))
+    assert found is not None
+    wanted = [(0.0, begin), (end, 300.0)]
+    assert np.max(np.abs(np.array(found.stretches) - wanted)) < 1.5
+
+
+def test_what_is_shaken_between_short_stops_has_no_stretch():
+    found = rest_of(vibrating(10.0, *((s, s + 12.0) for s in range(8, 300, 20)), line=False))
+    assert found is not None
+    assert found.stretches == ()
+    assert found.longest == pytest.approx(8.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["student", "laplace", "walk", "rounded", "line", "resonance", "warm-up", "shocks", "steps"],
+)
+def test_noise_whose_scatter_varies_is_at_rest(kind):
+    recording, _ = log(("rest", 300.0))
+    rng = np.random.default_rng(3)
+    n = recording.n
+    t, shocks = np.arange(n) / RATE, rng.integers(n - 150, size=5)
+    for channel in recording.channels:
+        values = channel.values
+        deviation = np.sqrt(RATE) * (GYRO if channel.quantity == "gyro" else ACCEL)
+        if kind == "student":
+            values += deviation * rng.standard_t(3, n)
+        elif kind == "laplace":
+            values += deviation * rng.laplace(size=n)
+        elif kind == "walk":
+            values += 0.3 * deviation * np.cumsum(rng.normal(size=n))
+        elif kind == "rounded":
+            values += 0.02 * deviation * np.cumsum(rng.normal(size=n))
+            values[:] = np.round(values / (4.0 * deviation)) * 4.0 * deviation
+        elif kind == "line":
+            values += 10.0 * deviation * np.sin(6.28 * 17.0 * t)
+        elif kind == "resonance":
+            narrow = Resonance(5.0 * deviation, 11.0, 0.005)
+            values += gmwm.simulate(narrow, n, 1.0 / RATE, seed=rng)
+        elif kind == "warm-up":
+            values += 1.5 * deviation * np.exp(-t / 150.0) * rng.normal(size=n)
+        elif kind == "shocks":
+            for at in shocks:
+                values[at : at + 150] += 50.0 * deviation * rng.normal(size=150)
+        elif kind == "steps":
+            for at in rng.integers(n, size=10):
+                values[at:] += 2.0 * deviation * rng.normal()
+    assert rest_of(recording) is None
+
+
 def test_a_shock_does_not_cut_a_stretch():
     recording, _ = log(*FLIGHT)
     recording["accel_x"].values[2000:2020] += 3.0
     assert len(find_still(recording).stretches) == 2
+
+
+def test_less_than_a_second_at_rest_at_the_beginning():
+    recording, rest = log(("rest", 1.0), ("move", 12.0), ("rest", 20.0))
+    assert np.max(np.abs(np.array(find_still(recording).stretches) - rest[1:])) < 1.0
 
 
 def test_a_boat_is_never_at_rest():
@@ -100,6 +174,20 @@ def test_they_are_calibrated_jointly():
     assert notice.values["longest"] == pytest.approx(40.0, abs=1.0)
     assert notice.values["total"] == pytest.approx(sum(b - a for a, b in rest), abs=3.0)
     assert cal.n * recording.dt == pytest.approx(notice.values["total"], abs=0.1)
+
+
+def test_what_only_vibrates_is_calibrated_on_its_stretches_at_rest():
+    recording = vibrating(3.0, (40.0, 70.0), seconds=110.0)
+    recording = replace(recording, channels=recording.channels[2::3])
+    cal = gmwm.calibrate(recording, WhiteNoise())
+    for name, fit in cal.items():
+        low, high = fit.interval(0.999)["N"]
+        assert low < (GYRO if name.startswith("gyro") else ACCEL) < high
+    (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
+    assert notice.values["stretches"] == 2
+    found = [each for each in gmwm.health(recording).notices if each.code == "vibration"]
+    assert found[0].values["total"] == pytest.approx(30.0, abs=1.0)
+    assert 2.5 < found[0].values["ratio"] < 4.0
 
 
 def test_a_log_without_rest_is_refused_with_the_longest_stretch():

@@ -8,6 +8,7 @@ import pytest
 import gmwm
 from gmwm.errors import InputError
 from gmwm.readers import read
+from gmwm.readers.clock.beat import without_beat
 from gmwm.readers.clock.uneven import followed
 
 N = 6000
@@ -190,3 +191,55 @@ def test_a_host_that_stalls_loses_nothing(recorded):
     np.testing.assert_array_equal(found["gyro_x"].values, truth)
     (notice,) = [each for each in found.notices if each.code == "stamps-astray"]
     assert notice.values["largest"] == pytest.approx(0.1, rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0 / 3.0, 0.4])
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_stamps_early_and_late_in_turns(recorded, share, loss):
+    clock = Simulated(4, 200.0)
+    clock.stamps = clock.stamps + share * (-1.0) ** clock.number / 200.0
+    clock.lose(loss)
+    found, truth = recorded(clock)
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    assert found.rate == pytest.approx(200.0, rel=1e-5)
+    (notice,) = [each for each in found.notices if each.code == "stamps-in-turns"]
+    assert notice.values["share"] == pytest.approx(share, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.4])
+def test_jitter_and_rounding_have_no_turns(seed, share):
+    rng = np.random.default_rng(seed)
+    n = (64, 500)[seed % 2]
+    assert without_beat(np.arange(n) + rng.uniform(-share, share, n)) is None
+    assert without_beat(np.round(np.arange(n) / rng.uniform(100.0, 900.0), 3)) is None
+
+
+@pytest.mark.parametrize("by", [-4.0, -0.6, 2e8])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_clock_that_is_set_by_little_or_in_a_stall_is_reported(recorded, by, seed):
+    clock = Simulated(seed, 200.0)
+    clock.jitter(0.3)
+    row = int(clock.rng.integers(1000, 5000))
+    if abs(by) > 1.0:
+        clock.stamps[row - 10 : row + 10] = clock.stamps[row + 10]
+    clock.stamps[row:] += by / 200.0
+    found, _ = recorded(clock)
+    notices = {each.code: each for each in found.notices}
+    reported = notices.get("clock-shifts", notices.get("clock-set"))
+    assert reported.severity == "warning"
+    if "clock-shifts" in notices:
+        assert found.n == N
+        assert reported.values["largest"] == pytest.approx(by / 200.0, rel=0.1, abs=5e-4)
+        assert reported.values["row"] == pytest.approx(row, abs=100)
+
+
+def test_a_clock_that_wanders_has_no_shifts(recorded):
+    clock = Simulated(2, 200.0)
+    clock.jitter(0.4)
+    wander = (
+        np.cumsum(clock.rng.normal(size=N)) * 5e-5 + 2.0 * np.sin(clock.number / 2000.0) / 200.0
+    )
+    clock.stamps = clock.stamps + wander
+    found, _ = recorded(clock)
+    assert {each.code for each in found.notices}.isdisjoint({"clock-shifts", "clock-set"})

@@ -77,3 +77,56 @@ def test_frames_without_rows_or_with_names_twice():
     twice = pd.concat([frame(0.01 * np.arange(N))] * 2, axis=1)
     with pytest.raises(InputError, match="Duplicate"):
         gmwm.read(twice)
+
+
+@pytest.mark.parametrize(
+    ("number", "meaning"),
+    [
+        (1e30, "beyond the range of any sensor"),
+        (-999.0, "an error code"),
+        (9999.0, "an error code"),
+        (-32768.0, "the smallest integer of 16 bit"),
+        (2147483647.0, "the largest integer of 32 bit"),
+    ],
+)
+@pytest.mark.parametrize("rows", [(700,), (0, 700, 701, N - 1)])
+def test_numbers_that_are_no_samples_are_missing(number, meaning, rows):
+    table = frame(0.01 * np.arange(N))
+    clean = gmwm.read(table)["gyro_y"].values.copy()
+    table.loc[list(rows), "gyro_y [rad/s]"] = number
+    found = gmwm.read(table)
+    clean[list(rows)] = np.nan
+    np.testing.assert_array_equal(found["gyro_y"].values, clean)
+    (notice,) = [each for each in found.notices if each.code == "sentinel"]
+    assert (notice.where, notice.severity) == ("gyro_y", "warning")
+    assert notice.values == {"count": len(rows), "value": number, "row": rows[0]}
+    assert meaning in notice.text
+
+
+def test_several_numbers_that_are_no_samples():
+    table = frame(0.01 * np.arange(N))
+    table.loc[[5, 6, 90], "accel_x [m/s^2]"] = [1e20, -1e30, -9999.0]
+    found = [each for each in gmwm.read(table).notices if each.code == "sentinel"]
+    assert [(each.values["count"], each.values["value"]) for each in found] == [
+        (1, -9999.0), (2, -1e30)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["shock", "counts", "cut off", "wide"])
+def test_samples_are_no_error_codes(kind):
+    table = frame(0.01 * np.arange(N))
+    rng = np.random.default_rng(1)
+    column = np.asarray(table["gyro_x [rad/s]"])
+    unit = "gyro_x [mdeg/s]"
+    column = 1e3 * np.degrees(column)
+    if kind == "shock":
+        column[100:120] = 3e4 * rng.normal(size=20)
+    elif kind == "counts":
+        column = np.round(rng.normal(size=N) * 700.0)
+        column[::1000] = 999.0
+    elif kind == "cut off":
+        column = np.clip(np.round(rng.normal(size=N) * 20_000.0), -32768, 32767)
+    elif kind == "wide":
+        column = np.where(rng.random(N) < 0.5, -999.0, 999.0) + column
+    table = table.drop(columns="gyro_x [rad/s]").assign(**{unit: column})
+    assert "sentinel" not in codes(gmwm.read(table))

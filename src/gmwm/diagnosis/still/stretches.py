@@ -11,7 +11,7 @@ noise is that of the quietest seconds of the log itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import welch
@@ -20,7 +20,8 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion, is_moved_with
+from gmwm.diagnosis.motion import find_motion
+from gmwm.diagnosis.still.blocks import blocks_of
 from gmwm.readers import Channel, Recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
@@ -68,9 +69,9 @@ class Still:
         listed = ", ".join(f"{start:.4g} to {stop:.4g}" for start, stop in self.stretches[:8])
         more = f" and {len(self.stretches) - 8} more" if len(self.stretches) > 8 else ""
         text = (
-            f"in motion for a part of its {self.duration:.4g} s; at rest from {listed} s{more} "
-            f"|{self.timeline}|: these {self.total:.4g} s are used, and no averaging time is "
-            f"longer than the longest of them, {self.longest:.4g} s"
+            f"in motion or vibrating for a part of its {self.duration:.4g} s; at rest from "
+            f"{listed} s{more} |{self.timeline}|: these {self.total:.4g} s are used, and no "
+            f"averaging time is longer than the longest of them, {self.longest:.4g} s"
         )
         values = {
             "stretches": len(self.stretches),
@@ -96,26 +97,20 @@ def find_still(recording: Recording) -> Still:
     -------
     Still
     """
-    size = max(round(tuning.STILL_BLOCK * recording.rate), tuning.FEWEST_OF_MOTION)
-    channels = [
-        channel
-        for channel in recording.inertial
-        if channel.is_of_a_sensor and is_moved_with(channel)
-    ]
-    count = recording.n // size
-    if not channels or count < tuning.FEWEST_STILL:
+    blocks = blocks_of(recording)
+    if blocks is None:
         return Still((), 0.0, (), recording.duration)
-    means, scatter = _moments(channels, size, count)
+    channels, size, means, scatter = blocks.channels, blocks.size, blocks.means, blocks.scatter
+    gyro, count = blocks.is_gyro, means.shape[0]
     floor = _floor(scatter)
-    gyro = [channel.quantity == "gyro" for channel in channels]
-    quiet_blocks = _quiet(scatter, floor)
+    quiet_blocks = _quiet(scatter, floor) & ~blocks.loudness.loud
     # A turn may begin between two blocks.
     turns = np.maximum(tuning.TURNS, tuning.BEYOND_WHITE * np.sqrt(floor[gyro] / size))
     quiet_blocks[1:] &= np.all(np.abs(np.diff(means[:, gyro], axis=0)) < turns, axis=1)
     runs = _runs(quiet_blocks, count, means[:, gyro])
     runs = _of_one_level(runs, means, floor, channels, size)
     quiet = [run for run in runs if run[1] - run[0] >= 2]
-    length = size * recording.dt
+    length = blocks.length
     long = [run for run in quiet if (run[1] - run[0]) * length >= tuning.SHORTEST_STILL]
     shaking = _vibrates(long, channels, scatter, size, recording.dt)
     vibrating = [run for run, shakes in zip(long, shaking, strict=True) if shakes]
@@ -134,24 +129,18 @@ def find_still(recording: Recording) -> Still:
 def rest_of(recording: Recording) -> Still | None:
     """The stretches at rest of a log that is not static; None if it is.
 
-    A tilt between two attitudes at rest is no motion here.
+    It is not if it moves, or if it scatters more at some times than at others and begins or ceases
+    to do so within seconds, as what vibrates. A tilt between two attitudes at rest is no motion.
     """
-    if all(move.is_tilt for move in find_motion(recording).moves):
+    motion = find_motion(recording)
+    if motion.turns_steadily:
+        return Still((), 0.0, (), recording.duration)
+    if not all(move.is_tilt for move in motion.moves):
+        return find_still(recording)
+    blocks = blocks_of(recording)
+    if blocks is None or not blocks.loudness.loud.any():
         return None
-    return find_still(recording)
-
-
-def _moments(channels: Sequence[Channel], size: int, count: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance of each block and axis, (blocks, axes); NaN where half is missing."""
-    means, scatter = np.full((2, count, len(channels)), np.nan)
-    for axis, channel in enumerate(channels):
-        blocks = np.asarray(channel.values[: count * size], dtype=float).reshape(count, size)
-        known = np.count_nonzero(~np.isnan(blocks), axis=1)
-        enough = known > size // 2
-        means[enough, axis] = np.nanmean(blocks[enough], axis=1)
-        squares = np.nansum((blocks - means[:, [axis]]) ** 2, axis=1)
-        scatter[enough, axis] = squares[enough] / (known[enough] - 1)
-    return means, scatter
+    return replace(find_still(recording), vibrating=blocks.loud_stretches)
 
 
 def _floor(scatter: FloatArray) -> FloatArray:
@@ -218,7 +207,7 @@ def _of_one_level(
     kept = []
     for (a, b), level in zip(runs, levels, strict=True):
         away = np.abs(level - levels[rest])[gyro]
-        change = np.abs(means[a + 4 : b] - means[a : b - 4])  # from one second to the next
+        change = np.abs(means[a + 4 : b] - means[a : max(b - 4, a)])  # from one second to the next
         calm = not change.size or bool(np.all(np.nanmedian(change, axis=0) < limit))
         if calm and (not away.size or np.max(away) < tuning.TURNS):
             kept.append((a, b))

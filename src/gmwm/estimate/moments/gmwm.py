@@ -90,20 +90,23 @@ class GMWM:
         extra = design.coordinates.noise
         reference = dictionary_fit(wv, moments.target, extra)
         level = Discrepancy(self.discrepancy, wv.tau.size - design.n_free)
+        beginnings = [level.value]
+        if not any(process.is_line for process in extra):
+            # What no sum of processes without lines can follow is discrepancy from the start. But
+            # processes of other kinds may follow what no mixture of the dictionary does.
+            level.start_at(reference.discrepancy)
+            beginnings.append(level.value)
+            if all(isinstance(process, DICTIONARY) for process in extra):
+                del beginnings[0]
         settled = None
-        if not all(isinstance(process, DICTIONARY) for process in extra):
-            # Such a process may follow what no mixture of the dictionary does.
+        for value in dict.fromkeys(beginnings):
+            level.value = value
             state = _begun(design, moments, reference, level, weights)
             settled = _iterate(design, state, level, weights)
-        if settled is None or level.value > 0.0:
-            level.restart()
-            if not any(process.is_line for process in extra):
-                # What no sum of processes without lines can follow is discrepancy from the start.
-                level.start_at(reference.discrepancy)
-            state = _begun(design, moments, reference, level, weights)
-            settled = _iterate(design, state, level, weights)
-            if settled is None:
-                settled = _under_reference(design, state, level, weights, extra)
+            if settled is not None and level.value == 0.0:
+                break
+        if settled is None:
+            settled = _under_reference(design, state, level, weights, extra)
         return conclude_moments(
             design, settled.moments, settled.covariance, settled.statistical, settled.point,
             settled.basis, weights, self.name, level.value, without,

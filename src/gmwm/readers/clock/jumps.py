@@ -56,9 +56,14 @@ class Jumps:
         return int(np.argmax(self.missing))
 
     @property
+    def is_off_grid(self) -> npt.NDArray[np.bool_]:
+        """Of each jump, whether it is not near a whole number of sampling intervals."""
+        return _off_grid(self.steps, self.missing)
+
+    @property
     def off_grid(self) -> int:
-        """Number of jumps that are not near a whole number of sampling intervals."""
-        return int(np.count_nonzero(_off_grid(self.steps, self.missing)))
+        """Number of such jumps."""
+        return int(np.count_nonzero(self.is_off_grid))
 
     @property
     def are_bursts(self) -> bool:

@@ -12,7 +12,9 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
+from gmwm.readers.clock.beat import without_beat
 from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, jumps_of
+from gmwm.readers.clock.shifts import find_shifts
 from gmwm.readers.clock.uneven import Followed, followed
 
 _UNITS = {
@@ -122,6 +124,16 @@ class Clock:
             timing = replace(self, stamps=unwrapped).timing(expected)
             wrapped = Notice("clock-wraps", "note", "", text)
             return replace(timing, notices=(*timing.notices, wrapped))
+        with np.errstate(all="ignore"):
+            beat = without_beat(self.stamps)
+        if beat is not None:
+            timing = replace(self, stamps=beat.stamps).timing(expected)
+            text = (
+                f"the time stamps are early and late in turns, by {beat.share:.2g} of a sampling "
+                "interval: the samples were taken as evenly spaced"
+            )
+            in_turns = Notice("stamps-in-turns", "note", "", text, {"share": beat.share})
+            return replace(timing, notices=(*timing.notices, in_turns))
         uneven: Followed | None = None
         with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
             steps = np.diff(self.stamps)
@@ -164,6 +176,7 @@ class Clock:
         notices = [notice, *self._notices_of_jumps(jumps, seconds)]
         if change is not None:
             notices.append(self._notice_of_change(change, seconds, rate))
+        notices += self._notices_of_shifts(jumps, seconds)
         if uneven is not None:
             notices += self._notices_of_uneven(uneven, jumps, seconds)
         slowest, fastest = tuning.RATES_OF_SENSORS
@@ -343,6 +356,22 @@ class Clock:
             action = "if samples are missing there, use the part before or after"
             notices.append(Notice("clock-set", "warning", "", text, numbers, action))
         return notices
+
+    def _notices_of_shifts(self, jumps: Jumps, seconds: float) -> list[Notice]:
+        """Where the clock was set by less than what is followed, or while the host stalled."""
+        found = find_shifts(self.stamps, jumps)
+        if not found:
+            return []
+        row, by = max(found, key=lambda each: abs(each[1]))
+        count = f"at {len(found)} places, farthest" if len(found) > 1 else ""
+        text = (
+            f"the clock shifts {count} by {by * jumps.interval * seconds:+.3g} s ({by:+.2g} "
+            f"sampling intervals) near {self.where(row)}: the samples were taken as evenly "
+            "spaced there"
+        )
+        values = {"count": len(found), "largest": by * jumps.interval * seconds, "row": row}
+        action = "if samples are missing there, use the part before or after"
+        return [Notice("clock-shifts", "warning", "", " ".join(text.split()), values, action)]
 
     def _unit(self, step: float, expected: float | None) -> tuple[float, bool]:
         """The unit in seconds, and whether it is a guess."""

@@ -1,0 +1,90 @@
+"""Numbers that stand for no sample: error codes, overflows, the ends of an integer's range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.readers import tuning
+
+_CODES = {float(sign * (10**k - 1)) for k in range(3, 8) for sign in (-1, 1)} | {-999.25, -99.99}
+_ENDS = {
+    float(end): bits
+    for bits in (64, 32, 16)
+    for end in (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1, 2**bits - 1)
+}
+
+
+def without_sentinels(
+    name: str, values: FloatArray, largest: float, where: Callable[[int], str]
+) -> tuple[FloatArray, list[Notice]]:
+    """Make missing what is no sample, and report it.
+
+    That is a number beyond the range of any sensor, or far outside all others and an error code
+    (999, -9999, ...) or the smallest or largest integer of 16, 32 or 64 bit.
+
+    Parameters
+    ----------
+    name : str
+        Of the channel.
+    values : (n,) ndarray
+        In the unit of the file; NaN where one is missing.
+    largest : float
+        Magnitude beyond the range of any sensor, in the same unit.
+    where : callable
+        Row -> where that is in the file.
+
+    Returns
+    -------
+    ndarray
+        A copy if any number is made missing, else ``values``.
+    list of Notice
+        One for each number that occurs, of code "sentinel".
+    """
+    some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
+    some = some[~np.isnan(some)]
+    if not some.size:
+        return values, []
+    low, middle, high = np.quantile(some, [0.05, 0.5, 0.95])
+    far = np.flatnonzero(np.abs(values - middle) > tuning.FAR_OUTSIDE * (high - low))
+    if not far.size:
+        return values, []
+    found = values[far]
+    numbers, which = np.unique(found, return_inverse=True)
+    chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])
+    gone = far[chosen[which]]
+    if not gone.size or gone.size > tuning.MOST_SENTINELS * values.size:
+        return values, []
+    clean = np.array(values)
+    clean[gone] = np.nan
+    notices = []
+    beyond = [i for i in np.flatnonzero(chosen).tolist() if abs(numbers[i]) > largest]
+    others = [i for i in np.flatnonzero(chosen).tolist() if i not in beyond]
+    for group in (*([i] for i in others), beyond):
+        if not group:
+            continue
+        rows = far[np.isin(which, group)]
+        number = float(numbers[group[int(np.argmax(np.abs(numbers[group])))]])
+        count = rows.size
+        times = f"{count:,} samples are" if count > 1 else "a sample is"
+        also = " and the like" if len(group) > 1 else ""
+        text = (
+            f"{times} {number:.10g}{also}, {_meaning(number, largest)}, first at "
+            f"{where(int(rows[0]))}: taken as missing"
+        )
+        data = {"count": int(count), "value": number, "row": int(rows[0])}
+        notices.append(Notice("sentinel", "warning", name, text, data, "look at the recorder"))
+    return clean, notices
+
+
+def _meaning(number: float, largest: float) -> str:
+    """What a number stands for; nothing if it is one like others."""
+    if number in _ENDS:
+        end = "largest" if number > 0.0 else "smallest"
+        return f"the {end} integer of {_ENDS[number]} bit"
+    if number in _CODES:
+        return "an error code"
+    return "beyond the range of any sensor" if abs(number) > largest else ""
