@@ -4,6 +4,7 @@ from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
 from gmwm.calibration.departure_notices import without_departures
 from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.screening import SCREENING
+from gmwm.calibration.stages import Stopwatch, stage
 from gmwm.calibration.summary import (
     Level,
     floor,
@@ -19,6 +20,7 @@ __all__ = [
     "Calibration",
     "Departure",
     "Level",
+    "Stopwatch",
     "calibrate",
     "departures",
     "floor",
@@ -26,6 +28,7 @@ __all__ = [
     "noise_density",
     "random_walk",
     "sentence",
+    "stage",
     "white_density",
     "without_departures",
 ]

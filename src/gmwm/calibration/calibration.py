@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -24,6 +25,7 @@ from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
 from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.calibration.stages import current, stage
 from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
@@ -288,9 +290,10 @@ def calibrate(
     """
     given = _recordings(recording)
     _check_together(given)
-    if still and screening:
-        given = [part for each in given for part in stretches_at_rest(each)]
-    treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    with stage("health"):
+        if still and screening:
+            given = [part for each in given for part in stretches_at_rest(each)]
+        treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -313,16 +316,29 @@ def calibrate(
         if progress is not None:
             progress(len(finished), len(alive), name)
 
+    watch = current()
+
     def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
+        with watch.running() if watch is not None else nullcontext():
+            return estimate(name)
+
+    def estimate(name: str) -> tuple[Fit, Selection | None] | InputError:
         try:
-            parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
+            with stage("variance"):
+                parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
             data = parts[0] if len(parts) == 1 else parts
             given_model = _model_of(name, model)
-            if given_model is not None:
-                return with_departures(estimated(given_model, data), sources[name]), None
-            selection = select(data, extra=offered[name])
-            return with_departures(selection.fit, sources[name]), selection
+            selection = None
+            with stage("model"):
+                if given_model is not None:
+                    fitted = estimated(given_model, data)
+                else:
+                    selection = select(data, extra=offered[name])
+                    fitted = selection.fit
+                    _ = selection.rivals  # found here, where channels are done side by side
+            with stage("departures"):
+                return with_departures(fitted, sources[name]), selection
         except InputError as error:
             return error  # of this channel; the others go on
         finally:

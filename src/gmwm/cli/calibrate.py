@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from gmwm._core.notices import Notice
-    from gmwm.calibration import Calibration
+    from gmwm.calibration import Calibration, Stopwatch
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -79,6 +79,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -89,6 +90,7 @@ def calibrate(
     target: str | None,
     datasheet: Path | None,
     jobs: int,
+    timings: bool,
     as_json: bool,
     quiet: bool,
     **reading: Any,
@@ -113,7 +115,7 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     from gmwm._core.files import folder_to_fill
-    from gmwm.calibration import SCREENING, calibrate as run
+    from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, stage
     from gmwm.report import read_datasheet
 
     given = written_models(models)
@@ -122,8 +124,9 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
-    with folder_to_fill(output) as folder:
-        recordings = [read_recording(file, **reading) for file in files]
+    with folder_to_fill(output) as folder, Stopwatch().running() as watch:
+        with stage("read"):
+            recordings = [read_recording(file, **reading) for file in files]
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
         if datasheet is not None:  # what is wrong with it is known before the work
@@ -140,16 +143,32 @@ def calibrate(
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 else None
         written = write_files(result, folder, own, datasheet, origin)
-    if target is not None:
-        written = f"{written}\n{export_into(folder, result, target)}"
+        if target is not None:
+            with stage("exports"):
+                written = f"{written}\n{export_into(folder, result, target)}"
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
         show(result)
         click.echo(written)
+    if timings:
+        _show_timings(watch, jobs)
     if not any(fit.valid for fit in result.values()):
         click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
         click.get_current_context().exit(NONE_VALID)
+
+
+def _show_timings(watch: Stopwatch, jobs: int) -> None:
+    """On the stream of errors: the output of --json stays JSON."""
+    table = new_table("stage", ">seconds", ">of the processor")
+    rows = [*watch.elapsed.items(), ("all stages", sum(watch.elapsed.values()))]
+    worked = {**watch.worked, "all stages": sum(watch.worked.values())}
+    for name, elapsed in rows:
+        table.add_row(name, f"{elapsed:.2f}", f"{worked[name]:.2f}")
+    console = new_console(to_errors=True)
+    console.print(table)
+    if jobs > 1:
+        console.print("stages of channels run side by side: their seconds are added up")
 
 
 def show(result: Calibration) -> None:
@@ -230,6 +249,7 @@ def write_files(
 ) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
+    from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
 
     names = ["calibration.json", "report.html"]
@@ -238,13 +258,17 @@ def write_files(
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
     with moved_together(folder) as new:
-        result.save(new / names[0])
-        result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+        with stage("report"):
+            result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+        with stage("exports"):
+            result.save(new / names[0])
         if {"gyro", "accel"} <= quantities:
             try:
-                export(result, "kalibr", path=new / "imu.yaml")
+                with stage("exports"):
+                    export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
-                lines = [f"imu.yaml has N and K for {TARGETS['kalibr'].horizon:g} s without aiding; "
+                horizon = TARGETS["kalibr"].horizon
+                lines = [f"imu.yaml has N and K for {horizon:g} s without aiding; "
                          "gmwm export --horizon S for others"]  # fmt: skip
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it

@@ -17,7 +17,6 @@ from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.problem import (
     Scales,
-    is_plain,
     objectives_with,
     solve_nonnegative,
     weight_root,

@@ -7,7 +7,12 @@ from gmwm.estimate.problem.information import (
     slope_dof,
     spectral_information,
 )
-from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
+from gmwm.estimate.problem.nonnegative import (
+    objectives_with,
+    orthogonal_to,
+    solve_columns,
+    solve_nonnegative,
+)
 from gmwm.estimate.problem.parameters import (
     Coordinates,
     Term,
@@ -52,9 +57,11 @@ __all__ = [
     "keys_by_term",
     "objectives_with",
     "ols_slope",
+    "orthogonal_to",
     "shape_of",
     "slope_dof",
     "slope_p_value",
+    "solve_columns",
     "solve_nonnegative",
     "spectral_information",
     "weight_root",
