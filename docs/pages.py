@@ -4,10 +4,11 @@
     python docs/pages.py docs/odd-plots.md   # some pages
     python docs/pages.py --slow              # with what is marked slow
     python docs/pages.py --figures           # and keep the figures that they save, in docs/img
+    python docs/pages.py --show              # with what they print
 
-The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose first
-line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->`` or
-``<!-- not run: WHY -->``, leaves it out.
+The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose
+first line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->``
+or ``<!-- not run: WHY -->``, leaves it out.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 DOCS = Path(__file__).resolve().parent
 PAGES = (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md")))
@@ -86,8 +87,8 @@ def blocks_of(page: Path) -> list[Block]:
 class Runner:
     """Runs pages; folders that begin with the same commands are filled once."""
 
-    def __init__(self, scratch: Path, slow: bool = False) -> None:
-        self.scratch, self.slow = scratch, slow
+    def __init__(self, scratch: Path, slow: bool = False, show: bool = False) -> None:
+        self.scratch, self.slow, self.show = scratch, slow, show
         self._filled: dict[str, Path] = {}
 
     def run(self, page: Path) -> Path:
@@ -109,7 +110,7 @@ class Runner:
 
     def _in(self, folder: Path, block: Block, names: dict[str, Any]) -> None:
         try:
-            with contextlib.chdir(folder), _quiet():
+            with contextlib.chdir(folder), _quiet(None if self.show else io.StringIO()):
                 _run(block, names)
         except (Exception, SystemExit) as error:
             raise AssertionError(f"{block.place}: {type(error).__name__}: {error}") from error
@@ -140,12 +141,12 @@ def _command(words: list[str]) -> None:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet(output: TextIO | None) -> Iterator[None]:
     os.environ["MPLBACKEND"] = "agg"
     import matplotlib as mpl
 
     style = {"svg.fonttype": "none", "svg.hashsalt": "gmwm", "figure.figsize": (6.4, 4.0)}
-    with contextlib.redirect_stdout(io.StringIO()), mpl.rc_context(style):
+    with contextlib.redirect_stdout(output or sys.stdout), mpl.rc_context(style):
         yield
 
 
@@ -156,13 +157,17 @@ def main() -> None:
     parser.add_argument("pages", nargs="*", type=Path, default=PAGES)
     parser.add_argument("--slow", action="store_true")
     parser.add_argument("--figures", action="store_true")
+    parser.add_argument("--show", action="store_true")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        runner = Runner(Path(scratch), given.slow)
+        runner = Runner(Path(scratch), given.slow, given.show)
         for page in given.pages:
-            start = time.perf_counter()
+            start = time.process_time()
             folder = runner.run(page.resolve())
-            print(f"{page.name}: {time.perf_counter() - start:.1f} s", file=sys.stderr)
+            print(
+                f"{page.name}: {time.process_time() - start:.1f} s of the processor",
+                file=sys.stderr,
+            )
             for figure in folder.glob("*.svg") if given.figures else ():
                 shutil.copy(figure, DOCS / "img" / figure.name)
 

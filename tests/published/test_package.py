@@ -12,7 +12,8 @@ from places import REPOSITORY
 
 pytest.importorskip("hatchling", reason="hatchling builds the archives")
 
-TEMPLATES = ("template.html", "report.css", "report.js", "validation.html", "comparison.html")
+TEMPLATES = ("template.html", "report.css", "report.js", "validation.html", "comparison.html",
+             "fleet.html")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,16 @@ def wheel(tmp_path_factory):
 
 
 def assert_clean(names):
-    unwanted = ("__pycache__", ".nbi", ".nbc", ".pyc", ".mypy_cache", ".hypothesis", ".git/", ".venv")
+    unwanted = (
+        "__pycache__",
+        ".nbi",
+        ".nbc",
+        ".pyc",
+        ".mypy_cache",
+        ".hypothesis",
+        ".git/",
+        ".venv",
+    )
     assert not [name for name in names if any(each in name for each in unwanted)]
 
 

@@ -5,6 +5,7 @@ from gmwm.calibration.departure_notices import without_departures
 from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.screening import SCREENING
 from gmwm.calibration.stages import Stopwatch, stage
+from gmwm.calibration.streamed import calibrate_stream
 from gmwm.calibration.summary import (
     Level,
     floor,
@@ -22,6 +23,7 @@ __all__ = [
     "Level",
     "Stopwatch",
     "calibrate",
+    "calibrate_stream",
     "departures",
     "floor",
     "load",

@@ -13,13 +13,13 @@ import click
 from gmwm.cli.calibrate import NONE_VALID
 from gmwm.cli.console import progress_bar
 from gmwm.cli.hints import with_hint
-from gmwm.cli.model_text import written_models
 from gmwm.cli.options import (
     arguments_of_read,
     estimating_options,
     part_options,
     printing_options,
     reading_options,
+    written_models,
 )
 
 

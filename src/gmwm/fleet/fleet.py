@@ -19,10 +19,10 @@ from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.runs import results
 from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm._core.units import field_units
-from gmwm._core.workers import results
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
 from gmwm.fleet import tuning
@@ -141,6 +141,9 @@ class Fleet(Mapping[str, Calibration | Notice]):
                     f"{axis.channel}: {axis.counts[most]} of {sum(axis.counts.values())} units are "
                     f"{most}, {axis.different} of another structure"
                 )
+                lines += wrapped(text, first="- ", indent=2)
+            if axis.invalid:
+                text = f"{axis.channel}: not valid in {some(axis.invalid)}"
                 lines += wrapped(text, first="- ", indent=2)
         for each in self.spreads:
             for outlier in each.outliers:
@@ -274,8 +277,8 @@ def fleet(
             if progress is not None:
                 progress(len(kept), len(items), "")
 
-        for item in items if store is not None else ():
-            unit = store.kept(item)
+        for item in items:
+            unit = None if store is None else store.kept(item)
             if unit is not None:
                 kept[item.path] = unit
         report()
@@ -338,12 +341,13 @@ def _left_over(names: Sequence[str]) -> list[Notice]:
         return []
     text = (
         f"the folder holds {len(names)} calibrations of other recordings, which are not counted: "
-        f"{_some(names)}"
+        f"{some(names)}"
     )
     return [Notice("left-over", "note", "", text, {"units": len(names)})]
 
 
-def _some(names: Sequence[str]) -> str:
+def some(names: Sequence[str]) -> str:
+    """The first names of a list."""
     return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
@@ -369,7 +373,7 @@ def _copies(units: Collection[Unit]) -> Iterator[Notice]:
             same.setdefault(unit.digest, []).append(unit.name)
     for names in same.values():
         if len(names) > 1:
-            text = f"the same recording: {_some(names)}"
+            text = f"the same recording: {some(names)}"
             yield Notice("same-recording", "warning", "", text, {"units": len(names)},
                          "each is counted; leave copies out")  # fmt: skip
 
@@ -381,7 +385,7 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
     median = sorted(each.rate for each in done.values())[len(done) // 2]
     other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
     if other:
-        text = f"{_have(other)} another sampling rate than {median:g} Hz: {_some(other)}"
+        text = f"{_have(other)} another sampling rate than {median:g} Hz: {some(other)}"
         yield Notice("rates-differ", "warning", "", text, {"units": len(other), "rate": median},
                      "make sure that they are of one kind")  # fmt: skip
     lacking: dict[tuple[str, ...], list[str]] = {}
@@ -390,7 +394,7 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
         lacking.setdefault(names, []).append(channel)
     for names, channels in lacking.items():
         if names:
-            text = f"{_have(names)} no such channel: {_some(names)}"
+            text = f"{_have(names)} no such channel: {some(names)}"
             values = {"units": len(names)}
             yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
     lengths = {name: each.duration for name, each in done.items()}
@@ -401,8 +405,7 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
             f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
             "scatter more"
         )
-        values = {"shortest": shortest, "longest": longest}
-        yield Notice("lengths-differ", "note", "", text, values)
+        yield Notice("lengths-differ", "note", "", text, {"shortest": shortest, "longest": longest})
     needed = needed_units()
     if len(done) < needed:
         text = (

@@ -11,8 +11,7 @@ from statistics import mode
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, number, split_header, split_line
-from gmwm.readers.dates import date_columns
+from gmwm.readers.cells import BLANKS, date_columns, number, split_header, split_line
 from gmwm.readers.names import meaning, of_dates
 from gmwm.readers.table import FORMATS
 

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm._core import runs as engine
-from gmwm._core.runs import do_runs
+from gmwm._core.runs import do_runs, runs as engine
 
 STUDY = {"name": "squares", "seed": 1}
 

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from gmwm import InputError
-from gmwm._core.workers import results
+from gmwm._core.runs import results
 
 
 class Square:
@@ -39,7 +39,7 @@ def test_one_job_does_the_work_itself(tmp_path):
 
 
 def test_a_lost_item_is_an_error_by_default():
-    from gmwm._core.workers import _refused
+    from gmwm._core.runs.workers import _refused
 
     with pytest.raises(InputError, match="3 processes ended at 'a b'") as caught:
         _refused("a b")

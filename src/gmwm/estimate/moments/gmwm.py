@@ -8,6 +8,7 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -68,6 +69,20 @@ class GMWM:
 
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Fit the open parameters of a model to wavelet variances."""
+
+        def without(i: int) -> Fit | None:
+            noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
+            left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
+            if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
+                return None
+            return self._estimate(Model(left), wv)
+
+        return self._estimate(model, wv, without)
+
+    def _estimate(
+        self, model: Model, wv: WaveletVariance, without: Callable[[int], Fit | None] | None = None
+    ) -> Fit:
+        """The fit; doubtful terms are judged if it is known what is left without them."""
         weights = Weights.of(self.weights, wv)
         scales = self.scales(wv)
         design = Design(model, scales)
@@ -94,7 +109,7 @@ class GMWM:
             settled = _under_reference(design, state, level, weights, extra)
         return conclude_moments(
             design, settled.moments, settled.covariance, settled.statistical, settled.point,
-            settled.basis, weights, self.name, level.value,
+            settled.basis, weights, self.name, level.value, without,
         )  # fmt: skip
 
 
