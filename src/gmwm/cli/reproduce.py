@@ -66,6 +66,8 @@ def reproduce(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    form: str | None,
+    layout: str | None,
 ) -> None:
     """Repeat an experiment of Stebler et al. (2012), or our own harder one.
 
@@ -93,7 +95,7 @@ def reproduce(
                                   "--resume": resume and not rotate,
                                   "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
         given = [
-            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column)
+            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column, form, layout)
             for file in recordings
         ]
         with folder_to_fill(output) as folder:
