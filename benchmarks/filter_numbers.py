@@ -9,13 +9,15 @@ analyses.
 from __future__ import annotations
 
 import sys
+import warnings
 
 import numpy as np
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.calibration import random_walk
-from gmwm.filter_numbers import Chain
+from gmwm.filter_numbers import Chain, tuning
+from gmwm.filter_numbers.axes import Axes
 from gmwm.filter_numbers.spectra import Estimated, Problem, Target, standard_errors
 from gmwm.ins import (
     Recorded,
@@ -93,6 +95,59 @@ def length() -> None:
             )  # fmt: skip
             print(f"{name:<12}{hours:>6}" + "".join(f"{cell:>12}" for cell in cells)
                   + "   " + nees, flush=True)  # fmt: skip
+
+
+def errors() -> None:
+    """Whether the standard errors of N and K are right, from many records of each sensor."""
+    print(
+        "records, and those with standard errors; over the numbers of the truth: median of these,"
+    )
+    print("mean and spread (68 %) of what is found; share of 95 % intervals that hold the truth")
+    print(f"{'truth':<14}{'hours':>6}{'runs':>6}{'with':>6}" + "".join(
+        f"{f'{key}: {head}':>11}" for key in "NK" for head in ("error", "mean", "spread", "held")
+    ))  # fmt: skip
+    for name, hours, runs in (("1 GM", 1, 100), ("walk + GM", 4, 100), ("demo gyro", 16, 50)):
+        truth = TRUTHS[name]
+        right = gmwm.bound(truth, dt=0.1)
+        found = []
+        for seed in range(runs):
+            series = truth.simulate(hours * 36_000, 0.1, 1000 + seed)
+            each = gmwm.bound(gmwm.fit(truth.opened(), series, 0.1))
+            if each.stderr:
+                found.append([[getattr(each, key), each.stderr[key]] for key in "NK"])
+        cells = []
+        for key, (value, error) in zip("NK", np.array(found).transpose(1, 2, 0), strict=True):
+            true = getattr(right, key)
+            low, high = np.quantile(value, [0.16, 0.84])
+            held = np.abs(value - true) < 1.96 * error
+            cells += [np.median(error) / true, np.mean(value) / true, 0.5 * (high - low) / true,
+                      np.mean(held)]  # fmt: skip
+        print(f"{name:<14}{hours:>6}{runs:>6}{len(found):>6}"
+              + "".join(f"{cell:>11.3g}" for cell in cells), flush=True)  # fmt: skip
+
+
+def balance() -> None:
+    """What it costs that the NEES of reduced numbers is even."""
+    print(
+        "N+K by gmwm.reduce for 10, 30 and 60 s, all truths as gyro_x, accel_x and gyro_z: NEES by"
+    )
+    print("weight of its evenness; true error at 60 s over that of a filter with the full model")
+    print(f"{'weight':>6}{'10 s':>16}{'30 s':>16}{'60 s':>16}{'error: mean':>14}{'most':>8}")
+    for weight in (0.0, 5.0, 10.0, 20.0, 40.0):
+        tuning.EVENNESS = weight
+        nees, losses = [], []
+        for name in ("gyro_x", "accel_x", "gyro_z"):
+            for truth in TRUTHS.values():
+                axis = Axes.of({name: truth}, DT, 0.0).axes[0]
+                found = gmwm.reduce({name: truth})[name]
+                models = ((found.model, found.initial_sd), (truth, 0.0))
+                each, full = (axis.chain.errors(truth, model, DT, OUTAGES, believed_sd=sd)
+                              for model, sd in models)  # fmt: skip
+                nees.append(each.nees())
+                losses.append(np.sqrt(each.actual[-1, -1, -1] / full.actual[-1, -1, -1]))
+        ends = zip(np.min(nees, axis=0), np.max(nees, axis=0), strict=True)
+        cells = "".join(f"{f'{low:.3f} to {high:.3f}':>16}" for low, high in ends)
+        print(f"{weight:>6g}{cells}{np.mean(losses):>14.3f}{np.max(losses):>8.3f}", flush=True)
 
 
 def tightness() -> None:
@@ -173,6 +228,18 @@ def flight() -> None:
     for name, truth in (("demo sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
         print(f"INS/GNSS on a loiter, {name}, at the end of outages")
         _flown(truth)
+    print("after 30 s of the last, N+K for some axes and the full model for the others")
+    numbers, scenario = gmwm.bound(QUIET.models), loiter_with_outages(OUTAGES, DT)
+    for some in ({"gyro_x", "gyro_y"}, {"gyro_z"}, {"accel_x", "accel_y", "accel_z"}):
+        believed = SensorModels.of(
+            {axis: numbers[axis].model if axis in some else model
+             for axis, model in QUIET.models.items()},
+            {axis: numbers[axis].initial_sd for axis in some},
+        )  # fmt: skip
+        analysis = covariance_analysis(scenario, QUIET, believed)
+        at = analysis.index(scenario.outages[1].end)
+        true, own = (np.hypot(*sd[at, :2]) for sd in (analysis.sd, analysis.predicted_sd))
+        print(f"{', '.join(sorted(some)):<32}{true:>10.4g}{own:>10.4g}", flush=True)
 
 
 def _flown(truth: SensorModels) -> None:
@@ -257,8 +324,9 @@ def real(folder: str) -> None:
 
 
 if __name__ == "__main__":
+    warnings.simplefilter("ignore", gmwm.FitWarning)
     if sys.argv[1:2] == ["real"]:
         real(sys.argv[2])
     else:
         for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
-            {"length": length, "tightness": tightness, "rules": rules, "flight": flight}[part]()
+            globals()[part]()

@@ -3,9 +3,11 @@ from .budget import ErrorBudget as ErrorBudget, ErrorRow as ErrorRow, error_budg
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
+    calibrate_stream as calibrate_stream,
     load as load,
     without_departures as without_departures,
 )
+from .comparison import SensorComparison as SensorComparison, compare as compare
 from .diagnosis import Health as Health, Still as Still, find_still as find_still, health as health
 from .errors import (
     FitWarning as FitWarning,
@@ -40,6 +42,7 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
+from .fleet import Fleet as Fleet, fleet as fleet
 from .process import (
     AR as AR,
     ARIMA as ARIMA,
@@ -67,11 +70,14 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
+    StreamedRecording as StreamedRecording,
+    StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
+    stream as stream,
     wavelet_variance as wavelet_variance,
 )
 

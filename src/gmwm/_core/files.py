@@ -182,6 +182,35 @@ def folder_to_fill(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def one_writer(folder: Path) -> Iterator[None]:
+    """Keep others from filling the same folder at the same time.
+
+    Raises
+    ------
+    InputError
+        With the code "runs-in-use", if another process fills it.
+    """
+    from filelock import FileLock, Timeout
+
+    path = folder / ".lock"
+    lock = FileLock(path, timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise InputError(
+            f"{folder} is in use by another run that is not at its end: wait for it, or give "
+            "another folder",
+            "runs-in-use",
+        ) from None
+    try:
+        yield
+    finally:
+        lock.release()
+        if all(each == path for each in folder.iterdir()):
+            path.unlink(missing_ok=True)
+
+
 def _sentence(path: Path, error: OSError) -> str:
     return f"{path}: cannot be written ({error.strerror}): choose another place with -o"
 

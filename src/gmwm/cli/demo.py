@@ -20,15 +20,22 @@ if TYPE_CHECKING:
 @click.option("--hours", type=click.FloatRange(0.01, 100.0), default=1.0, show_default=True,
               help="Length of the simulated recording in hours.")  # fmt: skip
 @click.option("--seed", type=int, default=1, show_default=True)
-def demo(output: Path, hours: float, seed: int) -> None:
+@click.option("--files", is_flag=True,
+              help="Only write files to try the other commands with: static.csv of a sensor at "
+                   "rest, imu.csv and fixes.csv of a drive with it.")  # fmt: skip
+def demo(output: Path, hours: float, seed: int, files: bool) -> None:
     """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
 
     Gyros have white noise and a Gauss-Markov process, accelerometers white noise and a random walk.
 
     \b
-    Example:
+    Examples:
       gmwm demo --hours 4 --seed 2
+      gmwm demo --files -o try
     """
+    if files:
+        write_files_to_try(output, hours, seed)
+        return
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import calibrate as run
     from gmwm.report import duration_text
@@ -49,6 +56,25 @@ def demo(output: Path, hours: float, seed: int) -> None:
     for name, fit in selected.fits.items():
         click.echo(f"  {name:8}  {fit.model.title()}")
     click.echo(f"\n{written}")
+
+
+def write_files_to_try(output: Path, hours: float, seed: int) -> None:
+    """Write the files, and print what can be done with them."""
+    from gmwm._core.files import folder_to_fill, moved_together
+    from gmwm.study import write_demo_files
+
+    with folder_to_fill(output) as folder, moved_together(folder) as new:
+        arm = write_demo_files(new, 3600.0 * hours, seed)
+    for name in ("static.csv", "imu.csv", "fixes.csv"):
+        click.echo(f"wrote {output / name}")
+    lever_arm = ",".join(f"{each:g}" for each in arm)
+    click.echo(
+        f"\nTry:\n"
+        f"  gmwm health {output / 'static.csv'}\n"
+        f"  gmwm calibrate {output / 'static.csv'} -o {output / 'out'}\n"
+        f"  gmwm navigate --imu {output / 'imu.csv'} --gnss {output / 'fixes.csv'} \\\n"
+        f"    --sensors {output / 'out' / 'calibration.json'} --lever-arm {lever_arm}"
+    )
 
 
 def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:

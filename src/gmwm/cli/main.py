@@ -12,29 +12,34 @@ import click
 
 from gmwm import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.cli.budget import budget
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify
+from gmwm.cli.compare import compare
 from gmwm.cli.demo import demo
 from gmwm.cli.export import export
+from gmwm.cli.fleet import fleet
 from gmwm.cli.health import health
 from gmwm.cli.hints import with_hint
 from gmwm.cli.navigate import navigate
-from gmwm.cli.numbers import bound, reduce
+from gmwm.cli.numbers import bound, budget, reduce
 from gmwm.cli.reproduce import reproduce
 from gmwm.errors import InputError, printable
 
 _EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as shells have them
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="gmwm")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Stochastic error models of inertial sensors from static recordings."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 for _command in (
-    calibrate, demo, budget, health, bound, reduce, certify, export, navigate, reproduce,
+    calibrate, fleet, compare, demo, budget, health, bound, reduce, certify, export, navigate,
+    reproduce,
 ):  # fmt: skip
     cli.add_command(_command)
 
@@ -66,7 +71,7 @@ def main() -> None:
 def _run() -> int:
     """Run the command; its exit status."""
     try:
-        return int(cli.main(standalone_mode=False) or 0)
+        return int(cli.main(prog_name="gmwm", standalone_mode=False) or 0)
     except InputError as error:
         return _failed(with_hint(error))
     except MemoryError:
@@ -76,8 +81,10 @@ def _run() -> int:
     except click.Abort:
         _failed("interrupted, no file is half-written")
         return _EXIT_INTERRUPTED
-    except SystemExit:  # of click and rich, where nobody reads on, as head does
-        _discard_output()
+    except SystemExit as stop:
+        if stop.code == 0:  # of click, after it has answered a shell that completes a line
+            return 0
+        _discard_output()  # of click and rich, where nobody reads on, as head does
         return _EXIT_PIPE
 
 

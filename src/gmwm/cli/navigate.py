@@ -53,8 +53,8 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 @click.option("--sensors", multiple=True, metavar="[NAME=]FILE",
               help="calibration.json of the IMU; several with names are compared.")  # fmt: skip
 @click.option("--outages", "outage_length", metavar="auto|SECONDS",
-              help="Length of the outages that are cut into the log to compare sensors.  "
-                   "[default: auto]")  # fmt: skip
+              help="Length of the outages that are cut into the log to compare sensors; auto is "
+                   "30 s.  [default: auto]")  # fmt: skip
 @click.option("--lever-arm", metavar="X,Y,Z",
               help="m, from the IMU to the antenna: forward, right, down.")  # fmt: skip
 @click.option("--heading", type=float,

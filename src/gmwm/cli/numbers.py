@@ -1,4 +1,4 @@
-"""``gmwm bound`` and ``gmwm reduce``: the numbers that a small filter should believe."""
+"""``gmwm bound``, ``gmwm reduce`` and ``gmwm budget``: what a calibration means for a filter."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.text import wrapped
 from gmwm.cli.console import progress_bar
 from gmwm.cli.options import seconds
 
 if TYPE_CHECKING:
     from gmwm._core.documents import Document
+    from gmwm.filter_numbers import SensorNumbers
 
 _OPTIONS = (
     click.argument("file", type=click.Path(path_type=Path)),
@@ -63,16 +65,19 @@ def bound(
         Calibration.load(file), form, horizon, level=level, shared=shared,
         bias_sd={"gyro": gyro_bias, "accel": accel_bias},
     )  # fmt: skip
-    show(found, output, as_json)
+    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
 
 
 @click.command()
 @_with_options
 @click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
               help="Times without aiding for which they shall be good, in seconds.")  # fmt: skip
+@click.option("--keyframe", type=float, metavar="S",
+              help="Interval of keyframes or scans, in place of outages, for relative "
+                   "poses.")  # fmt: skip
 def reduce(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    as_json: bool, outages: str,
+    as_json: bool, outages: str, keyframe: float | None,
 ) -> None:  # fmt: skip
     """Give the numbers with which a small filter is consistent in given outages.
 
@@ -88,16 +93,56 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration, form, times, shared=shared, progress=bar,
+            calibration, form, times, keyframe=keyframe, shared=shared, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
-    show(found, output, as_json)
+    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
 
 
-def show(result: Document, output: Path | None, as_json: bool) -> None:
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--times", default="1,10,60,600", show_default=True, metavar="T,T,...",
+              help="Coasting times in seconds.")  # fmt: skip
+@click.option("--unknown-start", is_flag=True,
+              help="Nothing is known of the errors at the start; by default the initial values of "
+                   "the slow ones are, as after aiding.")  # fmt: skip
+def budget(file: Path, times: str, unknown_start: bool) -> None:
+    """Predict the error growth of unaided navigation.
+
+    FILE is a calibration.json. For each term of each channel's model: attitude (deg), velocity
+    (m/s) and position (m) errors, 1 sigma, after coasting level and without manoeuvres. Valid up
+    to 600 seconds or so.
+
+    \b
+    Example:
+      gmwm budget out/calibration.json --times 1,10,60
+    """
+    from gmwm.budget import error_budget
+    from gmwm.calibration import Calibration
+
+    calibration = Calibration.load(file)
+    click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))
+
+
+def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> str:
+    """A line on the bias at switch-on, of the sensors for which none was given."""
+    given = {"gyro": gyro_bias, "accel": accel_bias}
+    flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
+    if not flags:
+        return ""
+    text = (
+        "initial_sd leaves out the bias at switch-on, which no recording at rest shows: add "
+        f"{' and '.join(flags)} (its standard deviation), or add its square to that of initial_sd"
+    )
+    return "\n".join(wrapped(text, first="- ", indent=2))
+
+
+def show(result: Document, output: Path | None, as_json: bool, remark: str = "") -> None:
     """Save and print a result."""
     if output is not None:
         result.save(output)
     click.echo(json.dumps(result.to_dict(), indent=1) if as_json else str(result))
+    if remark and not as_json:
+        click.echo(remark)
     if output is not None and not as_json:
         click.echo(f"wrote {output}")

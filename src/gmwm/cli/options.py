@@ -1,8 +1,9 @@
-"""Arguments of the command line that say how a recording is to be read."""
+"""Arguments of the command line: how a recording is to be read, and models as they are written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,11 @@ import click
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
+    from gmwm.process import Model, Process
     from gmwm.readers import Recording
+
+_TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
+_EXAMPLE = "write terms such as N, K, B, Q, R and GM with +, e.g. --model 'N + K + 2 GM'"
 
 CLOCKS = ("header", "log")
 """As in `gmwm.read`, which would take long to import for a line of help."""
@@ -52,6 +57,22 @@ _PART = (
     click.option("--stop", type=float, metavar="S", help="Leave out what is after."),
 )  # fmt: skip
 
+_ESTIMATING = (
+    click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
+                 help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
+                      "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
+                      "repeat."),
+    click.option("--leave", "left", multiple=True,
+                 type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
+                 metavar="WHAT",
+                 help="Leave events, lines, resonances, outliers or all as they are: samples of "
+                      "shocks are masked otherwise, lines and resonances are terms that a model "
+                      "may have, outliers all over it make the variances robust; repeat."),
+    click.option("--all", "everything", is_flag=True,
+                 help="Take everything as static; by default only the stretches at rest of a log "
+                      "that moves are used."),
+)  # fmt: skip
+
 _PRINTING = (
     click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, in SI units."),
     click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
@@ -68,6 +89,11 @@ def part_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _with(command, _PART)
 
 
+def estimating_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What is fitted, and to which samples."""
+    return _with(command, _ESTIMATING)
+
+
 def printing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """How results are printed."""
     return _with(command, _PRINTING)
@@ -80,19 +106,7 @@ def _with(command: Callable[..., Any], options: Sequence[Any]) -> Callable[..., 
 
 
 def read_recording(
-    file: Path,
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    form: str | None = None,
-    layout: str | None = None,
-    topics: tuple[str, ...] = (),
-    clock: str = CLOCKS[0],
-    only: str | None = None,
-    start: float | None = None,
-    stop: float | None = None,
+    file: Path, start: float | None = None, stop: float | None = None, **options: Any
 ) -> Recording:
     """Read a recording as the options say.
 
@@ -103,19 +117,40 @@ def read_recording(
     """
     from gmwm.readers import read
 
-    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    recording = read(
-        file,
-        rate=rate,
-        units=units,
-        channels=_chosen(roles(channels), only),
-        time=time_reference(time_column),
-        layout=layout,
-        topic=topics,
-        clock=clock,
-        format=form,
-    )
+    recording = read(file, **arguments_of_read(**options))
     return recording.part(0.0 if start is None else start, stop)
+
+
+def arguments_of_read(
+    rate: float | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channels: tuple[str, ...],
+    time_column: str | None,
+    form: str | None = None,
+    layout: str | None = None,
+    topics: tuple[str, ...] = (),
+    clock: str = CLOCKS[0],
+    only: str | None = None,
+) -> dict[str, Any]:
+    """What `gmwm.read` is given for the options.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used.
+    """
+    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    return {
+        "rate": rate,
+        "units": units,
+        "channels": _chosen(roles(channels), only),
+        "time": time_reference(time_column),
+        "layout": layout,
+        "topic": topics,
+        "clock": clock,
+        "format": form,
+    }
 
 
 def _chosen(
@@ -165,3 +200,86 @@ def seconds(option: str, text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"{option} {text}: write seconds, e.g. 1,10,60") from None
+
+
+# -- models ---------------------------------------------------------------------------------------
+
+
+def written_models(texts: Sequence[str]) -> dict[str, Model]:
+    """Models of ``--model MODEL`` and ``--model NAME=MODEL``, by name; empty for all channels.
+
+    Raises
+    ------
+    InputError
+        If a text is no model, or a name has two.
+    """
+    given: dict[str, Model] = {}
+    for text in texts:
+        name, _, model = map(str.strip, text.rpartition("="))
+        if name in given:
+            raise InputError(f"--model {text}: {name or 'all channels'} have a model: give one")
+        given[name] = _model(model)
+    return given
+
+
+def models_of_channels(
+    given: Mapping[str, Model], channels: Sequence[str]
+) -> dict[str, Model] | None:
+    """The model of each channel: its own, else that of its sensor, else that of all.
+
+    Parameters
+    ----------
+    given : mapping of str to Model
+        See `written_models`.
+    channels : sequence of str
+
+    Returns
+    -------
+    dict or None
+        None if nothing is given.
+
+    Raises
+    ------
+    InputError
+        If a channel has no model, or a model no channel.
+    """
+    if not given:
+        return None
+    keys = {name: (name, name.partition("_")[0], "") for name in channels}
+    for name in given:
+        if not any(name in each for each in keys.values()):
+            raise InputError(f"--model {name}=...: the channels are {', '.join(channels)}")
+    for name, each in keys.items():
+        if given.keys().isdisjoint(each):
+            raise InputError(
+                f"--model gives {name} no model: add one, e.g. --model '{name}=N + K', or "
+                "leave it out by --channels"
+            )
+    return {name: next(given[key] for key in each if key in given) for name, each in keys.items()}
+
+
+def _model(text: str) -> Model:
+    """A model, all parameters of which are free.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    from gmwm.process import CATALOGUE, GaussMarkov, Model
+
+    kinds: dict[str, type[Process]] = {"GM": GaussMarkov}
+    for kind in CATALOGUE:
+        kinds[kind.__name__] = kind
+        if len(kind.parameters[0].name) == 1 and not kind.prefix:
+            kinds[kind.parameters[0].name] = kind
+    terms: list[Process] = []
+    for part in text.split("+"):
+        found = _TERM.fullmatch(part)
+        if found is None or found[2] not in kinds:
+            raise InputError(f"--model {text}: {part.strip()!r} is no term: {_EXAMPLE}")
+        terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]
+    try:
+        return Model(tuple(terms))
+    except InputError as error:
+        raise InputError(f"--model {text}: {error}") from None

@@ -95,7 +95,16 @@ def reproduce(
                                   "--resume": resume and not rotate,
                                   "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
         given = [
-            read_recording(file, rate, gyro_unit, accel_unit, channels, time_column, form, layout)
+            read_recording(
+                file,
+                rate=rate,
+                gyro_unit=gyro_unit,
+                accel_unit=accel_unit,
+                channels=channels,
+                time_column=time_column,
+                form=form,
+                layout=layout,
+            )
             for file in recordings
         ]
         with folder_to_fill(output) as folder:

@@ -59,9 +59,12 @@ def about(imu: Imu, title: str, convention: str) -> list[str]:
             "NEES: predicted error squared over what a filter with these numbers believes, after "
             "that time without aiding; 1 is consistent, below 1 cautious, above 1 too optimistic"
         )
-    for quantity, by_horizon in imu.outlook.items():
-        values = (f"{t:g} s: {n:.3e}, {k:.3e}" for t, (n, k) in by_horizon.items())
-        lines += _wrapped(f"{quantity} N, K for all axes by horizon: {'; '.join(values)}")
+    for triad in imu.triads:
+        by_horizon = imu.outlook.get(triad.quantity, {})
+        values = [f"{t:g} s: {n:.3e}, {_walk(k, triad)}" for t, (n, k) in by_horizon.items()]
+        if values:
+            title = f"{triad.quantity} N, K for all axes by horizon"
+            lines += _wrapped(f"{title}: {'; '.join(values)}")
     for remark in imu.remarks:
         lines += _wrapped(plain(remark))
     return lines
@@ -98,6 +101,11 @@ def _table(imu: Imu, triad: Triad) -> list[str]:
 def _row(axis: Axis, keys: Sequence[str], times: Sequence[float]) -> list[str]:
     cells = [f"{'< ' if key in axis.upper else ''}{getattr(axis, key):.3e}" for key in (*keys,)]
     return [*cells, f"{axis.initial_sd:.3e}", *(f"{axis.nees[t]:.3g}" for t in times)]
+
+
+def _walk(K: float, triad: Triad) -> str:
+    """A random walk; where the models have none, its upper bound if the file has that."""
+    return f"< {triad.K:.3e}" if K <= 0.0 and triad.is_upper("K") else f"{K:.3e}"
 
 
 def _unit(unit: str, quantity: str) -> str:

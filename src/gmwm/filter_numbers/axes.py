@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Concatenate, ParamSpec, Protocol, cast, overload
 
 from gmwm._core import checks
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
 from gmwm.process import Model, Process, as_model
@@ -18,6 +20,25 @@ One = Process | Model | Fit
 Several = Calibration | Mapping[str, Process | Model] | Mapping[str, Fit]
 Sd = float | Mapping[str, float]
 """For every axis, or by the name of an axis or its kind (gyro, accel)."""
+
+P = ParamSpec("P")
+
+
+class PerAxis(Protocol[P]):
+    """A function that gives the numbers of one axis, or those of several by channel name."""
+
+    @overload
+    def __call__(self, source: One, *args: P.args, **kwargs: P.kwargs) -> FilterNumbers: ...
+    @overload
+    def __call__(self, source: Several, *args: P.args, **kwargs: P.kwargs) -> SensorNumbers: ...
+
+
+def per_axis(
+    function: Callable[Concatenate[One | Several, P], FilterNumbers | SensorNumbers],
+) -> PerAxis[P]:
+    """The function itself, the type of whose result is by that of the source."""
+    return cast(PerAxis[P], function)
+
 
 DT = 0.01
 """s, sampling interval of models that are not fitted; slow terms and horizons are far above it."""
@@ -54,6 +75,13 @@ class Axis:
         """The filter by which its numbers are judged; the gyro of the vertical turns a heading."""
         is_heading = self.quantity == "gyro" and self.name.endswith("_z")
         return Chain.usual("" if is_heading else self.quantity)
+
+    def between(self, keyframe: float) -> Chain:
+        """That of relative poses, an interval (s) apart."""
+        return Chain(
+            tuning.KEYFRAME_ORDER[self.quantity], tuning.KEYFRAME_SD[self.quantity],
+            tuning.KEYFRAMES * keyframe, keyframe, is_relative=True,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +128,14 @@ class Axes:
             f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, or "
             "models by channel name"
         )
+
+    def check_interval(self, name: str, shortest: float) -> None:
+        """Raise `InputError` if a time (s) is below two sampling intervals of an axis."""
+        least = 2.0 * max(axis.dt for axis in self.axes)
+        if least > shortest:
+            raise InputError(
+                f"{name} = {shortest:g} s: give two sampling intervals or more, {least:g} s"
+            )
 
     @property
     def groups(self) -> tuple[tuple[Axis, ...], ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 import numpy as np
 
@@ -12,10 +11,12 @@ from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, per_axis
+from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import (
     KINDS,
+    TIGHTEST,
     Estimated,
     Problem,
     Target,
@@ -26,27 +27,7 @@ from gmwm.filter_numbers.spectra import (
 from gmwm.process import Model
 
 
-@overload
-def bound(
-    source: One,
-    form: str = ...,
-    horizon: float = ...,
-    *,
-    level: float | None = ...,
-    bias_sd: Sd = ...,
-    dt: float | None = ...,
-) -> FilterNumbers: ...
-@overload
-def bound(
-    source: Several,
-    form: str = ...,
-    horizon: float = ...,
-    *,
-    level: float | None = ...,
-    bias_sd: Sd = ...,
-    shared: bool = ...,
-    dt: float | None = ...,
-) -> SensorNumbers: ...
+@per_axis
 def bound(
     source: One | Several,
     form: str = "N+K",
@@ -105,15 +86,11 @@ def bound(
     checks.choice("form", form, list(KINDS))
     horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
     axes = Axes.of(source, dt, bias_sd)
-    for axis in axes.axes:
-        if 2.0 * axis.dt > horizon:
-            raise InputError(
-                f"horizon = {horizon:g} s: give two sampling intervals or more, {2.0 * axis.dt:g} s"
-            )
-        if level is not None:
-            _fit(axis)
+    axes.check_interval("horizon", horizon)
     if level is not None:
         level = checks.share("level", level, 0.95)
+        for axis in axes.axes:
+            _fit(axis)
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
         return bound_of(group, form, horizon, level)
@@ -136,7 +113,17 @@ def bound_of(
     fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
-    sd = max(_start(group, each, model) for each in (*targets, *region))
+    dominated = (*targets, *region)
+    sd = max(_start(group, each, model) for each in dominated)
+    times = (horizon, 10.0 * horizon)
+    errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
+    if form != TIGHTEST and any(found[0].tightness > tuning.LOOSE for found in errors):
+        other = dominating(problem, TIGHTEST)
+        start = max(_start(group, each, other) for each in dominated)
+        tight = [predicted(axis, axis.chain, other, start, times[:1])[0] for axis in group]
+        looseness = [_loose(found[0], best) for found, best in zip(errors, tight, strict=True)]
+    else:
+        looseness = [()] * len(group)
     return [
         FilterNumbers(
             form=form,
@@ -144,13 +131,40 @@ def bound_of(
             horizon=horizon,
             initial_sd=sd,
             method="bound",
-            predicted=predicted(axis, model, sd, (horizon, 10.0 * horizon)),
-            notices=(*target.notices, *about(axis, level)),
+            predicted=found,
+            notices=(*target.notices, *_optimistic(found), *loose, *about(axis, level)),
             quantity=axis.quantity,
             stderr=stderr,
         )
-        for axis, target in zip(group, targets, strict=True)
+        for axis, target, found, loose in zip(group, targets, errors, looseness, strict=True)
     ]
+
+
+def _optimistic(found: Sequence[Predicted]) -> tuple[Notice, ...]:
+    """Where what the numbers leave out is too large for that."""
+    worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
+    if not worst.nees > tuning.OPTIMISTIC:
+        return ()
+    text = (
+        f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding; what "
+        "the numbers leave out is not small here"
+    )
+    values = {"nees": worst.nees, "time": worst.time}
+    mend = "estimate it as a state, or take it off the data"
+    return (Notice("optimistic", "warning", "", text, values, mend),)
+
+
+def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
+    """Where another form is worth its state."""
+    if found.tightness <= tuning.LOOSE or best.tightness > found.tightness / tuning.WORTH_A_STATE:
+        return ()
+    text = (
+        f"after {found.time:g} s without aiding errors are believed {found.tightness:.3g} times as "
+        f"large as they are; with {TIGHTEST}, {best.tightness:.3g} times"
+    )
+    values = {"tightness": found.tightness, "with_state": best.tightness}
+    mend = f"use {TIGHTEST} where the filter has a state for it"
+    return (Notice("loose-form", "note", "", text, values, mend),)
 
 
 def _fit(axis: Axis) -> Fit:
@@ -168,10 +182,12 @@ def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
     return float(np.sqrt(variance))
 
 
-def predicted(axis: Axis, model: Model, sd: float, times: Sequence[float]) -> tuple[Predicted, ...]:
+def predicted(
+    axis: Axis, chain: Chain, model: Model, sd: float, times: Sequence[float]
+) -> tuple[Predicted, ...]:
     """What a filter with these numbers knows of its error after some times without aiding."""
     try:
-        errors = axis.chain.errors(
+        errors = chain.errors(
             axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
         )
     except InputError:

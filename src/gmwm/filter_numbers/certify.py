@@ -9,12 +9,12 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.certificate import Cause, Certificate, Check
-from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.given import Given, in_use
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
@@ -81,12 +81,8 @@ def certify(
         raise InputError("outages: give one length at least, s")
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")
     axes = Axes.of(source, dt, bias_sd)
-    for axis in axes.axes:
-        if 2.0 * axis.dt > min(keyframe, *times):
-            raise InputError(
-                f"keyframe = {keyframe:g} s, outages from {times[0]:g} s: give two sampling "
-                f"intervals or more, {2.0 * axis.dt:g} s"
-            )
+    axes.check_interval("keyframe", keyframe)
+    axes.check_interval("outages", times[0])
     known = Imperfections() if imperfections is None else imperfections
     moved = None if motion is None else Motion.of(motion)
     if known.needs_motion and moved is None:
@@ -120,12 +116,11 @@ def _of_axis(
 ) -> list[Check]:
     """Errors of one axis without aiding, and between keyframes."""
     believed = numbers[axis.name]
-    between = Chain(
-        tuning.KEYFRAME_ORDER[axis.quantity], tuning.KEYFRAME_SD[axis.quantity],
-        tuning.KEYFRAMES * keyframe, keyframe, is_relative=True,
-    )  # fmt: skip
     result = []
-    for consumer, chain, ends in (("free", axis.chain, times), ("keyframes", between, (keyframe,))):
+    for consumer, chain, ends in (
+        ("free", axis.chain, times),
+        ("keyframes", axis.between(keyframe), (keyframe,)),
+    ):
         errors = chain.errors(
             axis.model, believed.model, axis.dt, ends,
             true_sd=axis.bias_sd, believed_sd=believed.initial_sd,
@@ -189,6 +184,8 @@ def _causes(
             factors = (v / o if o > 0.0 else float("inf") for v, o in zip(pair, over, strict=True))
             return Cause(kind, name, *pair, *factors)
 
+        if N > tuning.OTHER_UNITS * first.N:
+            notices.append(_units(kind, N / first.N))
         causes.append(Cause(kind, "in use", N, K, 1.0, 1.0))
         causes.append(row("error model, slow terms and all", first, (N, K)))
         if all(axis.fit is not None for axis in group):
@@ -221,6 +218,12 @@ def _causes(
             every = _bound(_with(group, list(terms.values())), horizon)
             causes.append(row("all together", every, (N, K)))
     return causes, notices
+
+
+def _units(kind: str, factor: float) -> Notice:
+    text = f"N in use is {factor:.3g} times that of the error model: it may be in other units"
+    mend = f"give it in {SI_UNIT.get(kind, 'u')}/sqrt(Hz)"
+    return Notice("other-units", "warning", kind, text, {"factor": factor}, mend)
 
 
 def _bound(group: Sequence[Axis], horizon: float, level: float | None = None) -> FilterNumbers:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 import numpy as np
 from scipy.optimize import minimize
@@ -12,7 +11,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, per_axis
 from gmwm.filter_numbers.bound import about, predicted
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
@@ -22,32 +21,13 @@ _TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}
 """Correlation times at the start of the search, over the longest outage."""
 
 
-@overload
-def reduce(
-    source: One,
-    form: str = ...,
-    outages: Sequence[float] = ...,
-    *,
-    bias_sd: Sd = ...,
-    dt: float | None = ...,
-    progress: Progress | None = ...,
-) -> FilterNumbers: ...
-@overload
-def reduce(
-    source: Several,
-    form: str = ...,
-    outages: Sequence[float] = ...,
-    *,
-    bias_sd: Sd = ...,
-    shared: bool = ...,
-    dt: float | None = ...,
-    progress: Progress | None = ...,
-) -> SensorNumbers: ...
+@per_axis
 def reduce(
     source: One | Several,
     form: str = "N+K",
     outages: Sequence[float] = (10.0, 30.0, 60.0),
     *,
+    keyframe: float | None = None,
     bias_sd: Sd = 0.0,
     shared: bool = False,
     dt: float | None = None,
@@ -65,6 +45,9 @@ def reduce(
         White noise with a random walk, with Gauss-Markov processes, or both.
     outages : sequence of float, optional
         Times without aiding for which they shall be good, s.
+    keyframe : float, optional
+        Interval of keyframes or scans between which poses are related, s, for which they shall be
+        good in place of outages.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind
         ("gyro", "accel") if a mapping.
@@ -78,8 +61,8 @@ def reduce(
     Returns
     -------
     FilterNumbers or SensorNumbers
-        Of one axis, or by channel; the horizon is the longest outage, and what is predicted is at
-        each of them and at ten times the longest.
+        Of one axis, or by channel; the horizon is the longest outage or the interval of keyframes,
+        and what is predicted is at each of them and at ten times the longest.
 
     Raises
     ------
@@ -90,15 +73,19 @@ def reduce(
     -----
     They minimise the expected negative logarithm of the predicted density at the true error of the
     integrals at the end of the outages: a proper score, which punishes a covariance that is too
-    small as it does one that is too large. The expectation is exact for the truth given, in the
-    filter of `gmwm.filter_numbers.Chain`. `gmwm.ins.reduce` does the same in a whole navigation
-    filter on a trajectory.
+    small as it does one that is too large. To it comes the squared logarithm of the NEES at each of
+    them: what one is too optimistic, another shall not make good. The expectation is exact for the
+    truth given, in the filter of `gmwm.filter_numbers.Chain`. `gmwm.ins.reduce` does it in a whole
+    navigation filter on a trajectory.
     """
     checks.choice("form", form, FORMS)
+    if keyframe is not None:
+        outages = (checks.positive("keyframe", keyframe, "give the interval of keyframes in s"),)
     times = sorted({checks.positive("outage", each) for each in outages})
     if not times:
         raise InputError("outages: give one length at least, s")
     axes = Axes.of(source, dt, bias_sd)
+    axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
     done = 0
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
@@ -106,7 +93,7 @@ def reduce(
         if progress is not None:
             progress(done, len(axes.axes), group[0].name)
         done += len(group)
-        return _reduced(group, form, times)
+        return _reduced(group, form, times, keyframe is not None)
 
     result = axes.numbers(found, shared)
     if progress is not None:
@@ -114,8 +101,11 @@ def reduce(
     return result
 
 
-def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[FilterNumbers]:
+def _reduced(
+    group: Sequence[Axis], form: str, times: Sequence[float], is_relative: bool
+) -> list[FilterNumbers]:
     longest = times[-1]
+    chains = [axis.between(longest) if is_relative else axis.chain for axis in group]
     targets = [Target.of(axis.model, axis.dt, longest) for axis in group]
     start, sd = _start(group, targets, form, longest)
     names = list(start.params)
@@ -127,13 +117,15 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
     def cost(logs: FloatArray) -> float:
         # Finite beyond the farthest too, where a line search may try: differences are taken of it.
         model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
-        total = 0.0
-        for axis in group:
-            errors = axis.chain.errors(
-                axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
-            )
-            total += float(np.sum(errors.score()))
-        return total / len(group) + tuning.INERTIA * float(logs @ logs)
+        errors = [
+            chain.errors(axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd)
+            for axis, chain in zip(group, chains, strict=True)
+        ]
+        score = np.mean([each.score() for each in errors], axis=0)
+        # Of all axes together: one that shares its numbers may well be cautious, another bold.
+        uneven = np.log(np.mean([each.nees() for each in errors], axis=0)) ** 2
+        inertia = tuning.INERTIA * float(logs @ logs)
+        return float(np.sum(score + tuning.EVENNESS * uneven)) + inertia
 
     best = minimize(
         cost, np.zeros(len(names)), method="BFGS",
@@ -147,11 +139,11 @@ def _reduced(group: Sequence[Axis], form: str, times: Sequence[float]) -> list[F
             horizon=longest,
             initial_sd=sd,
             method="reduce",
-            predicted=predicted(axis, model, sd, (*times, 10.0 * longest)),
+            predicted=predicted(axis, chain, model, sd, (*times, 10.0 * longest)),
             notices=(*target.notices, *about(axis, None)),
             quantity=axis.quantity,
         )
-        for axis, target in zip(group, targets, strict=True)
+        for axis, chain, target in zip(group, chains, targets, strict=True)
     ]
 
 

@@ -196,12 +196,10 @@ class FilterNumbers(Document):
         values = [(key, float(value or 0.0)) for key, value in self.model.params.items()]
         return [*values, ("initial_sd", self.initial_sd)]
 
-    def _columns(self) -> dict[str, float]:
-        """Of the table of a sensor."""
+    def _columns(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Of the table of a sensor: values with their errors, and predictions."""
         errors = {f"{key} +-": value for key, value in self.stderr.items()}
-        return {
-            **dict(self._shown()),
-            **errors,
+        return {**dict(self._shown()), **errors}, {
             **{f"NEES {each.time:g} s": each.nees for each in self.predicted},
             **{f"sd {each.time:g} s": each.tightness for each in self.predicted},
         }
@@ -334,18 +332,9 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
         first = next(iter(self.values()))
         head = f"{self.form} for {self.horizon:g} s, {first.method}"
         lines = [f"{self.source}: {head}" if self.source else head]
-        names = max(map(len, self))
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
-            group = self.of(quantity)
-            # Errors are known of some axes only.
-            columns = max((tuple(each._columns()) for each in group.values()), key=len)
             title = f"{quantity or 'channel'} [{SI_UNIT.get(quantity, 'u')}, s]"
-            names = max(names, len(title))
-            lines += ["", f"{title:<{names}}" + "".join(f" {column:>11}" for column in columns)]
-            for name, each in group.items():
-                known = each._columns()
-                cells = [f"{known[key]:.4g}" if key in known else "-" for key in columns]
-                lines.append(f"{name:<{names}}" + "".join(f" {cell:>11}" for cell in cells))
+            lines += ["", *_stacked(title, self.of(quantity))]
         if first.predicted:
             lines += ["", *wrapped(
                 "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
@@ -393,3 +382,19 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
             duration=number(content["duration_s"]),
             shared=bool(content["shared"]),
         )
+
+
+def _stacked(title: str, group: Mapping[str, FilterNumbers]) -> list[str]:
+    """A table of values above one of predictions, each within the width of a terminal."""
+    lines: list[str] = []
+    width = max(map(len, [title, *group]))
+    for parts in zip(*(each._columns() for each in group.values()), strict=True):
+        # Errors are known of some axes only.
+        columns = max(map(tuple, parts), key=len)
+        cells = [[f"{part[key]:.4g}" if key in part else "-" for key in columns] for part in parts]
+        widths = [max(9, *map(len, column)) for column in zip(columns, *cells, strict=True)]
+        for name, row in zip((title, *group), (columns, *cells), strict=True):
+            values = (f" {cell:>{w}}" for cell, w in zip(row, widths, strict=True))
+            lines.append(f"{name:<{width}}" + "".join(values))
+        title = "predicted"
+    return lines

@@ -15,7 +15,7 @@ from gmwm.process.noise import (
 )
 from gmwm.process.parameter import Parameter, parameter
 from gmwm.process.sinusoid import Sinusoid
-from gmwm.process.spectral import PSD, evaluated, haar_gain, legendre, quadrature
+from gmwm.process.spectral import PSD, Panels, evaluated, haar_gain, legendre, quadrature
 from gmwm.process.state_space import StateSpace, block_diagonal
 from gmwm.process.wavelet_gain import pair_weights, unit_legendre
 from gmwm.process.wavelets import ComplexArray, Wavelet, wavelet
@@ -34,6 +34,7 @@ __all__ = [
     "GaussMarkov",
     "LowPassNoise",
     "Model",
+    "Panels",
     "Parameter",
     "Process",
     "QuantizationNoise",

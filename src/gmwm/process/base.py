@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from inspect import Signature, signature
 from typing import Any, ClassVar, Self
 
@@ -299,6 +299,17 @@ class Process:
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
         return np.asarray(self.at_unit(shape).haar_variance(tau, dt), dtype=float)
+
+    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
+        """`unit_haar_variance` as a function of the shape alone."""
+        return lambda shape: self.unit_haar_variance(shape, tau, dt)
+
+    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray | None:
+        """Derivative of `unit_haar_variance` by the coordinates of `shape_to_free`, (J, s).
+
+        ``None`` where no closed form is known: the estimator takes differences then.
+        """
+        return None
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).

@@ -14,7 +14,9 @@ here both terms are of third order in a and computed as such.
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
 from math import factorial
 from typing import Any, ClassVar
 
@@ -28,10 +30,9 @@ from gmwm.process.parameter import parameter
 from gmwm.process.state_space import StateSpace
 
 _SERIES_BELOW = 0.5
-_SINH_TERMS = [1.0 / factorial(2 * k + 1) for k in range(1, 9)]
-_H_TERMS = [-((-1) ** k) * (2.0**k - 4.0) / factorial(k) for k in range(3, 22)]
-_H_ARRAY = np.array(_H_TERMS)
-_SINH_ARRAY = np.array(_SINH_TERMS)
+_SINH_ARRAY = np.array([1.0 / factorial(2 * k + 1) for k in range(1, 9)])
+_H_ARRAY = np.array([-((-1) ** k) * (2.0**k - 4.0) / factorial(k) for k in range(3, 22)])
+_SLOW_BELOW = 1e-3
 _WHITE_ABOVE = 40.0  # exp(-a) is below rounding: white noise
 _GRID_PER_DECADE = 8
 _PEAK, _PEAK_AT = 0.618, 1.89  # of sigma and of tau: the top of the Allan deviation, IEEE Std 952
@@ -71,6 +72,13 @@ class GaussMarkov(Process):
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         flat = _real_haar(dt / shape[0], np.ascontiguousarray(tau).ravel() / dt)
         return flat.reshape(tau.shape)
+
+    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
+        m = np.asarray(tau, dtype=float) / dt
+        return lambda shape: _real_haar(dt / shape[0], m)
+
+    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        return _real_slope(dt / shape[0], np.asarray(tau, dtype=float) / dt)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
@@ -120,8 +128,8 @@ class Resonance(Process):
 
     Notes
     -----
-    Autocovariance sigma^2 exp(-zeta w0 |t|) [cos(wd t) + (zeta w0/wd) sin(wd |t|)] with w0 = 2 pi
-    f0, wd = w0 sqrt(1 - zeta^2) (Gelb, *Applied Optimal Estimation*, 1974, sec. 2.2): two
+    Autocovariance sigma^2 exp(-zeta w0 t) [cos(wd t) + (zeta w0/wd) sin(wd t)] for t >= 0 with
+    w0 = 2 pi f0, wd = w0 sqrt(1 - zeta^2) (Gelb, *Applied Optimal Estimation*, 1974, sec. 2.2): two
     exponentials of complex rate, to which the formulas of the first order apply.
     """
 
@@ -160,24 +168,14 @@ class Resonance(Process):
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         rate, weight = self._exponential(shape, dt)
-        m = np.asarray(tau, dtype=float) / dt
-        direct = np.real(weight * _exponential_haar(rate, m))
-        return np.where(m * abs(rate) < 1e-3, self._slow_haar(rate, weight, m), direct)
-
-    @staticmethod
-    def _slow_haar(rate: complex, weight: complex, m: FloatArray) -> FloatArray:
-        """Expansion for m |rate| << 1, where the linear terms of the conjugates cancel.
-
-        With the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k, the wavelet variance is a polynomial
-        in m by Faulhaber's sums.
-        """
-        v2, v3, v4 = (
-            -2.0 * np.real(weight * (-rate) ** p) / factorial
-            for p, factorial in ((2, 2.0), (3, 6.0), (4, 24.0))
+        tau = np.asarray(tau, dtype=float)
+        return _complex_haar(rate, weight, np.ascontiguousarray(tau).ravel() / dt).reshape(
+            tau.shape
         )
-        cubic = 2.8 * m**3 - 2.0 / 3.0 * m - 2.0 / (15.0 * m)
-        quartic = 4.0 * m**4 - 2.0 * m**2
-        return np.asarray(v2 * m**2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0)
+
+    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
+        m = np.asarray(tau, dtype=float) / dt
+        return lambda shape: _complex_haar(*self._exponential(shape, dt), m)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         rate, weight = self._exponential(self._shape, dt)
@@ -221,21 +219,6 @@ class Resonance(Process):
         return (cls(0.4, 0.2, 0.05), cls(2e-3, 0.01, 0.5), cls(1.0, 1e-4, 0.3), cls(1.0, 0.45, 0.9))
 
 
-def _sinh_minus_identity(a: Any) -> Any:
-    """sinh(a) - a for scalar a, to full relative precision."""
-    if abs(a) < _SERIES_BELOW:
-        return a**3 * np.polynomial.polynomial.polyval(a * a, _SINH_TERMS)
-    return np.sinh(a) - a
-
-
-def _h(x: Any) -> Any:
-    """2 x - 3 + 4 exp(-x) - exp(-2 x), to full relative precision."""
-    y = np.where(np.abs(x) < _SERIES_BELOW, x, 0.0)  # keeps the unused branch finite
-    series = y**3 * np.polynomial.polynomial.polyval(y, _H_TERMS)
-    direct = 2.0 * x - 3.0 + 4.0 * np.exp(-x) - np.exp(-2.0 * x)
-    return np.where(np.abs(x) < _SERIES_BELOW, series, direct)
-
-
 def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
     """Two-sided spectrum of the unit-variance process, same shape as ``f``, in s."""
     half = 0.5 * rate
@@ -245,26 +228,17 @@ def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
     return dt * np.cosh(half) * s / (s * s + np.sin(np.pi * f * dt) ** 2)
 
 
-def _exponential_haar(rate: complex, m: FloatArray) -> Any:
-    """Haar wavelet variance of the unit-variance process.
+@compiled()
+def _real_haar(rate: float, m: FloatArray) -> FloatArray:
+    """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
     Parameters
     ----------
-    rate : float or complex
-        a > 0, or complex with positive real part (one of a conjugate pair).
-    m : ndarray
+    rate : float
+        a > 0.
+    m : (J,) ndarray
         Averaging times in samples.
     """
-    m = np.asarray(m, dtype=float)
-    if np.real(rate) > _WHITE_ABOVE:
-        return 0.5 / m + 0.0 * rate
-    denominator = 8.0 * m**2 * np.sinh(0.5 * rate) ** 2
-    return (2.0 * m * _sinh_minus_identity(rate) + _h(m * rate)) / denominator
-
-
-@compiled()
-def _real_haar(rate: float, m: FloatArray) -> FloatArray:
-    """`_exponential_haar` for a real rate and m of shape (J,): the inner loop of every fit."""
     result = np.empty(m.size)
     if rate > _WHITE_ABOVE:
         for i in range(m.size):
@@ -288,4 +262,61 @@ def _real_haar(rate: float, m: FloatArray) -> FloatArray:
         else:
             h = 2.0 * x - 3.0 + 4.0 * math.exp(-x) - math.exp(-2.0 * x)
         result[i] = (2.0 * m[i] * excess + h) / (m[i] * m[i] * scale)
+    return result
+
+
+@compiled()
+def _real_slope(rate: float, m: FloatArray) -> FloatArray:
+    """Derivative of `_real_haar` by the logarithm of the correlation time, (J, 1)."""
+    result = np.zeros((m.size, 1))
+    if rate > _WHITE_ABOVE:
+        return result
+    curve = _real_haar(rate, m)
+    square = math.sinh(0.5 * rate) ** 2
+    for i in range(m.size):
+        bend = math.expm1(-m[i] * rate) ** 2  # half of h'
+        numerator = 4.0 * m[i] * square + 2.0 * m[i] * bend
+        slope = numerator / (8.0 * m[i] * m[i] * square) - curve[i] / math.tanh(0.5 * rate)
+        result[i, 0] = -rate * slope
+    return result
+
+
+@compiled()
+def _complex_haar(rate: complex, weight: complex, m: FloatArray) -> FloatArray:
+    """The real part of ``weight`` times the same for a rate of positive real part.
+
+    One of a conjugate pair. For m |rate| << 1, where their linear terms cancel, it is a polynomial
+    in m by Faulhaber's sums, with the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k.
+    """
+    result = np.empty(m.size)
+    if rate.real > _WHITE_ABOVE:
+        for i in range(m.size):
+            result[i] = 0.5 * weight.real / m[i]
+        return result
+    if abs(rate) < _SERIES_BELOW:
+        excess = 0.0 + 0.0j
+        for k in range(_SINH_ARRAY.size - 1, -1, -1):
+            excess = excess * rate * rate + _SINH_ARRAY[k]
+        excess *= rate * rate * rate
+    else:
+        excess = cmath.sinh(rate) - rate
+    scale = 8.0 * cmath.sinh(0.5 * rate) ** 2
+    v2 = -(weight * rate**2).real
+    v3 = (weight * rate**3).real / 3.0
+    v4 = -(weight * rate**4).real / 12.0
+    for i in range(m.size):
+        if m[i] * abs(rate) < _SLOW_BELOW:
+            cubic = 2.8 * m[i] ** 3 - 2.0 / 3.0 * m[i] - 2.0 / (15.0 * m[i])
+            quartic = 4.0 * m[i] ** 4 - 2.0 * m[i] ** 2
+            result[i] = v2 * m[i] ** 2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0
+            continue
+        x = m[i] * rate
+        if abs(x) < _SERIES_BELOW:
+            h = 0.0 + 0.0j
+            for k in range(_H_ARRAY.size - 1, -1, -1):
+                h = h * x + _H_ARRAY[k]
+            h *= x * x * x
+        else:
+            h = 2.0 * x - 3.0 + 4.0 * cmath.exp(-x) - cmath.exp(-2.0 * x)
+        result[i] = (weight * (2.0 * m[i] * excess + h) / (m[i] * m[i] * scale)).real
     return result

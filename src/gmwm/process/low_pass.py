@@ -7,6 +7,7 @@ state-space form is that white noise, without a state.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import ClassVar
 
@@ -14,25 +15,18 @@ import numpy as np
 from scipy import fft
 from scipy.signal import lfilter
 
+from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import quadrature
+from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, Panels, quadrature
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
 _LOWEST, _HIGHEST = 0.004, 0.45  # of the grid of bandwidths, in cycles per sample
 _LARGEST_LOG = 600.0
 _LAGS = 1 << 17
-
-_PANEL, _POINTS = 0.125, 12
-"""Width of a panel in the logarithm of tan(pi f dt), and Chebyshev points on it. A polynomial
-through them is as near as rho^-12, rho that of the Bernstein ellipse through the next pole of the
-spectrum (Trefethen 2013, *Approximation Theory and Approximation Practice*, ch. 8)."""
-
-_POLE = 2.21
-"""Distance of that pole in half panels from which the polynomial is good to 1e-8."""
 
 BUTTERWORTH = float(np.sqrt(0.5))
 """Damping ratio at which the pass band is as flat as it can be."""
@@ -108,6 +102,10 @@ class LowPassNoise(_Filtered):
         averaging = tuple((tau.ravel() / dt).tolist())
         return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(tau.shape).copy()
 
+    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
+        averaging = tuple((np.asarray(tau, dtype=float) / dt).tolist())
+        return lambda shape: _unit_curve(shape, averaging, dt)
+
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         lag = np.asarray(lag, dtype=int)
         size = 2 * max(_LAGS, 2 * int(np.max(lag, initial=0)))
@@ -171,10 +169,12 @@ class AveragedNoise(_Filtered):
         return self.N**2 / dt * np.where(inside, covariance[np.where(inside, lag, 0)], 0.0)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        return self.N**2 * self.unit_haar_variance((self.window,), tau, dt)
+
+    def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)
-        covariance = _window_covariance(self.window / dt)
-        flat = [haar_sum(covariance, m) for m in (tau.ravel() / dt)]
-        return self.N**2 / dt * np.reshape(flat, tau.shape)
+        averaging = tuple((tau.ravel() / dt).tolist())
+        return _window_curve(shape[0] / dt, averaging).reshape(tau.shape) / dt
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         weights = _weights(self.window / dt)
@@ -207,41 +207,35 @@ def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatA
     """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
     nodes = _on_panels if _is_smooth(shape) else _nodes
     log_tangent, weight = nodes(averaging)
-    return np.asarray(weight @ _gain(shape, log_tangent, dt) / dt)
+    found: FloatArray = frozen(weight @ _gain(shape, log_tangent, dt) / dt)
+    return found
 
 
 def _is_smooth(shape: Shape) -> bool:
     """Whether the spectrum over a panel is a polynomial to 1e-8."""
     _, order, damping = shape
     angle = np.arccos(np.clip(1.0 - 2.0 * damping**2, -1.0, 1.0))
-    return bool(angle / order > _POLE * 0.5 * _PANEL)
+    return bool(angle / order > PANEL_POLE * HALF_PANEL)
 
 
 @lru_cache(maxsize=8)
 def _nodes(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
-    rounded = tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
-    found = quadrature(rounded)
+    found = quadrature(_rounded(averaging))
     return np.log(np.tan(np.pi * found.frequency)), 2.0 * found.gain * found.weight
 
 
 @lru_cache(maxsize=8)
 def _on_panels(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     """The same at Chebyshev points of panels, which are a tenth as many."""
-    log_tangent, weight = _nodes(averaging)
-    panel = np.floor(log_tangent / _PANEL)
-    starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
-    angles = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
-    points = np.cos(angles)
-    within = 2.0 * (log_tangent / _PANEL - panel) - 1.0
-    # Lagrange's polynomials by the barycentric formula, whose limit at a point is one.
-    distance = within[:, None] - points
-    distance[distance == 0.0] = np.finfo(float).tiny
-    share = (-1.0) ** np.arange(_POINTS) * np.sin(angles) / distance
-    share /= np.sum(share, axis=1, keepdims=True)
-    shared = [np.add.reduceat(weight * share[:, k], starts, axis=1) for k in range(_POINTS)]
-    places = _PANEL * (panel[starts, None] + 0.5 * (points + 1.0))
-    return places.ravel(), np.stack(shared, axis=-1).reshape(len(averaging), -1)
+    found = quadrature(_rounded(averaging))
+    panels = Panels.of(found.frequency)
+    weight = panels.gathered(2.0 * found.gain * found.weight)
+    return panels.log_tangent.ravel(), weight.reshape(len(averaging), -1)
+
+
+def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
 
 
 def _weights(length: float) -> FloatArray:
@@ -251,6 +245,13 @@ def _weights(length: float) -> FloatArray:
     weights = np.ones(whole + 1)
     weights[-1] = max(length - whole, 0.0)
     return weights / np.sum(weights)
+
+
+@lru_cache(maxsize=1024)
+def _window_curve(length: float, averaging: tuple[float, ...]) -> FloatArray:
+    """Wavelet variance of white noise of unit variance behind a window."""
+    covariance = _window_covariance(length)
+    return np.array([haar_sum(covariance, m) for m in averaging])
 
 
 def _window_covariance(length: float) -> FloatArray:

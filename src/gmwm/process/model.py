@@ -155,7 +155,7 @@ class Model:
         return np.sum(self.component_variances(tau, dt, wavelet), axis=0)
 
     def component_variances(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
-        """Wavelet variance of each term, shape (terms, *tau.shape), in u^2."""
+        """Wavelet variance of each term, shape (terms,) + tau.shape, in u^2."""
         self._require_given()
         tau = np.asarray(tau, dtype=float)
         curves = [term.wavelet_variance(tau, dt, wavelet) for term in self.terms]

@@ -153,6 +153,77 @@ def quadrature(averaging: tuple[float, ...]) -> Quadrature:
     return Quadrature(frequency, weight, gain, resolved)
 
 
+_PANEL, _POINTS = 0.125, 12
+"""Width of a panel in the logarithm of tan(pi f dt), and Chebyshev points on it. A polynomial
+through them is as near as rho^-12, rho that of the Bernstein ellipse through the next pole of the
+spectrum (Trefethen 2013, *Approximation Theory and Approximation Practice*, ch. 8)."""
+
+PANEL_POLE = 2.21
+"""Distance of that pole in half panels from which the polynomial is good to 1e-8."""
+
+HALF_PANEL = 0.5 * _PANEL
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """The nodes of a quadrature in panels, on which a smooth spectrum is a polynomial.
+
+    Attributes
+    ----------
+    log_tangent : (P, 12) ndarray
+        Chebyshev points of each panel: log tan(pi f), f in cycles per sample.
+    starts : (P,) ndarray
+        First node of each panel.
+    share : (K, 12) ndarray
+        Lagrange's polynomials of the points of its panel at each node.
+    """
+
+    log_tangent: FloatArray
+    starts: npt.NDArray[np.intp]
+    share: FloatArray
+
+    @classmethod
+    def of(cls, frequency: FloatArray) -> Panels:
+        """Those of rising nodes (K,), cycles per sample."""
+        log_tangent = np.log(np.tan(np.pi * frequency))
+        panel = np.floor(log_tangent / _PANEL)
+        starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
+        angles = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
+        points = np.cos(angles)
+        within = 2.0 * (log_tangent / _PANEL - panel) - 1.0
+        # By the barycentric formula, whose limit at a point is one.
+        distance = within[:, None] - points
+        distance[distance == 0.0] = np.finfo(float).tiny
+        share = (-1.0) ** np.arange(_POINTS) * np.sin(angles) / distance
+        share /= np.sum(share, axis=1, keepdims=True)
+        return cls(_PANEL * (panel[starts, None] + 0.5 * (points + 1.0)), starts, share)
+
+    def gathered(self, weight: FloatArray) -> FloatArray:
+        """Weights of the points from weights of the nodes, (..., K) to (..., P, 12)."""
+        ends = np.append(self.starts[1:], self.share.shape[0])
+        result = np.empty((*weight.shape[:-1], *self.log_tangent.shape))
+        for p, (start, end) in enumerate(zip(self.starts, ends, strict=True)):
+            result[..., p, :] = weight[..., start:end] @ self.share[start:end]
+        return result
+
+    @staticmethod
+    def are_smooth(values: FloatArray) -> npt.NDArray[np.bool_]:
+        """Panels on which values at the points, (P, 12), are a polynomial to 1e-10, (P,)."""
+        tail = np.max(np.abs(values @ _TAIL), axis=1)
+        return np.asarray(tail <= _SMOOTH * np.max(np.abs(values), axis=1))
+
+
+_SMOOTH = 1e-10
+_TAIL = (
+    2.0
+    / _POINTS
+    * np.cos(
+        np.outer(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS, np.arange(_POINTS - 3, _POINTS))
+    )
+)
+"""Last three Chebyshev coefficients from the values at the points."""
+
+
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     """Haar wavelet variance of a process from its spectrum alone.
 

@@ -12,6 +12,8 @@ from gmwm.readers.at_rest import (
     steady_turn,
     turning_gravity,
 )
+from gmwm.readers.blocks import notices_of_blocks, read_blocks
+from gmwm.readers.cells import DATE, seconds_of
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import is_frame, is_text
 from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
@@ -22,6 +24,7 @@ from gmwm.readers.table import label
 __all__ = [
     "AUXILIARY",
     "AXES",
+    "DATE",
     "READING",
     "TIME",
     "Channel",
@@ -34,7 +37,10 @@ __all__ = [
     "is_text",
     "label",
     "meaning",
+    "notices_of_blocks",
     "read",
+    "read_blocks",
+    "seconds_of",
     "stated_seconds",
     "steady_turn",
     "turning_gravity",

@@ -1,10 +1,12 @@
-"""One line of a delimited text: its fields, and the number in a field."""
+"""One line of a delimited text: its fields, and the number or the date in a field."""
 
 from __future__ import annotations
 
 import csv
 import math
 import re
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 
 from gmwm.readers.table import LARGEST
 
@@ -24,6 +26,12 @@ _NUMBERS = {
 
 _MISSING = re.compile(r"[+-]?nan|n/?a|#n/a|null|none|", re.IGNORECASE)
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
+
+DATE = re.compile(
+    r"(\d{4})[-/](\d{1,2})[-/](\d{1,2})[T ]\s*(\d{1,2}):(\d{2}):(\d{2}(?:\.\d*)?)"
+    r"\s?(Z|[+-]\d{2}:?\d{2})?"
+)
+"""A date with the time of day, and its zone if one is written."""
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -74,3 +82,44 @@ def number(cell: str, decimal: str) -> float | None:
     if _MISSING.fullmatch(cell):
         return math.nan
     return math.inf if _INFINITE.fullmatch(cell) else None
+
+
+def seconds_of(found: re.Match[str]) -> float:
+    """Seconds since 1970-01-01, without leap seconds.
+
+    Whole days and minutes are counted by the calendar, so that a minute may have 61 s.
+
+    Parameters
+    ----------
+    found : re.Match
+        Of `DATE`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such day or minute.
+    """
+    year, month, day, hour, minute = (int(part) for part in found.groups()[:5])
+    zone = found[7]
+    start = datetime(year, month, day, hour, minute, tzinfo=UTC)
+    if zone and zone != "Z":
+        sign = -1.0 if zone[0] == "-" else 1.0
+        start -= sign * timedelta(hours=int(zone[1:3]), minutes=int(zone[-2:]))
+    return start.timestamp() + float(found[6])
+
+
+def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
+    """Columns whose every field is a date, or empty; whether they have a zone.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Fields of the first lines.
+    """
+    result = {}
+    for column in range(min(map(len, rows), default=0)):
+        cells = [row[column] for row in rows if row[column]]
+        found = [DATE.fullmatch(cell) for cell in cells]
+        if cells and all(found):
+            result[column] = any(each is not None and each[7] is not None for each in found)
+    return result

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +22,14 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, number, split_line
+from gmwm.readers.cells import BLANKS, DATE, number, seconds_of, split_line
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
 from gmwm.readers.text_file import blocks, content_size
+
+if TYPE_CHECKING:
+    import pyarrow
 
 _HEAD = 1 << 18
 
@@ -96,27 +100,54 @@ class CsvTable:
             At the first line with a wrong number of fields or with text for a number; if there
             is none, for the first number that is infinite; if there is not enough memory.
         """
-        infinite = _Infinite()
         allowed = memory.budget()
         self._require(self._estimated_samples(len(columns)))
         held = 0
         parts: list[list[FloatArray]] = [[] for _ in columns]
-        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
-            found = _parse_with_arrow(block, self.layout, columns)
-            if found is None:
-                found = _parse_by_field(line, block, self, columns, infinite)
+        for found in self._parsed(columns):
             for part, values in zip(parts, found, strict=True):
                 part.append(values)
                 held += values.size
             if held * tuning.BYTES_PER_SAMPLE > allowed:
                 self._require(max(held, self._estimated_samples(len(columns))))
-        infinite.complain(self.source)
         # One column at a time lets the blocks go before the next one is joined.
         joined = {column: np.concatenate(parts.pop(0)) for column in columns}
         for column, scale in self.layout.scales.items():
             if column in joined:
                 joined[column] *= scale
         return joined
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` or a little more at a time."""
+        parts: list[list[FloatArray]] = []
+        held = 0
+        for found in self._parsed(columns):
+            parts.append(found)
+            held += found[0].size
+            if held >= rows:
+                yield self._joined(columns, parts)
+                parts, held = [], 0
+        if held:
+            yield self._joined(columns, parts)
+
+    def _joined(
+        self, columns: Sequence[int], parts: Sequence[Sequence[FloatArray]]
+    ) -> dict[int, FloatArray]:
+        return {
+            column: np.concatenate([part[i] for part in parts])
+            * self.layout.scales.get(column, 1.0)
+            for i, column in enumerate(columns)
+        }
+
+    def _parsed(self, columns: Sequence[int]) -> Iterator[list[FloatArray]]:
+        """Columns of one block of text after another."""
+        infinite = _Infinite()
+        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+            found = _parse_with_arrow(block, self.layout, columns)
+            if found is None:
+                found = _parse_by_field(line, block, self, columns, infinite)
+            yield found
+        infinite.complain(self.source)
 
     def _require(self, samples: float) -> None:
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
@@ -185,15 +216,38 @@ def _parse_with_arrow(
             ),
             convert_options=csv.ConvertOptions(
                 include_columns=wanted,
-                column_types=dict.fromkeys(wanted, pyarrow.float64()),
+                column_types={
+                    name: _arrow_type(layout.dates.get(i))
+                    for i, name in zip(columns, wanted, strict=True)
+                },
                 null_values=_NULLS,
                 decimal_point=layout.decimal,
             ),
         )
     except pyarrow.ArrowInvalid:
         return None
-    found: list[FloatArray] = [table.column(name).to_numpy() for name in wanted]
+    found: list[FloatArray] = [
+        _since_1970(table.column(name)) if i in layout.dates else table.column(name).to_numpy()
+        for i, name in zip(columns, wanted, strict=True)
+    ]
     return found if all(map(usable, found)) else None
+
+
+def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:
+    """Of a column of numbers, or of dates with or without a zone."""
+    import pyarrow
+
+    if has_zone is None:
+        return pyarrow.float64()
+    return pyarrow.timestamp("ns", tz="UTC" if has_zone else None)
+
+
+def _since_1970(column: pyarrow.ChunkedArray) -> FloatArray:
+    """Seconds; the float is good to a quarter of a microsecond."""
+    import pyarrow
+
+    whole: FloatArray = column.cast(pyarrow.int64()).to_numpy() * 1e-9
+    return whole
 
 
 def _single_blanks(block: bytes) -> bytes:
@@ -220,6 +274,8 @@ def _parse_by_field(
         cells = _cells(table, place, text)
         for values, column in zip(found, columns, strict=True):
             value = number(cells[column], layout.decimal)
+            if value is None and column in layout.dates:
+                value = _date(cells[column])
             if value is None:
                 raise InputError(
                     f"{table.source}, {place}, column {label(table.names, column)}: "
@@ -230,6 +286,15 @@ def _parse_by_field(
                 infinite.add(f"{place}, column {label(table.names, column)}", cells[column])
             values.append(value)
     return [np.array(values) for values in found]
+
+
+def _date(cell: str) -> float | None:
+    """Seconds since 1970, ``None`` where the field is no date."""
+    found = DATE.fullmatch(cell)
+    try:
+        return seconds_of(found) if found else None
+    except ValueError:
+        return None
 
 
 def _cells(table: CsvTable, place: str, text: str) -> list[str]:

@@ -11,8 +11,8 @@ from statistics import mode
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, number, split_header, split_line
-from gmwm.readers.names import meaning
+from gmwm.readers.cells import BLANKS, date_columns, number, split_header, split_line
+from gmwm.readers.names import meaning, of_dates
 from gmwm.readers.table import FORMATS
 
 _COMMENT_MARKS = ("#", "%", "//")
@@ -46,6 +46,8 @@ class Layout:
     notices : tuple of Notice
     scales : dict
         Index of a column -> what its numbers are multiplied by.
+    dates : dict
+        Index of a column of dates -> whether they have a zone.
     """
 
     delimiter: str
@@ -57,6 +59,7 @@ class Layout:
     line: int
     notices: tuple[Notice, ...] = ()
     scales: Mapping[int, float] = field(default_factory=dict)
+    dates: Mapping[int, bool] = field(default_factory=dict)
 
     @property
     def width(self) -> int:
@@ -115,16 +118,27 @@ def find_layout(source: str, head: bytes) -> Layout:
             )
     else:
         names = _commented_names(comments, delimiter, decimal, width)
+    dates = date_columns(rows)
+    named = [of_dates(name) if i in dates else name for i, name in enumerate(names or [""] * width)]
     return Layout(
         delimiter=delimiter,
         decimal=decimal,
-        names=tuple(names or [""] * width),
+        names=tuple(named),
         tentative=not has_header,
         trailing=trailing,
         offset=data[0].offset,
         line=data[0].number,
-        notices=(_numbering(first.number),) if data is following and not has_header else (),
+        notices=(
+            *((_numbering(first.number),) if data is following and not has_header else ()),
+            *(_of_dates(named[i]) for i in dates),
+        ),
+        dates=dates,
     )
+
+
+def _of_dates(name: str) -> Notice:
+    text = f"column {name!r} holds dates: they count as seconds since 1970-01-01"
+    return Notice("dates", "note", "", text, {"column": name})
 
 
 def _numbering(line: int) -> Notice:

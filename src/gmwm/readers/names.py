@@ -78,7 +78,7 @@ _BY_UNIT = ("temperature", "voltage")
 _TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
 _BEFORE_TIME = frozenset(
     {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
-    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local"}
+    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime", "iso"}
 )
 _SECONDS = {
     word: seconds
@@ -166,6 +166,14 @@ def meaning(name: str) -> Meaning:
 def bare(name: str) -> str:
     """A name without the unit in brackets after it."""
     return _BRACKETS.sub("", name).strip()
+
+
+def of_dates(name: str) -> str:
+    """Name of a column of dates, which are read as seconds; a scale such as (UTC) is left out."""
+    plain = bare(name)
+    words = re.findall(r"[A-Za-z]+", plain.lower())
+    is_vague = not plain or (bool(words) and words[-1] in _BEFORE_TIME)
+    return f"{plain} time [s]".lstrip() if is_vague else f"{plain} [s]"
 
 
 def _split_brackets(name: str) -> tuple[str, str]:

@@ -182,3 +182,14 @@ RECORDS_AT_ONCE = 1 << 16
 
 LONGEST_OF_WRAP = 100.0
 """Steps within which a counter that ran over goes on."""
+
+# -- recordings that are read a block at a time ---------------------------------------------------
+
+ROWS_OF_BLOCK = 1 << 18
+"""Of a block: 2 MB a column."""
+
+FEWEST_OF_BLOCK = 4096
+"""Rows of which a clock is seen as well as of a long recording."""
+
+ROWS_BACK_OF_BLOCK = 2
+"""By which stamps may be early at the seam of two blocks: a late row before."""

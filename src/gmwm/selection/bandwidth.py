@@ -15,12 +15,19 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments import dictionary, dictionary_fit
-from gmwm.estimate.problem import Scales, Term, shape_of, solve_nonnegative, weight_root
+from gmwm.estimate.moments import Design, dictionary, dictionary_fit
+from gmwm.estimate.problem import (
+    Scales,
+    Term,
+    objectives_with,
+    solve_nonnegative,
+    weight_root,
+)
 from gmwm.process import (
     BUTTERWORTH,
     AveragedNoise,
     LowPassNoise,
+    Model,
     Process,
     QuantizationNoise,
     Shape,
@@ -126,27 +133,22 @@ class _Beside:
         residual = solve_nonnegative(self.matrix, self.target)[1]
         return float(residual @ residual)
 
-    def residual(self, process: Process, shape: Shape) -> FloatArray:
-        column = self.root @ self.scales.unit_curves(process)(shape)
-        return solve_nonnegative(np.column_stack([self.matrix, column]), self.target)[1]
+    def squares(self, curves: FloatArray) -> FloatArray:
+        """Weighted sums of squares with each curve in turn, (J, G) to (G,)."""
+        return objectives_with(self.matrix, self.root @ curves, self.target)
 
     def best(self, free: Process) -> tuple[Bandwidth, float]:
         """A family at its best shape, and the objective there."""
-        term, own = Term.of(free, 0), shape_of(free)
-        grid = {
-            tuple(
-                v if is_free else o for v, o, is_free in zip(s, own, term.free_shape, strict=True)
-            )
-            for s in free.shape_grid(self.scales.dt, self.scales.n)
-        }
-        squares = {shape: float(np.sum(self.residual(free, shape) ** 2)) for shape in grid}
-        start = min(squares, key=squares.__getitem__)
+        design, term = Design(Model((free,)), self.scales), Term.of(free, 0)
+        start = design.grid(0)[int(np.argmin(self.squares(design.grid_curves(0))))]
         if isinstance(free, AveragedNoise):
             return self._whole_window(free, start)
+        together = np.column_stack([self.matrix, self.target])
         z0 = free.shape_to_free(start)[term.free_shape]
 
         def residual(z: FloatArray) -> FloatArray:
-            return self.residual(free, term.moved(start, z))
+            together[:, -1] = self.root @ design.curve(0, term.moved(start, z))
+            return solve_nonnegative(together, self.target)[1]
 
         fitted = least_squares(
             residual, z0, bounds=(z0 - _REACH, z0 + _REACH), diff_step=1e-4, xtol=1e-4, max_nfev=20
@@ -163,7 +165,8 @@ class _Beside:
         middle, dt = int(np.rint(start[0] / self.scales.dt)), self.scales.dt
         reach = max(middle // 8, 1) + 1
         lengths = range(max(middle - reach, 2), middle + reach + 1)
-        squares = {m: float(np.sum(self.residual(free, (m * dt,)) ** 2)) for m in lengths}
-        best = min(squares, key=squares.__getitem__)
-        given = free.with_values(window=best * dt)
-        return Bandwidth(given, given, 1), squares[best]
+        curve = self.scales.unit_curves(free)
+        squares = self.squares(np.stack([curve((m * dt,)) for m in lengths], axis=1))
+        best = int(np.argmin(squares))
+        given = free.with_values(window=lengths[best] * dt)
+        return Bandwidth(given, given, 1), float(squares[best])

@@ -14,6 +14,7 @@ from gmwm._core.frames import frame
 from gmwm._core.text import wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
+from gmwm.estimate.result import fit_joint
 from gmwm.process import GaussMarkov, Model, Process, WhiteNoise
 from gmwm.selection import tuning
 from gmwm.selection.ranking import (
@@ -24,7 +25,7 @@ from gmwm.selection.ranking import (
     rank,
     rank_key,
 )
-from gmwm.selection.ties import loses_at_a_level, ramp_or_walk, ranges
+from gmwm.selection.ties import ramp_or_walk, ranges
 from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 
 if TYPE_CHECKING:
@@ -34,7 +35,14 @@ if TYPE_CHECKING:
 
 RULES = ("criterion", "merge")
 _SHOWN = 12
-_REDUNDANT = ("amplitude-bound", "search-limit", "redundant-term", "indistinct-terms")
+_REDUNDANT = (
+    "amplitude-bound",
+    "search-limit",
+    "redundant-term",
+    "indistinct-terms",
+    "undetermined",
+    "confounded",
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -243,9 +251,11 @@ def select(
     ranked, slope = rank(wv, choices.seeing(wv))
     ranking = tuple(ranked)
     chosen, fitted = _chosen(ranking, wv)
+    if chosen not in ranking:
+        ranking = tuple(sorted((*ranking, chosen), key=rank_key))
     if slope is not None and not _has_ramp(chosen.model):
         fitted = replace(fitted, notices=(*fitted.notices, ramp_or_walk(fitted, slope)))
-    return Selection(ranking, chosen, fitted)
+    return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
 
 
 def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
@@ -259,17 +269,56 @@ def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidat
         fitted = _fitted(candidate.model, wv)
         if not _is_acceptable(fitted):
             tried.append((candidate, fitted))
-        elif found is None or loses_at_a_level(found[1], fitted):
+        elif found is None or found[1].goodness.loses_to(fitted.goodness):
             found = candidate, fitted
-        if found is not None and not found[1].goodness.largest_p < tuning.LEVEL_LOST_P:
+        if found is not None and not found[1].goodness.misses_a_level:
             break
-    # A term too many, or one that is only bounded, does less harm than a level that is missed.
+    # A term too many does less harm than a level that is missed; without it there is neither.
+    for candidate, fitted in tried:
+        if found is not None and rank_key(candidate) > limit:
+            break
+        if found is None or found[1].goodness.loses_to(fitted.goodness):
+            smaller = _supported_part(ranking, candidate, fitted, wv)
+            if smaller is None:
+                continue
+            if found is None or found[1].goodness.loses_to(smaller[1].goodness):
+                return smaller
     if found is not None:
-        for better, other in tried:
-            if rank_key(better) <= limit and loses_at_a_level(found[1], other):
-                return better, other
         return _simplest_by_own_fit(ranking, *found, wv)
     return next((item for item in tried if not item[1].goodness.is_excluded), tried[0])
+
+
+def _supported_part(
+    ranking: Sequence[Candidate], candidate: Candidate, fitted: Fit, wv: WaveletVariance
+) -> tuple[Candidate, Fit] | None:
+    """A model less its terms that the data do not support; None if what is left is no better."""
+    while (term := _doubtful_term(fitted)) is not None:
+        left = list(candidate.model.terms)
+        left.remove(next(each for each in left if _stands_for(each, term)))
+        if all(each.is_drift or each.is_line for each in left):
+            return None
+        model = Model(tuple(left))
+        fitted = _fitted(model, wv)
+        known = (item for item in ranking if item.model == model)
+        candidate = next(known, replace(candidate_of(fitted), model=model))
+    return (candidate, fitted) if _is_acceptable(fitted) else None
+
+
+def _doubtful_term(fitted: Fit) -> Process | None:
+    """A term that a fit finds no support for."""
+    model = fitted.model
+    owners = {item.key: model.terms[item.term] for item in model.parameters}
+    kinds = {type(term).__name__: term for term in model.terms}
+    for notice in fitted.notices:
+        if notice.code in _REDUNDANT:
+            return owners[notice.where] if notice.where else kinds[notice.values["process"]]
+    return None
+
+
+def _stands_for(term: Process, fitted: Process) -> bool:
+    """Whether a term of a candidate is that of the fit."""
+    given = {name: value for name, value in term.values.items() if value is not None}
+    return type(term) is type(fitted) and given.items() <= fitted.values.items()
 
 
 def _is_acceptable(fitted: Fit) -> bool:
@@ -288,11 +337,19 @@ def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
         if not _gauss_markov_is_redundant(fits[-1]):
             break
     ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
-    return Selection(ranking, ranking[0], fits[-1])
+    return Selection(ranking, ranking[0], _of_each(ranking[0], fits[-1], wv))
 
 
 def _fitted(model: Model, wv: WaveletVariance) -> Fit:
-    return estimate(model, wv.parts if isinstance(wv, PooledVariance) else wv)
+    """Of several recordings, to their mean: a choice does not need the fit to each of them."""
+    return estimate(model, wv)
+
+
+def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:
+    """The fit of the chosen model with those to each recording, where there are several."""
+    if not isinstance(wv, PooledVariance):
+        return fitted
+    return fit_joint(chosen.model, wv.parts, estimate, fitted)
 
 
 def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
@@ -319,7 +376,7 @@ def _simplest_by_own_fit(
         other = _fitted(candidate.model, wv)
         as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + tuning.TIE
         as_good = as_good and other.discrepancy <= fitted.discrepancy
-        if as_good and _is_acceptable(other) and not loses_at_a_level(other, fitted):
+        if as_good and _is_acceptable(other) and not other.goodness.loses_to(fitted.goodness):
             return candidate, other
     return best, fitted
 

@@ -21,15 +21,6 @@ from gmwm.selection import tuning
 Ranges = dict[str, tuple[float, float]]
 
 
-def loses_at_a_level(smaller: Fit, larger: Fit) -> bool:
-    """Whether a model misses an averaging time by more than chance that a larger one describes.
-
-    Their criteria may tie all the same, for the chi-square is of all levels together.
-    """
-    lost, kept = smaller.goodness.largest_p, larger.goodness.largest_p
-    return lost < tuning.LEVEL_LOST_P <= kept
-
-
 def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
     """Union of the intervals of each parameter over several models.
 

@@ -50,7 +50,3 @@ to be in the model. No sum of such processes is better than their mixture."""
 FILTER_LIKE = 10.0
 """Correlation time in samples below which a Gauss-Markov process would take over part of a filter:
 none is beside the low-pass while its shape is sought."""
-
-LEVEL_LOST_P = 0.01
-"""Level of the test that no averaging time is missed, by which a smaller model loses to a larger
-one: 3.5 standard errors for twenty levels."""

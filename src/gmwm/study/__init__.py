@@ -3,13 +3,14 @@
 from gmwm.study.appendix import converge, convergence_table
 from gmwm.study.choice import choice_study, choice_table
 from gmwm.study.demo import compare, simulated_imu
+from gmwm.study.demo_files import write_demo_files
 from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
 from gmwm.study.figures import boxplots
 from gmwm.study.navigation import reproduce_figure
-from gmwm.study.rotation import reproduce_rotation
 from gmwm.study.runs import run_study
 from gmwm.study.studies import FIGURES, STUDIES, Study
 from gmwm.study.summary import summarise
+from gmwm.study.turns import reproduce_rotation
 
 __all__ = [
     "FAULTS",
@@ -29,4 +30,5 @@ __all__ = [
     "sensors",
     "simulated_imu",
     "summarise",
+    "write_demo_files",
 ]

@@ -6,38 +6,25 @@ compared comes from the recording that is calibrated alone; intervals allow for 
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import norm
 
-from gmwm import filter_numbers
-from gmwm._core.documents import Document
-from gmwm._core.files import folder_to_fill, written
 from gmwm._core.notices import Notice
-from gmwm._core.runs import Earlier
 from gmwm._core.text import wrapped
-from gmwm._core.typing import FloatArray, Progress
-from gmwm.calibration import Calibration, calibrate
-from gmwm.errors import InputError
-from gmwm.filter_numbers import SensorNumbers
+from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
-from gmwm.ins.imu import AXES, Recorded, SensorModels
-from gmwm.ins.montecarlo import GROUPS, Experiment, FilterErrors, Validation
-from gmwm.readers import Recording
-from gmwm.study.navigation import TEN, Calibrated, aligned, saved, scenario_of, times
+from gmwm.ins.montecarlo import GROUPS, FilterErrors, Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FIRST = "GMWM"
+FIRST = "GMWM"  # the others are compared with it
 _BOUND = float(norm.ppf(0.975))  # of the interval whose coverage is counted
-_D = TypeVar("_D", bound=Document)
 
 
 @dataclass(frozen=True)
@@ -94,7 +81,7 @@ class Rotation:
         def squares(runs: FilterErrors, end: int) -> FloatArray:
             return np.asarray(np.sum(runs.error[:, end, part] ** 2, axis=1))
 
-        other, first = (self._table(each, squares) for each in (name, _FIRST))
+        other, first = (self._table(each, squares) for each in (name, FIRST))
         both = np.isfinite(other) & np.isfinite(first)
         tables = [np.where(both, each, np.nan) for each in (other, first)]
         return self._interval(tables, turn, np.sqrt)
@@ -171,7 +158,7 @@ class Rotation:
                 self._head(),
                 self._table_of(
                     f"All turns together, at the ends of outages, before the first fix: errors "
-                    f"over those of {_FIRST}; NEES per degree of freedom",
+                    f"over those of {FIRST}; NEES per degree of freedom",
                     ["horizontal RMS", "vertical RMS", "NEES horizontal", "NEES vertical"],
                     self._row,
                 ),
@@ -182,7 +169,7 @@ class Rotation:
                     self._covered,
                 ),
                 self._table_of(
-                    f"Horizontal RMS over that of {_FIRST}, turn by turn",
+                    f"Horizontal RMS over that of {FIRST}, turn by turn",
                     by_turn,
                     lambda name: [self.ratio(name, "horizontal", i) for i in turns],
                 ),
@@ -206,7 +193,7 @@ class Rotation:
     def _head(self) -> list[str]:
         turn = self.turns[0]
         truth, ends = turn.study.truth, [f"{each.end:g}" for each in turn.study.outages]
-        n, runs = len(self.sources), sum(each.study[_FIRST].runs for each in self.turns)
+        n, runs = len(self.sources), sum(each.study[FIRST].runs for each in self.turns)
         text = (
             f"{turn.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, outages that "
             f"end at {', '.join(ends)} s; each of {n} recordings calibrated in turn, the others "
@@ -234,7 +221,7 @@ class Rotation:
                 "NEES position", "within 95 %: horizontal", "vertical"]  # fmt: skip
         rows = [head, ["---"] * len(head)]
         for name in self.names:
-            ratio = "1" if name == _FIRST else _of(self.ratio(name, "horizontal"))
+            ratio = "1" if name == FIRST else _of(self.ratio(name, "horizontal"))
             judged = [_of(self.nees(name, each)) for each in ("horizontal", "vertical", "position")]
             shares = [f"{100.0 * self.coverage(name, each).value:.0f} %"
                       for each in ("horizontal", "vertical")]  # fmt: skip
@@ -318,190 +305,6 @@ def crossed_weights(
     weights = by[:, :, None, None] * (times_drawn[:, :, None] * of)[:, None]
     weights[:, np.arange(n), np.arange(n)] = 0.0
     return np.asarray(weights)
-
-
-def rotate(
-    vehicle: str,
-    recordings: Sequence[Recording],
-    folder: Path,
-    *,
-    runs: int | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    earlier: Earlier = "refuse",
-    progress: Progress | None = None,
-) -> Rotation:
-    """Calibrate every recording in turn, and navigate with the others.
-
-    Parameters
-    ----------
-    vehicle : {"helicopter", "car"}
-    recordings : sequence of Recording
-        Two at least.
-    folder : Path
-        Where calibrations and finished runs are kept, so that work that was interrupted goes on.
-    runs : int, optional
-        Most stretches of each recording; by default all that do not overlap.
-    seed, jobs : int, optional
-    earlier : {"resume", "replace", "refuse"}, optional
-        What to do with what the folder holds.
-    progress : callable, optional
-        Called as ``progress(done, total, what)``.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two recordings, an axis is missing, one is too short, or the folder
-        holds runs that are not to be resumed.
-    """
-    if len(recordings) < 2:
-        raise InputError("give two recordings or more: each is calibrated in turn")
-    scenario = scenario_of(vehicle)
-    horizon = max(outage.duration for outage in scenario.outages)
-    parts = [
-        _shortened(Recorded.of(recording, scenario.trajectory.duration), runs)
-        for recording in recordings
-    ]
-    kept = folder / "calibrations"
-    if earlier == "refuse" and kept.exists():
-        raise InputError(
-            f"{folder} holds calibrations of an earlier study: resume it, or give another folder",
-            "earlier-runs",
-        )
-    turns: list[Validation] = []
-    notices: list[Notice] = []
-    with folder_to_fill(kept):
-        for i, recording in enumerate(recordings):
-            if progress is not None:
-                progress(i, len(recordings), recording.source)
-            filters, found = _filters(recording, parts[i].bias_sd, horizon, kept)
-            notices += found
-            source = _joined([part for j, part in enumerate(parts) if j != i])
-            total = len(source.stretches)
-            title = f"{vehicle}, real errors"
-            turns.append(
-                Validation.of(
-                    Experiment(scenario, source, filters, None, total, seed, title),
-                    jobs=jobs,
-                    folder=folder / f"{vehicle}-{i + 1}",
-                    earlier="resume",
-                )
-            )
-            notices += [replace(each, source=recording.source) for each in turns[-1].notices]
-    if progress is not None:
-        progress(len(recordings), len(recordings), "")
-    return Rotation(
-        sources=tuple(recording.source for recording in recordings),
-        stretches=tuple(len(part.stretches) for part in parts),
-        turns=tuple(turns),
-        notices=tuple(notices),
-    )
-
-
-def reproduce_rotation(
-    figure: str,
-    folder: Path,
-    *,
-    runs: int | None,
-    seed: int,
-    jobs: int,
-    recordings: Sequence[Recording],
-    resume: bool,
-    progress: Progress | None = None,
-) -> tuple[str, list[Path]]:
-    """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
-
-    Returns
-    -------
-    text, paths
-        What to print, and the files that were written.
-    """
-    for recording in recordings:
-        missing = [axis for axis in AXES if axis not in recording.names]
-        if missing:
-            raise InputError(
-                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
-                f"{', '.join(AXES)}"
-            )
-    rotation = rotate(
-        "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
-        jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,
-    )  # fmt: skip
-    text, paths = str(rotation), []
-    for suffix, content in (("txt", text), ("md", rotation.markdown())):
-        paths.append(folder / f"{figure}-rotated.{suffix}")
-        with written(paths[-1]) as stream:
-            stream.write(content + "\n")
-    return text, [*paths, *saved(rotation.plot(), folder / f"{figure}-rotated")]
-
-
-def _filters(
-    recording: Recording, start: dict[str, float], horizon: float, folder: Path
-) -> tuple[dict[str, SensorModels], list[Notice]]:
-    """What filters believe after one recording is calibrated: nothing else is known to them."""
-    stem = _digest(recording)
-
-    def kept(kind: type[_D], what: str, make: Callable[[], _D]) -> _D:
-        path = folder / f"{stem}-{what}.json"
-        if path.exists():
-            return kind.load(path)
-        made = make()
-        made.save(path)
-        return made
-
-    calibration = kept(Calibration, "calibration", lambda: calibrate(recording))
-    found = Calibrated.by_lines_too(calibration)
-    lines = found.line_models()
-    filters = {
-        _FIRST: aligned(SensorModels.of(calibration), start),
-        "lines": aligned(lines, start),
-        "lines x 10": aligned(times(lines, TEN), start),
-        "N+K read off": aligned(found.curve_models(horizon), start),
-    }
-    bound, reduce = filter_numbers.bound, filter_numbers.reduce
-    for name, numbers in {
-        "N+K bound": kept(SensorNumbers, f"bound-N+K-{horizon:g}",
-                          lambda: bound(calibration, "N+K", horizon)),
-        "N+K+GM bound": kept(SensorNumbers, f"bound-N+K+GM-{horizon:g}",
-                             lambda: bound(calibration, "N+K+GM", horizon)),
-        "N+K reduced": kept(SensorNumbers, f"reduce-N+K-{horizon:g}",
-                            lambda: reduce(calibration, "N+K", [horizon])),
-    }.items():  # fmt: skip
-        models = {axis: numbers[axis].model for axis in AXES}
-        filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
-    axes = found.lineless()
-    notices = []
-    if axes:
-        text = (
-            f"{', '.join(axes)}: the plot has neither a floor nor a line of slope +1/2: lines have "
-            "a Gauss-Markov process as high as its lowest point"
-        )
-        notices.append(
-            Notice("no-line", "note", "", text, {"axes": ", ".join(axes)}, source=recording.source)
-        )
-    return filters, notices
-
-
-def _digest(recording: Recording) -> str:
-    """Of what a calibration depends on: the samples, and the version of the program."""
-    from gmwm import __version__
-
-    digest = hashlib.sha256(f"{__version__} {recording.source} {recording.dt!r}".encode())
-    for axis in AXES:
-        digest.update(np.ascontiguousarray(recording[axis].values).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def _shortened(part: Recorded, most: int | None) -> Recorded:
-    return part if most is None else replace(part, stretches=part.stretches[:most])
-
-
-def _joined(parts: Sequence[Recorded]) -> Recorded:
-    return replace(
-        parts[0],
-        stretches=tuple(each for part in parts for each in part.stretches),
-        source=", ".join(part.source for part in parts),
-    )
 
 
 def _short(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
-from gmwm.variance import tuning
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.gaps import Runs
+from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -81,7 +83,7 @@ def wavelet_variance(
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
     _check_width(channel, runs, wavelet)
-    values = values - float(np.nanmean(values))
+    values = values - survey(values)[1] / runs.present
     levels = Levels.of(values, runs, wavelet, channel.dt)
     moments = levels.moments()
     driftless = None
@@ -117,19 +119,13 @@ def wavelet_variance(
 
 
 def fourth_cumulant(values: FloatArray) -> float:
-    """Of the independent part of a series, from its first differences, u^4; 0 if not above chance.
-
-    Cumulants of independent samples add up, so that the differences have twice that of the samples.
-    """
-    differences = np.diff(values)
-    square = differences[~np.isnan(differences)] ** 2
-    mean = float(np.mean(square))
-    excess = float(np.mean((square / mean) ** 2)) - 3.0 if mean > 0.0 else 0.0
-    chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / square.size)
-    return 0.5 * mean**2 * excess if excess > chance else 0.0
+    """Of the independent part of a series, NaN where samples are missing, u^4."""
+    count, square, fourth = difference_powers(values)
+    return cumulant_of_powers(square / count, fourth / count, count)
 
 
-def _where(channel: Channel) -> str:
+def where_of(channel: Channel) -> str:
+    """How messages call a channel."""
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
@@ -142,41 +138,54 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
         If they are no series of numbers, too few, infinite, constant or of no sensor's size, or
         the sampling interval is none.
     """
-    where = _where(channel)
+    where = where_of(channel)
     checks.sampling_interval(channel.dt)
     values = np.ascontiguousarray(checks.real_numbers(channel.values, where))
     if values.ndim != 1 or values.size < MIN_SAMPLES:
         raise InputError(
             f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
         )
-    bad = np.flatnonzero(np.isinf(values))
+    missing, total, low, high = survey(values)
+    bad = np.flatnonzero(np.isinf(values)) if not np.isfinite(total) else np.zeros(0)
     if bad.size:
         raise InputError(
             f"{where} has {bad.size} infinite samples, the first at index {bad[0]}: remove or "
             "repair them, or set them to NaN for missing"
         )
-    runs = Runs.of(values)
+    runs = Runs.of(values) if missing else Runs((0,), (values.size,), values.size)
     if runs.longest < MIN_SAMPLES:
         raise InputError(
             f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
             "can be determined of its noise"
         )
+    check_varies(replace(channel, values=np.array([low, high])))
+    return values, runs
+
+
+def check_varies(channel: Channel) -> None:
+    """Refuse a channel that is constant or varies by what no sensor does.
+
+    Raises
+    ------
+    InputError
+    """
+    where = where_of(channel)
     if channel.is_constant:
         raise InputError(
-            f"{where} is constant ({np.nanmin(values):g}): a dead channel has no noise model"
+            f"{where} is constant ({np.nanmin(channel.values):g}): a dead channel has no noise "
+            "model"
         )
     if not channel.is_of_a_sensor:
         raise InputError(
             f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
         )
-    return values, runs
 
 
 def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
     width = known_wavelet(wavelet).width(1)
     if width > runs.longest:
         raise InputError(
-            f"{_where(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
             "take a shorter wavelet, e.g. haar"
         )
 

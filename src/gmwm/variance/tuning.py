@@ -116,3 +116,38 @@ KURTOSIS_VARIANCE = 27.0
 
 LARGEST_KURTOSIS = 5.0
 """Standard errors of it that Gaussian noise does not have."""
+
+# -- streaming -------------------------------------------------------------------------------------
+
+STREAMING_STARTS = 512
+"""Windows that begin within an averaging time, from there on. The sampling variance of white noise
+is 1 + 1.25/512^2 of that of all windows, which differ by 0.2 % of a standard error."""
+
+STREAMING_ROWS = 32
+"""Octaves beyond that: 2^32 averaging times of 512 samples are more than any recording has."""
+
+STREAMING_EDGE = 16
+"""Parts of an averaging time of which the first and the last must have a sample: what is missing
+lies within a half window then, but for a sixteenth."""
+
+STREAMING_LEAST_EDGE = 4
+"""Samples of such a part at least, but for shorter averaging times."""
+
+STREAMING_LEAST = 0.375
+"""Part of the samples of half a window that must be there; with half of all samples missing singly,
+32 of 64, that is four standard deviations less."""
+
+LONGEST_WITHIN = 0.625
+"""Part of half a window that one gap may take, the rest of what must be there."""
+
+ALIKE = 2.0 / 3.0
+"""Sum of the squared autocorrelation of the Haar coefficients of white noise over all lags, in
+averaging times: 2 (1/4 + 1/12)."""
+
+LEAST_OF_BLOCK = 0.5
+"""Part of a block of samples that must be there for its mean to count."""
+
+# -- threads ---------------------------------------------------------------------------------------
+
+SAMPLES_PER_THREAD = 1 << 20
+"""Fewer take less time than threads need to begin."""

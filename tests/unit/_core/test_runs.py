@@ -7,14 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm._core import runs as engine
-from gmwm._core.runs import do_runs
+from gmwm._core.runs import do_runs, runs as engine
 
 STUDY = {"name": "squares", "seed": 1}
 
@@ -225,14 +225,27 @@ def test_an_end_leaves_no_worker_and_finished_runs(tmp_path, end):
 # ---- Clusters ----
 
 
+def killed_once(folder, run):
+    """At one run the process ends, the first time."""
+    if run == 1 and not (folder / "killed").exists():
+        (folder / "killed").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return squares(run)
+
+
 def test_a_dask_cluster_of_processes_gives_what_this_process_gives(tmp_path):
+    """Also if a worker ends in the middle, even the only one, with all that it was sent."""
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
-        there = do_runs(squares, 6, STUDY, folder=tmp_path, cluster=cluster.scheduler_address)
+        there = do_runs(
+            partial(killed_once, tmp_path), 6, STUDY, folder=tmp_path / "runs",
+            cluster=cluster.scheduler_address,
+        )  # fmt: skip
+    assert (tmp_path / "killed").exists()
     same(there, do_runs(squares, 6, STUDY))
-    same(there, do_runs(None, 6, STUDY, folder=tmp_path))
+    same(there, do_runs(None, 6, STUDY, folder=tmp_path / "runs"))
 
 
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path):

@@ -22,8 +22,15 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.filter_numbers.chain import Chain
-from gmwm.filter_numbers.spectra import ParameterRegion, Target
+from gmwm.filter_numbers.spectra import (
+    Estimated,
+    ParameterRegion,
+    Problem,
+    Target,
+    standard_errors,
+)
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
+from gmwm.study.sensor_tables import TABLE_6
 
 ONE = TRUTHS["one"]
 WORST = 1.001
@@ -229,6 +236,27 @@ def test_numbers_do_not_shrink_as_the_record_grows():
 # ---- A whole confidence region ----
 
 
+def test_what_is_left_out_and_is_not_small_is_a_warning():
+    # A ramp that outgrows its constant, and quantization of an angle without white noise above it.
+    ramp = WhiteNoise(1e-4) + RateRamp(1e-5)
+    coarse = Model((QuantizationNoise(1e-2), RandomWalk(1e-6)))
+    for truth in (ramp, coarse, ONE, QuantizationNoise(1e-6) + ONE):
+        found = gmwm.bound({"gyro_x": truth})["gyro_x"]
+        warned = [n for n in found.notices if n.code == "optimistic"]
+        assert len(warned) == (max(found.nees.values()) > 1.05) == (truth in (ramp, coarse))
+        assert all(n.values["nees"] == max(found.nees.values()) for n in warned)
+
+
+def test_a_loose_form_names_the_one_that_is_worth_its_state():
+    truth = {"accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
+    plain, tight = (gmwm.bound(truth, form)["accel_x"] for form in ("N+K", "N+K+GM"))
+    (notice,) = (n for n in plain.notices if n.code == "loose-form")
+    assert notice.values["tightness"] == plain.tightness[60.0] > 1.2
+    assert notice.values["with_state"] == pytest.approx(tight.tightness[60.0], abs=1e-6)
+    short = gmwm.bound(truth, horizon=1.0)["accel_x"]
+    assert not any(n.code == "loose-form" for each in (tight, short) for n in each.notices)
+
+
 @pytest.fixture(scope="module")
 def fitted():
     return gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(7200, 1.0, 11), 1.0)
@@ -265,6 +293,27 @@ def test_standard_errors_are_those_of_the_fit_by_the_chain_rule(fitted):
     assert set(found.stderr) == set(total)
     for key, square in total.items():
         assert found.stderr[key] == pytest.approx(np.sqrt(square), rel=0.03), key
+
+
+def test_standard_errors_of_parameters_that_are_decades_apart():
+    # Variances from 1e-11 (N) to 1e5 (tau): rounding of the largest is no error of the least.
+    truth = TABLE_6.models["gyro_x"]
+    values, step = np.array(list(truth.params.values())), 1e-3
+    sizes = values * np.array([0.005, 0.02, 0.04, 0.02, 0.08, 0.2, 0.4])
+    root = np.linalg.cholesky(np.full((7, 7), 0.5) + 0.5 * np.eye(7)) * sizes[:, None]
+    problem = Problem((Target.of(truth, 0.1, 60.0),), 60.0)
+    known = Estimated(truth, tuple(truth.params), root @ root.T)
+    found = standard_errors(problem, gmwm.bound(truth, dt=0.1).model, [known])
+    total = {"N": 0.0, "K": 0.0}
+    for column in root.T:
+        ends = [
+            gmwm.bound(truth.with_params(dict(zip(truth.params, moved, strict=True))), dt=0.1)
+            for moved in (values + step * column, values - step * column)
+        ]
+        for key in total:
+            total[key] += ((getattr(ends[0], key) - getattr(ends[1], key)) / (2.0 * step)) ** 2
+    for key, square in total.items():
+        assert found[key] == pytest.approx(np.sqrt(square), rel=0.03), key
 
 
 def test_standard_errors_of_shared_axes_and_of_none(fitted):

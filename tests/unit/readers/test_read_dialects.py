@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,35 @@ def test_a_line_that_is_cut_off(save, name, head, width):
     table[-1] = table[-1][:-2]
     with pytest.raises(InputError, match=f"{width - 2} fields where {width} were expected"):
         read(save(name, head, table), units=SI)
+
+
+@pytest.mark.parametrize(
+    ("header", "zone", "mark"),
+    [("time", "", "T"), ("Timestamp (UTC)", "Z", "T"), ("Date", "+01:00", " "), ("", "", " ")],
+)
+@pytest.mark.parametrize("quoted", [False, True])
+def test_dates_are_times_in_seconds(tmp_path, header, zone, mark, quoted):
+    path = tmp_path / "log.csv"
+    first = datetime(2026, 2, 28, 23, 59, 59)  # passes a day and a month
+    rows = [
+        (first + timedelta(milliseconds=5 * i)).isoformat(mark, "milliseconds") + zone
+        for i in range(400)
+    ]
+    lines = [f'"{row}",{i}.5' if quoted else f"{row},{i}.5" for i, row in enumerate(rows)]
+    names = [f"{header},gyro_x [rad/s]"] if header else []
+    path.write_text("\n".join([*names, *lines]))
+    extra = {} if header else {"channels": {"gyro_x": 1}, "time": 0, "units": {"gyro_x": "rad/s"}}
+    recording = read(path, **extra)
+    assert recording.dt == pytest.approx(0.005, rel=1e-6)  # a quarter of a microsecond in 2 s
+    assert recording["gyro_x"].values[-1] == 399.5
+    assert "dates" in [notice.code for notice in recording.notices]
+
+
+@pytest.mark.parametrize("wrong", ["2026-02-30T00:00:01.00", "soon"])
+def test_a_date_that_is_none_is_named_with_its_line(tmp_path, wrong):
+    path = tmp_path / "log.csv"
+    rows = [f"2026-02-03T00:00:{i / 100:05.2f},{i}" for i in range(5000)]
+    rows[4000] = f"{wrong},1"
+    path.write_text("time,gyro_x [rad/s]\n" + "\n".join(rows))
+    with pytest.raises(InputError, match=f"line 4002, column 'time .s.': '{wrong}'"):
+        read(path)

@@ -15,8 +15,9 @@ from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.imu.sensors import AXES
 from gmwm.ins.montecarlo.scenario import Scenario
 from gmwm.readers.recording import Recording
-from gmwm.study import rotation
-from gmwm.study.rotation import Rotation, crossed_weights, reproduce_rotation, rotate
+from gmwm.study import turns
+from gmwm.study.rotation import Rotation, crossed_weights
+from gmwm.study.turns import reproduce_rotation, rotate
 from gmwm.variance.analysis import wavelet_variance
 
 FACTORS = {"GMWM": 1.0, "lines": 2.0}
@@ -131,7 +132,7 @@ def short(monkeypatch):
     """A drive of 40 s, and a calibration that counts how often it is done."""
     truth = car_drive(duration=40.0, dt=1 / RATE)
     scenario = Scenario(truth, gnss(truth), (Outage(20.0, 10.0),), interval=10.0)
-    monkeypatch.setattr(rotation, "scenario_of", lambda vehicle: scenario)
+    monkeypatch.setattr(turns, "scenario_of", lambda vehicle: scenario)
     done = []
 
     def calibrate(given):
@@ -140,13 +141,13 @@ def short(monkeypatch):
         fits = {axis: fit(model, wavelet_variance(given[axis])) for axis in AXES}
         return Calibration(fits, {}, given.source, RATE, 3000)
 
-    bound = rotation.filter_numbers.bound
+    bound = turns.filter_numbers.bound
     quick = SimpleNamespace(  # the others take seconds
         bound=lambda given, form, horizon: bound(given, "N+K", horizon),
         reduce=lambda given, form, outages: bound(given, form, outages[0]),
     )
-    monkeypatch.setattr(rotation, "calibrate", calibrate)
-    monkeypatch.setattr(rotation, "filter_numbers", quick)
+    monkeypatch.setattr(turns, "calibrate", calibrate)
+    monkeypatch.setattr(turns, "filter_numbers", quick)
     return done
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from scipy.stats import chi2
 
@@ -12,7 +13,8 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.problem import weight_root
-from gmwm.process import Model, Shape
+from gmwm.estimate.result import Fit
+from gmwm.process import Model, Process, Shape
 
 
 def limit_notices(design: Design, shapes: Sequence[Shape], x: FloatArray) -> list[Notice]:
@@ -35,13 +37,13 @@ def limit_notices(design: Design, shapes: Sequence[Shape], x: FloatArray) -> lis
 
 def redundant_notices(
     design: Design, point: Point, target: FloatArray, covariance: FloatArray
-) -> list[Notice]:
-    """The term whose shape was searched for and that the data can do without, if there is one.
+) -> list[tuple[int, Notice]]:
+    """Terms whose shape was searched for and that do not improve the fit, the least useful first.
 
     The amplitude alone does not show it: among all shapes one always fits some accident.
     The objective without the term does, at one per cent shared among the levels where a term of
     this kind might have been found. ``point.objective`` is under ``covariance``, whatever the
-    weights of the estimate were.
+    weights of the estimate were. Each notice has the place of its term in the design.
     """
     root = weight_root(covariance)
     redundant: list[tuple[float, int]] = []
@@ -55,24 +57,62 @@ def redundant_notices(
         without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
         freed = 1 + design.terms[i].n_shapes
         if without - point.objective < chi2.isf(tuning.REDUNDANT_P / target.size, freed):
-            redundant.append((without, i))
-    if not redundant:
-        return []
-    # Of several alike, each can stand in for another: one of them is too many, not all.
-    without, i = min(redundant)
-    process = design.at_shape(i, point.shapes[i])
+            redundant.append((without - point.objective, i))
     return [
-        Notice(
-            "redundant-term", "bad", "",
-            f"the {process.named()} does not improve the fit significantly: it is not "
-            "identifiable, leave it out",
-            {
-                "process": type(process).__name__,
-                "gain": without - point.objective,
-                **{p.name: process.values[p.name] for p in process.shape_parameters},
-            },
-        )
-    ]  # fmt: skip
+        (i, _redundant_notice(design.at_shape(i, point.shapes[i]), gain))
+        for gain, i in sorted(redundant)
+    ]
+
+
+def _redundant_notice(process: Process, gain: float) -> Notice:
+    return Notice(
+        "redundant-term", "bad", "",
+        f"the {process.named()} does not improve the fit significantly: it is not "
+        "identifiable, leave it out",
+        {
+            "process": type(process).__name__,
+            "gain": gain,
+            **{p.name: process.values[p.name] for p in process.shape_parameters},
+        },
+    )  # fmt: skip
+
+
+def with_doubtful_terms(
+    fit: Fit,
+    redundant: Sequence[tuple[int, Notice]],
+    places: Mapping[str, int],
+    without: Callable[[int], Fit | None],
+) -> Fit:
+    """A fit with the notice of the term that the data can do without, if there is one.
+
+    A slow term raises the errors of the very levels that show it, so that neither its gain nor its
+    amplitude looks significant under the noise that it is part of. It is needed all the same where
+    the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`).
+
+    Parameters
+    ----------
+    fit : Fit
+    redundant : sequence of (int, Notice)
+        Noise terms whose gain is not significant; of several alike each can stand in for another:
+        one of them is too many, not all.
+    places : mapping of str to int
+        Noise term of each amplitude.
+    without : callable
+        The fit without a noise term; None if nothing is left to fit.
+    """
+    present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
+    if not redundant and not present:
+        return fit
+
+    def is_needed(i: int) -> bool:
+        reduced = without(i)
+        return reduced is not None and reduced.goodness.loses_to(fit.goodness)
+
+    found = {key for key in present if is_needed(places[key])}
+    notices = [n for n in fit.notices if n.code != "amplitude-bound" or n.where not in found]
+    notices += [notice for i, notice in redundant if not is_needed(i)][:1]
+    bounds = {key: bound for key, bound in fit.upper_bounds.items() if key not in found}
+    return replace(fit, notices=tuple(notices), upper_bounds=bounds)
 
 
 def level_notices(n_levels: int, n_free: int) -> list[Notice]:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments.checks import level_notices, limit_notices, redundant_notices
+from gmwm.estimate.moments.checks import (
+    level_notices,
+    limit_notices,
+    redundant_notices,
+    with_doubtful_terms,
+)
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point
 from gmwm.estimate.moments.weights import Weights
@@ -32,6 +38,7 @@ def conclude_moments(
     weights: Weights,
     method: str,
     discrepancy: float,
+    without: Callable[[int], Fit | None] | None = None,
 ) -> Fit:
     """Make the `Fit` of a minimum.
 
@@ -52,6 +59,8 @@ def conclude_moments(
     method : str
     discrepancy : float
         Relative error allowed for at each level, part of ``covariance``.
+    without : callable, optional
+        The fit without a noise term, which shows whether it is needed.
     """
     target = moments.target
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
@@ -76,17 +85,25 @@ def conclude_moments(
         slope=moments.slope if moments.slope_is_free else None,
     )
     comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1], statistical)
-    notices = [
-        *limit_notices(design, point.shapes, point.x),
-        *redundant_notices(
-            design, replace(point, objective=comparison.objective), target, covariance
-        ),
-        *level_notices(target.size, design.n_free),
-    ]
-    return conclude(
+    fit = conclude(
         found, comparison, moments.wv, method=method, weights=weights.name,
-        discrepancy=discrepancy, misfits=discrepancy > 0.0, notices=notices,
+        discrepancy=discrepancy, misfits=discrepancy > 0.0,
+        notices=[
+            *limit_notices(design, point.shapes, point.x),
+            *level_notices(target.size, design.n_free),
+        ],
     )  # fmt: skip
+    if without is None:
+        return fit
+    keys = design.coordinates.fitted(found.processes, None)[1]
+    places = {
+        key: i
+        for key, (i, is_amplitude) in zip(keys, design.coordinates.owners, strict=True)
+        if is_amplitude
+    }
+    judged = replace(point, objective=comparison.objective)
+    redundant = redundant_notices(design, judged, target, covariance)
+    return with_doubtful_terms(fit, redundant, places, without)
 
 
 def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:

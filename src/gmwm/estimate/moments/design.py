@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import Coordinates, Scales, Term, shape_of
+from gmwm.estimate.problem import Coordinates, Scales, Term, is_plain, shape_of
 from gmwm.process import Model, Process, Shape
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
@@ -59,8 +60,10 @@ class Design:
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
         self._curve_of = tuple(self._curve_at(term) for term in self.terms)
-        self._grids: dict[int, list[Shape]] = {}
-        self._curves: dict[int, FloatArray] = {}
+        self._slopes_of = {i: self._slopes_at(self.terms[i]) for i in self.shaped}
+        self._owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+        self._own: dict[Any, Any] = {}
+        self._last: dict[int, tuple[Shape, FloatArray]] = {}
         self._parts: dict[tuple[int, ...], Design] = {}
 
     @property
@@ -88,7 +91,10 @@ class Design:
 
     def curve(self, i: int, shape: Shape) -> FloatArray:
         """Wavelet variance of `at_shape`, (J,)."""
-        return self._curve_of[i](shape)
+        known = self._last.get(i)
+        if known is None or known[0] != shape:
+            known = self._last[i] = shape, self._curve_of[i](shape)
+        return known[1]
 
     def _curve_at(self, term: Term) -> Callable[[Shape], FloatArray]:
         """The function of `curve` for one term: what every step of a fit asks for."""
@@ -96,23 +102,34 @@ class Design:
             return self.scales.unit_curves(term.process)
         return lambda shape: self.scales.curve(self._with_shape(term, shape))
 
+    def _slopes_at(self, term: Term) -> Callable[[Shape], FloatArray | None]:
+        """Derivatives of its curve by the coordinates of its shape, if in closed form."""
+        if term.free_scale:
+            return self.scales.unit_slopes(term.process)
+        return lambda shape: None
+
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``; terms that are alike share one list."""
-        first = self._alike(i)
-        if first not in self._grids:
-            self._grids[first] = self._new_grid(self.terms[first])
-        return self._grids[first]
+        kept, key = self.kept(i), ("grid", self.terms[i].process)
+        if key not in kept:
+            kept[key] = self._new_grid(self.terms[i])
+        found: list[Shape] = kept[key]
+        return found
 
     def grid_curves(self, i: int) -> FloatArray:
         """Curves of term ``i`` on its grid, (J, G)."""
-        first = self._alike(i)
-        if first not in self._curves:
-            columns = [self.curve(first, shape) for shape in self.grid(first)]
-            self._curves[first] = np.stack(columns, axis=1)
-        return self._curves[first]
+        kept, key = self.kept(i), ("curves", self.terms[i].process)
+        if key not in kept:
+            columns = [self.curve(i, shape) for shape in self.grid(i)]
+            kept[key] = np.stack(columns, axis=1)
+        found: FloatArray = kept[key]
+        return found
 
-    def _alike(self, i: int) -> int:
-        return next(j for j in range(i + 1) if self.terms[j].process == self.terms[i].process)
+    def kept(self, i: int) -> dict[Any, Any]:
+        """Where what belongs to a term is kept: with the levels, for the terms of other designs."""
+        process = self.terms[i].process
+        plain = is_plain(process) and not self.scales.is_simulated(process)
+        return self.scales.shared if plain and self.terms[i].n_shapes else self._own
 
     def _new_grid(self, term: Term) -> list[Shape]:
         """Starting shapes; fixed parameters have their value in all of them."""
@@ -174,7 +191,10 @@ class Design:
 
     def curves(self, shapes: Sequence[Shape]) -> FloatArray:
         """Curves of all terms at unit free amplitude, (J, terms)."""
-        return np.stack([self.curve(i, shape) for i, shape in enumerate(shapes)], axis=1)
+        result = np.empty((self.scales.tau.size, len(self.terms)))
+        for i, shape in enumerate(shapes):
+            result[:, i] = self.curve(i, shape)
+        return result
 
     def amplitudes(self, x: FloatArray) -> FloatArray:
         """Amplitudes of all terms, 1 where fixed, (terms,)."""
@@ -184,9 +204,16 @@ class Design:
 
     def shape_derivatives(self, shapes: Sequence[Shape]) -> FloatArray:
         """Derivative of each term's curve by its own z, at unit free amplitude, (J, z)."""
-        columns = []
+        result = np.empty((self.scales.tau.size, len(self._owners)))
+        column = 0
         for i in self.shaped:
             term = self.terms[i]
+            closed = self._slopes_of[i](shapes[i])
+            if closed is not None:
+                found = closed[:, term.free_shape]
+                result[:, column : column + term.n_shapes] = found
+                column += term.n_shapes
+                continue
             z = term.process.shape_to_free(shapes[i])
             width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
             for k in np.flatnonzero(term.free_shape):
@@ -195,12 +222,13 @@ class Design:
                     moved = z.copy()
                     moved[k] += step
                     pair.append(self.curve(i, term.process.shape_from_free(moved)))
-                columns.append((pair[0] - pair[1]) / (2.0 * width))
-        return np.stack(columns, axis=1) if columns else np.zeros((self.scales.tau.size, 0))
+                result[:, column] = (pair[0] - pair[1]) / (2.0 * width)
+                column += 1
+        return result
 
     def owners(self) -> list[int]:
         """For each element of z, the term it belongs to."""
-        return [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+        return self._owners
 
     # -- models -----------------------------------------------------------------------------------
 

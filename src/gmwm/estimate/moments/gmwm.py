@@ -8,6 +8,7 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -68,6 +69,20 @@ class GMWM:
 
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Fit the open parameters of a model to wavelet variances."""
+
+        def without(i: int) -> Fit | None:
+            noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
+            left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
+            if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
+                return None
+            return self._estimate(Model(left), wv)
+
+        return self._estimate(model, wv, without)
+
+    def _estimate(
+        self, model: Model, wv: WaveletVariance, without: Callable[[int], Fit | None] | None = None
+    ) -> Fit:
+        """The fit; doubtful terms are judged if it is known what is left without them."""
         weights = Weights.of(self.weights, wv)
         scales = self.scales(wv)
         design = Design(model, scales)
@@ -75,23 +90,26 @@ class GMWM:
         extra = design.coordinates.noise
         reference = dictionary_fit(wv, moments.target, extra)
         level = Discrepancy(self.discrepancy, wv.tau.size - design.n_free)
+        beginnings = [level.value]
+        if not any(process.is_line for process in extra):
+            # What no sum of processes without lines can follow is discrepancy from the start. But
+            # processes of other kinds may follow what no mixture of the dictionary does.
+            level.start_at(reference.discrepancy)
+            beginnings.append(level.value)
+            if all(isinstance(process, DICTIONARY) for process in extra):
+                del beginnings[0]
         settled = None
-        if not all(isinstance(process, DICTIONARY) for process in extra):
-            # Such a process may follow what no mixture of the dictionary does.
+        for value in dict.fromkeys(beginnings):
+            level.value = value
             state = _begun(design, moments, reference, level, weights)
             settled = _iterate(design, state, level, weights)
-        if settled is None or level.value > 0.0:
-            level.restart()
-            if not any(process.is_line for process in extra):
-                # What no sum of processes without lines can follow is discrepancy from the start.
-                level.start_at(reference.discrepancy)
-            state = _begun(design, moments, reference, level, weights)
-            settled = _iterate(design, state, level, weights)
-            if settled is None:
-                settled = _under_reference(design, state, level, weights, extra)
+            if settled is not None and level.value == 0.0:
+                break
+        if settled is None:
+            settled = _under_reference(design, state, level, weights, extra)
         return conclude_moments(
             design, settled.moments, settled.covariance, settled.statistical, settled.point,
-            settled.basis, weights, self.name, level.value,
+            settled.basis, weights, self.name, level.value, without,
         )  # fmt: skip
 
 

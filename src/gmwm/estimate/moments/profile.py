@@ -16,7 +16,7 @@ from scipy.optimize import leastsq
 
 from gmwm._core.typing import FloatArray
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.problem import solve_nonnegative
+from gmwm.estimate.moments.profile_kernels import profiled, projected
 from gmwm.process import Shape
 
 _MAX_EVALUATIONS = 200
@@ -45,7 +45,7 @@ class _Place(NamedTuple):
 
     z: FloatArray
     shapes: Sequence[Shape]
-    curves: FloatArray
+    columns: FloatArray
     x: FloatArray
     residual: FloatArray
 
@@ -63,18 +63,19 @@ class Profile:
     """
 
     def __init__(self, design: Design, target: FloatArray, root: FloatArray) -> None:
-        self.design, self.target, self.root = design, target, root
+        self.design = design
+        self.target, self.root = (np.array(each, order="C") for each in (target, root))
+        linear = np.isin(np.arange(len(design.terms)), design.linear)
+        self._linear, self._given = np.flatnonzero(linear), np.flatnonzero(~linear)
 
-    def amplitudes(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Best free amplitudes for the curves of all terms, and the weighted residuals."""
-        linear = list(self.design.linear)
-        given = [i for i in range(curves.shape[1]) if i not in linear]
-        y = self.root @ (self.target - curves[:, given].sum(axis=1))
-        return solve_nonnegative(self.root @ curves[:, linear], y)
+    def _profiled(self, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Weighted columns, best free amplitudes, and the weighted residuals."""
+        columns, x, residual = profiled(self.root, curves, self._linear, self._given, self.target)
+        return columns, x, residual
 
     def at(self, shapes: Sequence[Shape]) -> Point:
         """The best point with these shapes."""
-        x, residual = self.amplitudes(self.design.curves(shapes))
+        _, x, residual = self._profiled(self.design.curves(shapes))
         return Point(shapes, x, float(residual @ residual))
 
     def refine(self, start: Point) -> Point:
@@ -95,7 +96,7 @@ class Profile:
             if not visited or not np.array_equal(visited[-1].z, z):
                 shapes = design.unpack(np.clip(z, low, high), template)
                 curves = design.curves(shapes)
-                visited[:] = [_Place(z.copy(), shapes, curves, *self.amplitudes(curves))]
+                visited[:] = [_Place(z.copy(), shapes, *self._profiled(curves))]
             return visited[-1]
 
         def residual(z: FloatArray) -> FloatArray:
@@ -108,14 +109,9 @@ class Profile:
             return slopes[1]
 
         def slope_at(z: FloatArray) -> FloatArray:
-            _, shapes, curves, x, _ = at(z)
-            weighted = self.root @ curves[:, list(design.linear)][:, x > 0.0]
-            slope = self.root @ design.shape_derivatives(shapes)
-            slope *= design.amplitudes(x)[owners]
-            if weighted.shape[1]:
-                basis, _ = np.linalg.qr(weighted)
-                slope = slope - basis @ (basis.T @ slope)
-            return slope
+            _, shapes, columns, x, _ = at(z)
+            slopes, factor = design.shape_derivatives(shapes), design.amplitudes(x)[owners]
+            return np.asarray(projected(self.root, columns, x, slopes, factor))
 
         if z0.size > self.target.size:
             return self.at(start.shapes)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,7 +15,12 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.problem import Scales, objectives_with, solve_nonnegative, weight_root
+from gmwm.estimate.problem import (
+    Scales,
+    objectives_with,
+    solve_nonnegative,
+    weight_root,
+)
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -27,6 +33,9 @@ from gmwm.process import (
 from gmwm.variance import WaveletVariance
 
 _BISECTIONS = 14
+
+_references: WeakKeyDictionary[WaveletVariance, dict[Any, Reference]] = WeakKeyDictionary()
+"""Mixtures that were fitted: candidate models ask for the same one again and again."""
 
 DICTIONARY = (WhiteNoise, QuantizationNoise, RandomWalk, GaussMarkov)
 """Kinds of which a mixture is made that follows almost any wavelet variance."""
@@ -187,6 +196,11 @@ def dictionary(
     matrix : (J, A) ndarray
         Wavelet variance of each at unit amplitude.
     """
+    return _dictionary(scales, _kinds(extra))
+
+
+def _kinds(extra: tuple[Process, ...]) -> tuple[Process, ...]:
+    """The processes of the dictionary."""
     # Lines to be found are left out: a comb of them follows anything. Those at given frequencies
     # follow one thing only, which no other process can.
     lines = tuple(p for p in extra if p.is_line and p.values["frequency"] is not None)
@@ -195,24 +209,39 @@ def dictionary(
     kinds.pop(GaussMarkov, None)
     processes: tuple[Process, ...] = tuple(kind() for kind in DICTIONARY)
     processes += tuple(p for kind, p in kinds.items() if kind not in map(type, processes))
-    processes += tuple(line.with_values(amplitude=None) for line in lines)
-    design = Design(Model(processes), scales)
-    atoms = [
-        (i, shape)
-        for i in design.linear
-        for shape in _denser(design.grid(i), bool(design.terms[i].process.ordered_by))
-    ]
-    return design, atoms, np.stack([design.curve(i, shape) for i, shape in atoms], axis=1)
+    return processes + tuple(line.with_values(amplitude=None) for line in lines)
 
 
-def _denser(shapes: list[Shape], wanted: bool) -> list[Shape]:
+def _dictionary(
+    scales: Scales, kinds: tuple[Process, ...]
+) -> tuple[Design, list[tuple[int, Shape]], FloatArray]:
+    design = Design(Model(kinds), scales)
+    atoms, columns = [], []
+    for i in design.linear:
+        shapes, curves = _atoms(design, i)
+        atoms += [(i, shape) for shape in shapes]
+        columns.append(curves)
+    return design, atoms, np.concatenate(columns, axis=1)
+
+
+def _atoms(design: Design, i: int) -> tuple[list[Shape], FloatArray]:
+    """Shapes of a term and their curves, (J, A)."""
+    if not design.terms[i].process.ordered_by:
+        return design.grid(i), design.grid_curves(i)
+    kept, key = design.kept(i), ("atoms", design.terms[i].process)
+    if key not in kept:
+        shapes = _denser(design.grid(i))
+        kept[key] = shapes, np.stack([design.curve(i, shape) for shape in shapes], axis=1)
+    found: tuple[list[Shape], FloatArray] = kept[key]
+    return found
+
+
+def _denser(shapes: list[Shape]) -> list[Shape]:
     """Shapes of one parameter with their geometric means in between.
 
     The finest levels of long records are known to a thousandth, and the mixture must not fail on
     account of its grid.
     """
-    if not wanted:
-        return shapes
     values = np.array([shape[0] for shape in shapes])
     middle = np.sqrt(values[1:] * values[:-1])
     return [(float(v),) for v in np.sort(np.concatenate([values, middle]))]

@@ -7,7 +7,12 @@ from gmwm.estimate.problem.information import (
     slope_dof,
     spectral_information,
 )
-from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
+from gmwm.estimate.problem.nonnegative import (
+    nonnegative,
+    objectives_with,
+    solve_nonnegative,
+    without,
+)
 from gmwm.estimate.problem.parameters import (
     Coordinates,
     Term,
@@ -25,7 +30,7 @@ from gmwm.estimate.problem.ramp import (
     ols_slope,
     slope_p_value,
 )
-from gmwm.estimate.problem.scales import Scales
+from gmwm.estimate.problem.scales import Scales, is_plain
 from gmwm.estimate.problem.simulation import Simulation
 from gmwm.estimate.problem.targets import FittedMoments, Moments
 from gmwm.estimate.problem.whitening import chi_square, weight_root
@@ -48,7 +53,9 @@ __all__ = [
     "frequency_nodes",
     "gls_slope",
     "in_model_order",
+    "is_plain",
     "keys_by_term",
+    "nonnegative",
     "objectives_with",
     "ols_slope",
     "shape_of",
@@ -57,4 +64,5 @@ __all__ = [
     "solve_nonnegative",
     "spectral_information",
     "weight_root",
+    "without",
 ]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 
 _DEPENDENT = 1e-12  # of a unit column: what is left of it beside those it depends on
 _TOLERANCE = 1e-14  # of |y|: a correlation with the residuals that is rounding
@@ -28,9 +28,8 @@ def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, F
     """
     if columns.shape[1] == 0:
         return np.zeros(0), y
-    unit, length = _unit(columns)
-    scaled = _solve(unit, np.ascontiguousarray(y))
-    return scaled / length, y - unit @ scaled
+    amplitudes, residuals = nonnegative(np.ascontiguousarray(columns), np.ascontiguousarray(y))
+    return amplitudes, residuals
 
 
 def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
@@ -46,60 +45,57 @@ def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) 
     -------
     (G,) ndarray
     """
-    together = np.empty((y.size, columns.shape[1] + 1))
-    together[:, :-1] = _unit(columns)[0]
-    y = np.ascontiguousarray(y)
-    result = np.empty(candidates.shape[1])
-    for g, column in enumerate(_unit(candidates)[0].T):
-        together[:, -1] = column
-        rest = y - together @ _solve(together, y)
-        result[g] = rest @ rest
-    return result
+    arrays = (np.ascontiguousarray(each) for each in (columns, candidates, y))
+    return np.asarray(_each(*arrays))
 
 
-def _unit(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    length = np.sqrt(np.sum(columns * columns, axis=0))
-    length[length == 0.0] = 1.0
-    return np.ascontiguousarray(columns / length), length
+@compiled()
+def _append(
+    unit: FloatArray, order: IntArray, p: int, basis: FloatArray, upper: FloatArray
+) -> None:
+    """Orthonormal direction of column ``order[p]`` beside those before, by Gram-Schmidt twice."""
+    rows = unit.shape[0]
+    for i in range(rows):
+        basis[p, i] = unit[i, order[p]]
+    for q in range(p):
+        upper[q, p] = 0.0
+    for _ in range(2):
+        for q in range(p):
+            product = 0.0
+            for i in range(rows):
+                product += basis[q, i] * basis[p, i]
+            upper[q, p] += product
+            for i in range(rows):
+                basis[p, i] -= product * basis[q, i]
+    norm = 0.0
+    for i in range(rows):
+        norm += basis[p, i] ** 2
+    norm = math.sqrt(norm)
+    upper[p, p] = norm if norm > _DEPENDENT else 0.0
+    for i in range(rows):
+        basis[p, i] = basis[p, i] / norm if norm > _DEPENDENT else 0.0
 
 
 @compiled()
 def _passive_solution(
-    unit: FloatArray, y: FloatArray, order: FloatArray, size: int, basis: FloatArray,
-    upper: FloatArray, solution: FloatArray,
+    unit: FloatArray, order: IntArray, first: int, size: int, basis: FloatArray,
+    upper: FloatArray, rest: FloatArray, along: FloatArray, solution: FloatArray,
 ) -> None:  # fmt: skip
-    """Least squares of the first ``size`` columns of ``order``, by Gram-Schmidt done twice."""
-    rows = y.size
-    for p in range(size):
+    """Least squares of the first ``size`` columns of ``order``; new are those from ``first`` on.
+
+    Row p of ``rest`` is what the first p directions leave of the right side.
+    """
+    rows = unit.shape[0]
+    for p in range(first, size):
+        _append(unit, order, p, basis, upper)
+        # The part along each direction is taken from what the earlier ones left.
+        along[p] = 0.0
         for i in range(rows):
-            basis[p, i] = unit[i, order[p]]
-        for q in range(p):
-            upper[q, p] = 0.0
-        for _ in range(2):
-            for q in range(p):
-                product = 0.0
-                for i in range(rows):
-                    product += basis[q, i] * basis[p, i]
-                upper[q, p] += product
-                for i in range(rows):
-                    basis[p, i] -= product * basis[q, i]
-        norm = 0.0
+            along[p] += basis[p, i] * rest[p, i]
         for i in range(rows):
-            norm += basis[p, i] ** 2
-        norm = math.sqrt(norm)
-        upper[p, p] = norm if norm > _DEPENDENT else 0.0
-        for i in range(rows):
-            basis[p, i] = basis[p, i] / norm if norm > _DEPENDENT else 0.0
-    # The part of y along each direction is taken from what the earlier ones left of it.
-    rest = y.copy()
-    for p in range(size):
-        product = 0.0
-        for i in range(rows):
-            product += basis[p, i] * rest[i]
-        for i in range(rows):
-            rest[i] -= product * basis[p, i]
-        solution[p] = product
+            rest[p + 1, i] = rest[p, i] - along[p] * basis[p, i]
     for p in range(size - 1, -1, -1):
+        solution[p] = along[p]
         for q in range(p + 1, size):
             solution[p] -= upper[p, q] * solution[q]
         solution[p] = solution[p] / upper[p, p] if upper[p, p] > 0.0 else 0.0
@@ -108,34 +104,38 @@ def _passive_solution(
 @compiled()
 def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
     rows, count = unit.shape
+    most = min(rows, count)
     x = np.zeros(count)
-    order = np.zeros(count, dtype=np.int64)
-    solution = np.zeros(count)
+    slope = np.zeros(count)
+    order = np.zeros(most, dtype=np.int64)
+    solution, along = np.zeros(most), np.zeros(most)
     is_passive = np.zeros(count, dtype=np.bool_)
-    basis, upper = np.zeros((count, rows)), np.zeros((count, count))
+    rejected = np.zeros(count, dtype=np.bool_)
+    basis, upper = np.zeros((most, rows)), np.zeros((most, most))
+    rest = np.zeros((most + 1, rows))
     size = 0
     residual = y.copy()
     length = 0.0
     for i in range(rows):
+        rest[0, i] = y[i]
         length += y[i] ** 2
     least = _TOLERANCE * math.sqrt(length)
     for _ in range(3 * count + 3):
-        rejected = np.zeros(count, dtype=np.bool_)
+        rejected[:] = False
+        slope[:] = 0.0
+        for i in range(rows):
+            for j in range(count):
+                slope[j] += unit[i, j] * residual[i]
         entered = -1
-        while entered < 0 and size < min(rows, count):
+        while entered < 0 and size < most:
             steepest, best = least, -1
             for j in range(count):
-                if is_passive[j] or rejected[j]:
-                    continue
-                slope = 0.0
-                for i in range(rows):
-                    slope += unit[i, j] * residual[i]
-                if slope > steepest:
-                    steepest, best = slope, j
+                if not (is_passive[j] or rejected[j]) and slope[j] > steepest:
+                    steepest, best = slope[j], j
             if best < 0:
                 break
             order[size] = best
-            _passive_solution(unit, y, order, size + 1, basis, upper, solution)
+            _passive_solution(unit, order, size, size + 1, basis, upper, rest, along, solution)
             # By rounding, what should gain may come out with the wrong sign.
             if solution[size] > 0.0:
                 entered = best
@@ -156,17 +156,18 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
                 break
             for p in range(size):
                 x[order[p]] += step * (solution[p] - x[order[p]])
-            kept = 0
+            kept, first = 0, size
             for p in range(size):
                 j = order[p]
                 if p == at or x[j] <= 0.0:
                     x[j] = 0.0
                     is_passive[j] = False
+                    first = min(first, p)
                 else:
                     order[kept] = j
                     kept += 1
             size = kept
-            _passive_solution(unit, y, order, size, basis, upper, solution)
+            _passive_solution(unit, order, first, size, basis, upper, rest, along, solution)
         for p in range(size):
             x[order[p]] = solution[p]
         for i in range(rows):
@@ -175,3 +176,76 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
             for i in range(rows):
                 residual[i] -= unit[i, order[p]] * solution[p]
     return x
+
+
+@compiled()
+def _unit(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns of unit length, and their lengths, 1 in place of 0."""
+    rows, count = columns.shape
+    length = np.zeros(count)
+    unit = np.empty((rows, count))
+    for i in range(rows):
+        for j in range(count):
+            length[j] += columns[i, j] * columns[i, j]
+    for j in range(count):
+        length[j] = math.sqrt(length[j]) if length[j] > 0.0 else 1.0
+    for i in range(rows):
+        for j in range(count):
+            unit[i, j] = columns[i, j] / length[j]
+    return unit, length
+
+
+@compiled()
+def nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`solve_nonnegative`, for compiled code; the arrays are contiguous."""
+    unit, length = _unit(columns)
+    x = _solve(unit, y)
+    residual = y.copy()
+    for i in range(y.size):
+        for j in range(x.size):
+            residual[i] -= unit[i, j] * x[j]
+    for j in range(x.size):
+        x[j] /= length[j]
+    return x, residual
+
+
+@compiled()
+def _each(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
+    rows, count = columns.shape
+    together = np.empty((rows, count + 1))
+    together[:, :count] = _unit(columns)[0]
+    others = _unit(candidates)[0]
+    result = np.zeros(candidates.shape[1])
+    for g in range(result.size):
+        for i in range(rows):
+            together[i, count] = others[i, g]
+        x = _solve(together, y)
+        for i in range(rows):
+            left = y[i]
+            for j in range(count + 1):
+                left -= together[i, j] * x[j]
+            result[g] += left * left
+    return result
+
+
+@compiled()
+def without(columns: FloatArray, others: FloatArray) -> FloatArray:
+    """What of some columns is orthogonal to others, (J, k) and (J, l).
+
+    At most so many of the others as there are rows.
+    """
+    rows, count = others.shape
+    order = np.arange(count)
+    basis, upper = np.zeros((count, rows)), np.zeros((count, count))
+    unit = _unit(others)[0]
+    for p in range(count):
+        _append(unit, order, p, basis, upper)
+    result = columns.copy()
+    for j in range(columns.shape[1]):
+        for p in range(count):
+            product = 0.0
+            for i in range(rows):
+                product += basis[p, i] * columns[i, j]
+            for i in range(rows):
+                result[i, j] -= product * basis[p, i]
+    return result

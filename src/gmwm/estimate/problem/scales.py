@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,9 @@ class Scales:
         How curves that have no closed form are found.
     simulate_all : bool
         Whether all are found so.
+    shared : dict
+        What fits of several models to these levels ask for again: starting shapes and their curves,
+        by what they belong to.
     """
 
     tau: FloatArray
@@ -42,10 +47,11 @@ class Scales:
     wavelet: str = "haar"
     simulation: Simulation = _USUAL
     simulate_all: bool = False
+    shared: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, wv: WaveletVariance) -> Scales:
-        return cls(wv.tau, wv.dt, wv.n, wv.wavelet)
+        return _of_levels(tuple(wv.tau.tolist()), wv.dt, wv.n, wv.wavelet)
 
     def curve(self, model: Process | Model) -> FloatArray:
         """Wavelet variance of a model, u^2, (J,)."""
@@ -60,11 +66,19 @@ class Scales:
         if self.is_simulated(process):
             return lambda shape: self.curve(process.at_unit(shape))
         if process.shape_parameters:
+            if self.wavelet == "haar":
+                return process.unit_haar_curves(self.tau, self.dt)
             return lambda shape: process.unit_wavelet_variance(
                 shape, self.tau, self.dt, self.wavelet
             )
         found = frozen(process.unit_wavelet_variance((), self.tau, self.dt, self.wavelet))
         return lambda _: found
+
+    def unit_slopes(self, process: Process) -> Callable[[Shape], FloatArray | None]:
+        """Derivative of `unit_curves` by the coordinates of the shape, (J, s), where known."""
+        if self.wavelet != "haar" or self.is_simulated(process):
+            return lambda shape: None
+        return lambda shape: process.unit_haar_slopes(shape, self.tau, self.dt)
 
     def is_simulated(self, process: Process) -> bool:
         """Whether its curve is found by simulation."""
@@ -81,3 +95,14 @@ class Scales:
             )
         positive = np.maximum(curve, 1e-12 * np.max(curve))
         return pilot_psd(positive, np.rint(self.tau / self.dt), self.dt)
+
+
+@lru_cache(maxsize=16)
+def _of_levels(tau: tuple[float, ...], dt: float, n: int, wavelet: str) -> Scales:
+    """One object for all series of the same levels."""
+    return Scales(frozen(np.array(tau)), dt, n, wavelet)
+
+
+def is_plain(process: Process) -> bool:
+    """Whether an instance holds nothing but parameters, so that equal ones are the same."""
+    return vars(process).keys() <= {parameter.name for parameter in process.parameters}

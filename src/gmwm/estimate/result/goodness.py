@@ -159,6 +159,18 @@ class Goodness:
         return self.largest_p < tuning.EXCLUDED_P
 
     @property
+    def misses_a_level(self) -> bool:
+        """Whether the model misses some level by more than one in a hundred right models does."""
+        return self.largest_p < tuning.REDUNDANT_P
+
+    def loses_to(self, larger: Goodness) -> bool:
+        """Whether it misses an averaging time that a larger model describes.
+
+        The sum over all levels may tie all the same.
+        """
+        return self.misses_a_level and larger.largest_p >= tuning.REDUNDANT_P
+
+    @property
     def sentence(self) -> str:
         """The largest misfit in words; empty if no level is known well."""
         worst = self.worst

@@ -122,6 +122,7 @@ def fit_joint(
     model: Model,
     parts: Sequence[WaveletVariance],
     estimate: Callable[[Model, WaveletVariance], Fit],
+    whole: Fit | None = None,
 ) -> JointFit:
     """Fit one model to several recordings, and to each.
 
@@ -132,19 +133,20 @@ def fit_joint(
     parts : sequence of WaveletVariance
     estimate : callable
         ``estimate(model, wv) -> Fit`` of a method.
+    whole : Fit, optional
+        The model fitted to all recordings, where that was done before.
 
     Raises
     ------
     InputError
         If the model has a rate ramp.
     """
-    pooled = PooledVariance.of(parts)
     if any(term.is_drift for term in model.terms) and len(parts) > 1:
         raise InputError(
             "a rate ramp is an accident of one recording: take it out of the model, or fit the "
             "recordings one by one"
         )
-    whole = estimate(model, pooled)
+    whole = whole or estimate(model, PooledVariance.of(parts))
     each = tuple(estimate(model, part) for part in parts)
     equality_p, spread = _heterogeneity(whole, each)
     curves_p = _curves_test(whole, each)

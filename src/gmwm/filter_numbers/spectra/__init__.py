@@ -2,6 +2,7 @@
 
 from gmwm.filter_numbers.spectra.dominance import (
     KINDS,
+    TIGHTEST,
     Problem,
     dominating,
     with_correlation_times,
@@ -12,6 +13,7 @@ from gmwm.filter_numbers.spectra.target import Target
 
 __all__ = [
     "KINDS",
+    "TIGHTEST",
     "Estimated",
     "ParameterRegion",
     "Problem",

@@ -25,6 +25,9 @@ from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 KINDS = {"N+K": "NK", "N+GM": "NG", "N+K+GM": "NKG"}
 """Forms that `dominating` knows, with the kinds of their terms."""
 
+TIGHTEST = "N+K+GM"
+"""The one that holds the others."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:

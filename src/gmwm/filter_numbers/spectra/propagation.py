@@ -94,8 +94,11 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
     """Change of the logarithm of the density for a step along each independent error, (n, p)."""
     model, keys = estimate.model, estimate.keys
     values = np.array([float(model.params[key] or 0.0) for key in keys])
-    variances, vectors = np.linalg.eigh(estimate.covariance)
-    root = vectors * np.sqrt(np.maximum(variances, 0.0))
+    # Of the correlation: variances of correlation times and of amplitudes are twenty decades apart,
+    # and rounding of the largest would be far above the smallest.
+    errors = np.sqrt(np.diag(estimate.covariance))
+    shares, vectors = np.linalg.eigh(estimate.covariance / np.outer(errors, errors))
+    root = errors[:, None] * vectors * np.sqrt(np.maximum(shares, 0.0))
     counted = [
         i for i, term in enumerate(model.terms) if any(term is kept for kept in target.terms)
     ]

@@ -6,16 +6,12 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from gmwm._core.files import existing_file
 from gmwm.errors import InputError
+from gmwm.readers import DATE, seconds_of
 
-_DATE = re.compile(
-    r"(\d{4})[-/](\d{1,2})[-/](\d{1,2})[T ]\s*(\d{1,2}):(\d{2}):(\d{2}(?:\.\d*)?)"
-    r"\s?(Z|[+-]\d{2}:?\d{2})?"
-)
 _WEEK = re.compile(r"^\s*(\d{4})\s+(\d{1,6}\.\d+)(?=\s)")
 _GPS_WEEKS = 315964800  # s from 1970-01-01 to 1980-01-06, on one calendar
 _WEEK_LENGTH = 604800
@@ -54,7 +50,7 @@ def in_seconds(path: Path) -> Iterator[tuple[Path, str]]:
     with path.open("rb") as stream:
         head = stream.read(_LOOKED_AT).decode(errors="replace")
     scale = next((found[1] for line in head.splitlines() if (found := _RTKLIB.match(line))), "")
-    if not scale and not _DATE.search(head):
+    if not scale and not DATE.search(head):
         yield path, ""
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -75,19 +71,12 @@ def _line(text: str, rtklib: bool, place: str) -> str:
         seconds = _GPS_WEEKS + int(week[1]) * _WEEK_LENGTH + float(week[2])
         text = f"{seconds:.6f} " + text[week.end() :]
     else:
-        text = _DATE.sub(lambda found: f"{_seconds(found, place):.6f}", text)
+        text = DATE.sub(lambda found: f"{_seconds(found, place):.6f}", text)
     return (",".join(text.split()) if rtklib else text) + "\n"
 
 
 def _seconds(found: re.Match[str], place: str) -> float:
-    """Since 1970-01-01; whole days and minutes by the calendar, so that 60 s may pass."""
-    year, month, day, hour, minute = (int(part) for part in found.groups()[:5])
-    zone = found[7]
     try:
-        start = datetime(year, month, day, hour, minute, tzinfo=UTC)
+        return seconds_of(found)
     except ValueError as error:
         raise InputError(f"{place}: {found[0]} is not a date: {error}; correct the line") from None
-    if zone and zone != "Z":
-        sign = -1.0 if zone[0] == "-" else 1.0
-        start -= sign * timedelta(hours=int(zone[1:3]), minutes=int(zone[-2:]))
-    return start.timestamp() + float(found[6])

@@ -16,10 +16,10 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import align
 from gmwm.ins.field.measured import Measured, MeasuredSpec
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import Smoothed, smooth
+from gmwm.ins.field.start import align
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels

@@ -14,9 +14,9 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import standstills
-from gmwm.ins.field.fix_file import read_fix_log, read_heights
+from gmwm.ins.field.fix_file import FixLog, read_fix_log, read_heights
 from gmwm.ins.field.imu_file import ImuLog, read_imu_log
+from gmwm.ins.field.start import standstills
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.spec import (
@@ -192,8 +192,21 @@ class Measured:
             attitude=spec.attitude,
             attitude_sd=spec.attitude_sd,
             title=log.source,
-            notices=(*log.notices, *found.notices, *cut, *assumed),
+            notices=(*log.notices, *found.notices, *_scales(log, found), *cut, *assumed),
         )
+
+
+def _scales(log: ImuLog, found: FixLog) -> tuple[Notice, ...]:
+    """Dates of the fixes on a scale that those of an IMU rarely are on."""
+    scale = next((each.values["scale"] for each in found.notices if each.code == "dates"), "UTC")
+    if scale == "UTC" or not any(each.code == "dates" for each in log.notices):
+        return ()
+    text = (
+        f"both have dates, those of the fixes in {scale}: if the IMU's are in UTC, GPS time is "
+        "ahead of them by the leap seconds, 18 s since 2017"
+    )
+    values = {"scale": scale}
+    return (Notice("time-scales", "warning", "", text, values, "shift the fixes by as much"),)
 
 
 def with_bias(
@@ -234,9 +247,7 @@ def _with_barometer(
     inside = np.isfinite(height) & (time > -0.5 * log.imu.dt)
     inside &= time < (log.imu.n + 0.5) * log.imu.dt
     time, height = time[inside], height[inside]
-    first = next(
-        (each for each in aiding.fixes if each.kind == "position" and each.time.size), None
-    )
+    first = aiding.of("position")
     near = np.abs(time - (np.nan if first is None else first.time[0])) <= tuning.CHORD
     if first is None or not np.any(near):
         raise InputError(

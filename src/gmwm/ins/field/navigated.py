@@ -16,11 +16,11 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import Alignment, align
 from gmwm.ins.field.explanations import LEVEL
 from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay, innovation_sizes
+from gmwm.ins.field.start import Alignment, align
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.montecarlo import InnovationTest
@@ -97,10 +97,10 @@ class Navigated:
         )  # fmt: skip
         replay = Replay.of(measured, alignment)
         imu = replay.imu
-        times = next(each.time for each in replay.aiding.fixes if each.kind == "position")
-        if not times.size:
+        positions = replay.aiding.of("position")
+        if positions is None:
             raise InputError("no position fix follows the first one: there is nothing to filter")
-        ends = np.concatenate([[0.0], times, [imu.n * imu.dt]])
+        ends = np.concatenate([[0.0], positions.time, [imu.n * imu.dt]])
         longest = int(np.argmax(np.diff(ends)))
         start, end = float(ends[longest]), float(ends[longest + 1])
         solution = replay.solution(interval, (end,))

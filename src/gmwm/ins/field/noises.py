@@ -55,7 +55,7 @@ def fix_noise(base: Replay) -> Iterator[Candidate]:
 
 def coloured(base: Replay) -> Candidate | None:
     """Errors of the positions that are alike from fix to fix."""
-    positions = next((f for f in base.aiding.fixes if f.kind == "position" and f.time.size), None)
+    positions = base.aiding.of("position")
     if positions is None or np.any(np.asarray(base.aiding.coloured_sd)):
         return None
     shape = np.median(positions.sd, axis=0)

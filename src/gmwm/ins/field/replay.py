@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.stats import norm
 
 from gmwm._core.typing import FloatArray
-from gmwm.ins.field.alignment import Alignment, started
 from gmwm.ins.field.measured import Measured
+from gmwm.ins.field.start import Alignment, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
 from gmwm.ins.geometry import matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels

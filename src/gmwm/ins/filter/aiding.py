@@ -203,6 +203,10 @@ class Aiding:
             barometer_tau=own.barometer_tau,
         )
 
+    def of(self, kind: str) -> Fixes | None:
+        """The first fixes of a kind, ``None`` if there are none."""
+        return next((each for each in self.fixes if each.kind == kind and each.time.size), None)
+
     def without(self, outages: Iterable[Outage]) -> Aiding:
         """The same without the GNSS fixes of the outages."""
         result = []

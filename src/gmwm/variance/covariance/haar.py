@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, haar_gain, quadrature
+from gmwm.process import PSD, Panels, evaluated, haar_gain, quadrature
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
 
 # Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
@@ -167,20 +167,81 @@ def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, Float
     return np.array(rows, dtype=int), np.array(columns, dtype=int), np.array(weights)
 
 
-def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
-    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4."""
-    averaging = tuple(m.tolist())
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Weights of the integrals of products of two gains against the square of a spectrum.
+
+    Attributes
+    ----------
+    panels : Panels
+    frequency : (P, 12) ndarray
+        Points of the panels, cycles per sample.
+    weight : (pairs, P, 12) ndarray
+    first, second : (pairs,) ndarray
+        Levels.
+    """
+
+    panels: Panels
+    frequency: FloatArray
+    weight: FloatArray
+    first: npt.NDArray[np.intp]
+    second: npt.NDArray[np.intp]
+
+
+@lru_cache(maxsize=4)
+def _pairs(averaging: tuple[float, ...]) -> _Pairs:
     grid = quadrature(averaging)
-    density = grid.sampled(psd, dt)
-    scaled = grid.gain * (np.sqrt(grid.weight) * density)
+    panels = Panels.of(grid.frequency)
+    first, second = np.triu_indices(len(averaging))
+    weighted = grid.weight * grid.gain
+    weight = np.concatenate(
+        [panels.gathered(own * weighted[j:]) for j, own in enumerate(grid.gain)]
+    )
+    rows, columns, excess = _excess(averaging)
+    if rows.size:
+        place = np.zeros((len(averaging), len(averaging)), dtype=int)
+        place[first, second] = np.arange(first.size)
+        weight[place[rows, columns]] += panels.gathered(grid.weight * excess)
+    frequency = np.arctan(np.exp(panels.log_tangent)) / np.pi
+    return _Pairs(panels, frequency, weight, first, second)
+
+
+def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
+    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4.
+
+    Where S^2 is a polynomial on a panel of nodes, the lobes of the gains are in weights of a few
+    points; the other panels, about a narrow resonance or a kink, are summed node by node.
+    """
+    averaging = tuple(m.tolist())
+    pairs = _pairs(averaging)
+    square = (evaluated(psd, pairs.frequency.ravel() / dt, dt) / dt) ** 2
+    square = square.reshape(pairs.frequency.shape)
+    smooth = pairs.panels.are_smooth(square)
+    square[~smooth] = 0.0
+    integral = np.empty((m.size, m.size))
+    values = pairs.weight.reshape(pairs.first.size, -1) @ square.ravel()
+    integral[pairs.first, pairs.second] = integral[pairs.second, pairs.first] = values
+    if not np.all(smooth):
+        integral += _node_by_node(psd, dt, averaging, ~smooth)
+    return 4.0 * integral
+
+
+def _node_by_node(
+    psd: PSD, dt: float, averaging: tuple[float, ...], chosen: npt.NDArray[np.bool_]
+) -> FloatArray:
+    """A quarter of the integrals over some panels, from all of their nodes."""
+    grid, panels = quadrature(averaging), _pairs(averaging).panels
+    nodes = np.flatnonzero(np.repeat(chosen, np.diff(panels.starts, append=grid.frequency.size)))
+    density = evaluated(psd, grid.frequency[nodes] / dt, dt) / dt
+    scaled = grid.gain[:, nodes] * (np.sqrt(grid.weight[nodes]) * density)
     integral = scaled @ scaled.T
     rows, columns, weights = _excess(averaging)
     if rows.size:
-        correction = weights @ (grid.weight * density**2)
+        correction = weights[:, nodes] @ (grid.weight[nodes] * density**2)
         integral[rows, columns] += correction
         apart = rows != columns
         integral[columns[apart], rows[apart]] += correction[apart]
-    return np.asarray(4.0 * integral)
+    return np.asarray(integral)
 
 
 def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:

@@ -45,6 +45,13 @@ class LagGrid:
         return result
 
     @cached_property
+    def folds(self) -> tuple[FloatArray, FloatArray, _Folds]:
+        """Frequencies and weights within the bin at zero, and the folds of all frequencies."""
+        x, w = legendre(8)
+        near = 0.25 / self.size * (x + 1.0)
+        return near, w, _Folds.of(np.concatenate([self.frequency, near]), self.block)
+
+    @cached_property
     def lag(self) -> npt.NDArray[np.intp]:
         """Lags in blocks, the negative ones at the end."""
         result = np.arange(self.size)
@@ -81,24 +88,58 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
     folds are summed; the smoothing of all others shares the factor sin^2(pi f), and their sum is
     an integral over the rest of the band.
     """
-    if block == 1:
-        return np.asarray(psd(frequency / dt, dt)) / dt
-    total = np.zeros_like(frequency)
-    folds = min(tuning.FOLDS, block // 2)
-    for fold in range(-folds, folds + 1):
-        f = np.abs(frequency + fold) / block
-        smoothing = (np.sin(np.pi * block * f) / (block * np.sin(np.pi * f))) ** 2
+    return _Folds.of(frequency, block).density(psd, dt)
+
+
+@dataclass(frozen=True, eq=False)
+class _Folds:
+    """What of `block_density` does not depend on the spectrum.
+
+    Attributes
+    ----------
+    frequency : (A,) ndarray
+        Of all folds, then of the rest of the band, cycles per sample.
+    smoothing : (folds, F) ndarray
+        Weights of the folds.
+    square : (F,) ndarray
+        Weight of the rest.
+    rest : (R,) ndarray
+        Weights of the integral over it.
+    """
+
+    frequency: FloatArray
+    smoothing: FloatArray
+    square: FloatArray
+    rest: FloatArray
+
+    @classmethod
+    def of(cls, frequency: FloatArray, block: int) -> _Folds:
+        if block == 1:
+            one = np.ones((1, frequency.size))
+            return cls(frequency, one, one[0], np.zeros(0))
+        most = min(tuning.FOLDS, block // 2)
+        folds = np.arange(-most, most + 1)
+        f = np.abs(frequency + folds[:, None]) / block
+        smoothing = (np.sin(np.pi * block * f) / (block * np.sin(np.pi * f))) ** 2 / block
         # With an even number of folds the outermost one is half of the fold on either side.
-        share = 0.5 if 2 * abs(fold) == block else 1.0
-        total += share * smoothing * np.asarray(psd(f / dt, dt)) / (block * dt)
-    x, w = legendre(256)
-    low = (folds + 0.5) / block
-    if low < 0.5:
-        rest = low * (0.5 / low) ** (0.5 * (x + 1.0))
-        weight = 0.5 * w * rest * np.log(0.5 / low)
-        integral = 2.0 * weight @ (np.asarray(psd(rest / dt, dt)) / dt / np.sin(np.pi * rest) ** 2)
-        total += (np.sin(np.pi * frequency) / block) ** 2 * integral
-    return total
+        smoothing[2 * np.abs(folds) == block] *= 0.5
+        low = (most + 0.5) / block
+        rest = weight = np.zeros(0)
+        if low < 0.5:
+            x, w = legendre(256)
+            rest = low * (0.5 / low) ** (0.5 * (x + 1.0))
+            weight = w * rest * np.log(0.5 / low) / np.sin(np.pi * rest) ** 2
+        square = (np.sin(np.pi * frequency) / block) ** 2
+        return cls(np.concatenate([f.ravel(), rest]), smoothing, square, weight)
+
+    def density(self, psd: PSD, dt: float) -> FloatArray:
+        """The spectrum of block means."""
+        found = np.asarray(psd(self.frequency / dt, dt)) / dt
+        folded = found[: self.smoothing.size].reshape(self.smoothing.shape)
+        total = np.sum(self.smoothing * folded, axis=0)
+        if self.rest.size:
+            total += self.square * float(self.rest @ found[self.smoothing.size :])
+        return np.asarray(total)
 
 
 def block_spectrum(psd: PSD, dt: float, grid: LagGrid) -> FloatArray:
@@ -108,11 +149,10 @@ def block_spectrum(psd: PSD, dt: float, grid: LagGrid) -> FloatArray:
     its bin at zero is its mean over the bin less what a smooth function would have curved there:
     exact for short memory, where it vanishes, and for a random walk, where it is constant.
     """
-    frequency = grid.frequency
-    result = block_density(psd, dt, frequency, grid.block)
-    x, w = legendre(8)
-    f = 0.25 / grid.size * (x + 1.0)
-    mean = 0.5 * w @ (f**2 * block_density(psd, dt, f, grid.block))
-    bin_value = (12.0 * mean - frequency[1] ** 2 * result[1]) / 11.0
-    result[0] = max(bin_value, 0.0) / frequency[0] ** 2
+    x, w, folds = grid.folds
+    found = folds.density(psd, dt)
+    result, near = found[: grid.frequency.size], found[grid.frequency.size :]
+    mean = 0.5 * w @ (x**2 * near)
+    bin_value = (12.0 * mean - grid.frequency[1] ** 2 * result[1]) / 11.0
+    result[0] = max(bin_value, 0.0) / grid.frequency[0] ** 2
     return result

@@ -5,7 +5,7 @@ import pytest
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins import tuning
-from gmwm.ins.field.alignment import align
+from gmwm.ins.field.start import align
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, ned_difference, offset
 from gmwm.ins.imu import Imu, SensorModels

@@ -7,9 +7,9 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import compare
-from gmwm.ins.field.alignment import align
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
+from gmwm.ins.field.start import align
 from gmwm.ins.geometry import ned_difference
 from gmwm.study.emulated_logs import emulated_log, sensors
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 
 import numpy as np
 import pytest
@@ -177,6 +178,24 @@ def test_dates_are_seconds(log, as_it_is, tmp_path, write):
     np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
 
 
+def dated(log, folder):
+    """The IMU's stamps as dates."""
+    log.imu(folder)
+    head, *rows = (folder / "imu.csv").read_text().splitlines()
+    rows = [
+        f"{iso(float(stamp))},{rest}" for stamp, _, rest in (row.partition(",") for row in rows)
+    ]
+    (folder / "imu.csv").write_text("\n".join([head.replace("time_s", "UTC"), *rows]) + "\n")
+
+
+def test_dates_of_both_files_are_one_clock(log, as_it_is, tmp_path):
+    dated(log, tmp_path)
+    log.fixes(tmp_path, iso, "time")
+    found = navigated(tmp_path)
+    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
+    assert "time-scales" not in codes(found)
+
+
 def test_a_date_that_is_none_is_named_with_its_line(log, tmp_path):
     log.imu(tmp_path)
     log.fixes(tmp_path, iso, "time")
@@ -188,7 +207,7 @@ def test_a_date_that_is_none_is_named_with_its_line(log, tmp_path):
 
 @pytest.mark.parametrize("weeks", [False, True])
 def test_a_solution_of_rtklib(log, as_it_is, tmp_path, weeks):
-    log.imu(tmp_path)
+    (log.imu if weeks else partial(dated, log))(tmp_path)
     position = log.aiding.fixes[0]
     lines = [
         "% program   : RTKLIB",
@@ -211,6 +230,7 @@ def test_a_solution_of_rtklib(log, as_it_is, tmp_path, weeks):
     np.testing.assert_allclose(found.measured.aiding.fixes[0].time, position.time, atol=2e-3)
     np.testing.assert_allclose(found.measured.aiding.fixes[0].sd[0], [1.0, 1.0, 1.5])
     assert apart(found, as_it_is).max() < 5.0  # there are no velocities here
+    assert ("time-scales" in codes(found)) is not weeks  # GPS time beside dates of the IMU
 
 
 def test_a_shift_of_the_fixes_is_added_to_their_times(log, as_it_is, tmp_path):
@@ -254,7 +274,7 @@ def test_a_heading_beside_an_attitude_is_refused(underway, tmp_path):
 def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
     underway, tmp_path, velocity, monkeypatch
 ):
-    monkeypatch.setattr("gmwm.ins.field.alignment._steady", lambda imu: None)
+    monkeypatch.setattr("gmwm.ins.field.start.alignment.steady", lambda imu: None)
     squares = []
     for seed in range(3):
         log = Log(underway, seed, velocity=velocity)
@@ -270,7 +290,7 @@ def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
 
 
 def test_motion_without_acceleration_shows_no_heading(tmp_path, monkeypatch):
-    monkeypatch.setattr("gmwm.ins.field.alignment._steady", lambda imu: None)
+    monkeypatch.setattr("gmwm.ins.field.start.alignment.steady", lambda imu: None)
     straight = Log(car_drive(duration=110.0, dt=1.0 / RATE).segment(0.0, 18.0))
     straight.imu(tmp_path)
     straight.fixes(tmp_path)

@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import zipfile
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from functools import cache
 from pathlib import Path
-from threading import Thread
-from time import monotonic, sleep
+from time import monotonic
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from gmwm._core import checks, memory
-from gmwm._core.files import folder_to_fill, moved_into_place
+from gmwm._core.files import folder_to_fill, moved_into_place, one_writer
+from gmwm._core.runs.workers import results
 from gmwm._core.typing import Progress
 from gmwm.errors import InputError
 
@@ -88,9 +86,8 @@ def do_runs(
         done = runs - len(todo)
         if progress is not None:
             progress(done, runs, "")
-        results = _on_cluster(work, todo, cluster) if cluster else _here(work, todo, jobs)
-        with closing(results):
-            for run, values in results:
+        with closing(results(work, todo, jobs=jobs, cluster=cluster)) as found:
+            for run, values in found:
                 store.add(run, values)
                 done += 1
                 if progress is not None:
@@ -213,90 +210,9 @@ def _store(folder: Path | None, study: Mapping[str, Any], earlier: Earlier) -> I
     if folder is None:
         yield store
         return
-    from filelock import FileLock, Timeout
-
-    with folder_to_fill(folder):
-        lock = FileLock(folder / ".lock", timeout=0)
-        try:
-            lock.acquire()
-        except Timeout:
-            raise InputError(
-                f"{folder} is in use by another study that is running: wait for its end, or give "
-                "another folder",
-                "runs-in-use",
-            ) from None
+    with folder_to_fill(folder), one_writer(folder):
         try:
             store.open(folder, earlier)
             yield store
         finally:
-            try:
-                store.save()
-            finally:
-                lock.release()
-                if not any(folder.glob("part-*.npz")):
-                    (folder / ".lock").unlink(missing_ok=True)
-
-
-def _here(work: Work, todo: Sequence[int], jobs: int) -> Generator[tuple[int, Any], None, None]:
-    """Numbers and values of runs as they come, from processes on this machine."""
-    if jobs == 1 or len(todo) < 2:
-        for run in todo:
-            yield run, work(run)
-        return
-    from joblib import Parallel, delayed, parallel_config
-
-    with parallel_config("loky", inner_max_num_threads=1):
-        pool = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    yield from pool(delayed(_in_worker)(work, run, os.getpid()) for run in todo)
-
-
-def _in_worker(work: Work, run: int, parent: int) -> tuple[int, Any]:
-    _end_with(parent)
-    return _numbered(work, run)
-
-
-@cache
-def _end_with(parent: int) -> None:
-    """End this process when its parent ends, also where that is killed and cannot send word."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            sleep(1.0)
-        os._exit(1)
-
-    Thread(target=watch, daemon=True).start()
-
-
-def _numbered(work: Work, run: int) -> tuple[int, Any]:
-    return run, work(run)
-
-
-def _on_cluster(
-    work: Work, todo: Sequence[int], address: str
-) -> Generator[tuple[int, Any], None, None]:
-    """Numbers and values of runs as they come, from the workers of a Dask scheduler."""
-    try:
-        from distributed import Client, as_completed
-        from distributed.comm.addressing import parse_address
-        from distributed.comm.registry import get_backend
-    except ImportError:
-        raise InputError(
-            "a cluster needs Dask: install it with pip install 'gmwm[cluster]'"
-        ) from None
-    try:
-        # A scheme that nobody speaks is refused before any thread is started.
-        get_backend(parse_address(address)[0])
-        client = Client(address, timeout="10s")
-    except TypeError as error:  # what distributed raises for tls:// without certificates
-        raise InputError(
-            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its "
-            "certificates, distributed.comm.tls in its configuration"
-        ) from None
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None
-    with client:
-        # Each worker is sent the work once, not with every run.
-        shared = client.scatter(work, broadcast=True)
-        futures = [client.submit(_numbered, shared, run, pure=False) for run in todo]
-        for future in as_completed(futures):
-            yield future.result()
+            store.save()

@@ -1,0 +1,201 @@
+"""Who does the work: processes of this machine, or the workers of a Dask cluster.
+
+A worker that ends before its work does loses nothing: what it was at is done again.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import cache
+from threading import Thread
+from time import sleep
+from typing import Any, TypeVar
+
+from gmwm._core import checks
+from gmwm.errors import InputError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+Work = Callable[[T], R]
+"""Does one item; can be pickled, and gives the same whoever calls it."""
+
+Done = Generator[tuple[T, R], None, None]
+"""Items with what came of them, as they come."""
+
+ENDED = 3
+"""Processes that may end at an item, before it is taken for the cause; Dask's own number."""
+
+_TOGETHER = 2  # times that an item may be among those at which a process ended; then it goes alone
+_WAITING = 2  # items that a process is given: the one at work, and the next
+
+
+def results(
+    work: Work[T, R],
+    items: Sequence[T],
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    lost: Work[T, R] | None = None,
+) -> Done[T, R]:
+    """Do the work of every item, in any order.
+
+    Parameters
+    ----------
+    work : callable
+    items : sequence
+        Hashable and different.
+    jobs : int, optional
+        Processes on this machine; -1 for one a core. One does the work itself.
+    cluster : str, optional
+        Address of a Dask scheduler that does the work instead.
+    lost : callable, optional
+        Gives the result of an item at which `ENDED` processes ended; by default that is an error.
+
+    Raises
+    ------
+    InputError
+        If no scheduler answers, it has no workers, or an item is lost (code "worker-lost").
+    """
+    given_up = _refused if lost is None else lost
+    if cluster is not None:
+        return _on_cluster(work, items, cluster, given_up)
+    return _here(work, items, jobs, given_up)
+
+
+def _refused(item: Any) -> Any:
+    raise InputError(
+        f"{ENDED} processes ended at {checks.shown(item)}: they may need more memory than there "
+        "is, use fewer jobs",
+        "worker-lost",
+    )
+
+
+def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> Done[T, R]:
+    if jobs == 1 or len(items) < 2:
+        for item in items:
+            yield item, work(item)
+        return
+    from joblib import effective_n_jobs
+
+    left, ended = dict.fromkeys(items), dict.fromkeys(items, 0)
+    while left:
+        # At which item a process ended is known only of one that has the processes for itself.
+        suspect = next((item for item in left if ended[item] >= _TOGETHER), None)
+        group = list(left) if suspect is None else [suspect]
+        try:
+            with _quietly_closing(_in_processes(work, group, jobs)) as found:
+                for item, result in found:
+                    del left[item]
+                    yield item, result
+        except BrokenProcessPool:
+            for item in [item for item in group if item in left][
+                : _WAITING * effective_n_jobs(jobs)
+            ]:
+                ended[item] += 1
+            if suspect is not None and ended[suspect] >= ENDED:
+                del left[suspect]
+                yield suspect, lost(suspect)
+
+
+@contextmanager
+def _quietly_closing(found: Done[T, R]) -> Iterator[Done[T, R]]:
+    """Close it at the end; who interrupts work knows that some of it is not done."""
+    try:
+        yield found
+    finally:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*have been cancelled", UserWarning)
+            found.close()
+
+
+def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]:
+    from joblib import Parallel, delayed, parallel_config
+
+    with parallel_config("loky", inner_max_num_threads=1):
+        pool = Parallel(
+            n_jobs=jobs, pre_dispatch=f"{_WAITING} * n_jobs", return_as="generator_unordered"
+        )
+    yield from pool(delayed(_in_worker)(work, item, os.getpid()) for item in items)
+
+
+def _in_worker(work: Work[T, R], item: T, parent: int) -> tuple[T, R]:
+    _end_with(parent)
+    return _with_item(work, item)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """End this process when its parent ends, also where that is killed and cannot send word."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(1.0)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
+def _with_item(work: Work[T, R], item: T) -> tuple[T, R]:
+    return item, work(item)
+
+
+def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T, R]) -> Done[T, R]:
+    with _client(address) as client:
+        from distributed import KilledWorker, as_completed
+
+        left = dict.fromkeys(items)
+        for_nothing = 0
+        while left:
+            before = len(left)
+            try:
+                # Each worker is sent the work once, not with every item.
+                shared = client.scatter(work, broadcast=True)
+            except TimeoutError:
+                raise InputError(
+                    f"the Dask scheduler at {address!r} has no workers: start some"
+                ) from None
+            futures = {client.submit(_with_item, shared, item, pure=False): item for item in left}
+            for future in as_completed(futures):
+                item = futures[future]
+                try:
+                    _, result = future.result()
+                except KilledWorker:
+                    result = lost(item)
+                except CancelledError:  # the last worker that had the work ended
+                    continue
+                del left[item]
+                yield item, result
+            for_nothing = for_nothing + 1 if len(left) == before else 0
+            if for_nothing == ENDED:
+                raise InputError(
+                    f"the workers of the Dask cluster at {address!r} end before their work: see "
+                    "their logs"
+                )
+
+
+def _client(address: str) -> Any:
+    try:
+        from distributed import Client
+        from distributed.comm.addressing import parse_address
+        from distributed.comm.registry import get_backend
+    except ImportError:
+        raise InputError(
+            "a cluster needs Dask: install it with pip install 'gmwm[cluster]'"
+        ) from None
+    try:
+        # A scheme that nobody speaks is refused before any thread is started.
+        get_backend(parse_address(address)[0])
+        return Client(address, timeout="10s")
+    except TypeError as error:  # what distributed raises for tls:// without certificates
+        raise InputError(
+            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its "
+            "certificates, distributed.comm.tls in its configuration"
+        ) from None
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None

@@ -1,0 +1,63 @@
+"""Where the time of a run goes, stage by stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from threading import Lock
+
+
+@dataclass(frozen=True, eq=False)
+class Stopwatch:
+    """Time by stage, of all threads together.
+
+    Attributes
+    ----------
+    elapsed : dict
+        Stage -> s by the clock on the wall; stages of several threads run at one time.
+    worked : dict
+        Stage -> s of the processor.
+    """
+
+    elapsed: dict[str, float] = field(default_factory=dict)
+    worked: dict[str, float] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock, repr=False)
+
+    @contextmanager
+    def running(self) -> Iterator[Stopwatch]:
+        """Let `stage` of this thread count here; ``None`` stops no watch."""
+        before = _watch.set(self)
+        try:
+            yield self
+        finally:
+            _watch.reset(before)
+
+    def add(self, name: str, elapsed: float, worked: float) -> None:
+        with self._lock:
+            self.elapsed[name] = self.elapsed.get(name, 0.0) + elapsed
+            self.worked[name] = self.worked.get(name, 0.0) + worked
+
+
+_watch: ContextVar[Stopwatch | None] = ContextVar("watch", default=None)
+
+
+def current() -> Stopwatch | None:
+    """The watch that runs in this thread, for threads that it starts."""
+    return _watch.get()
+
+
+@contextmanager
+def stage(name: str) -> Iterator[None]:
+    """Count the time of a block for the watch that runs, if one does."""
+    watch = _watch.get()
+    if watch is None:
+        yield
+        return
+    start, worked = time.perf_counter(), time.thread_time()
+    try:
+        yield
+    finally:
+        watch.add(name, time.perf_counter() - start, time.thread_time() - worked)

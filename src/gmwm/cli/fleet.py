@@ -1,0 +1,103 @@
+"""``gmwm fleet``: many units of a sensor, each calibrated by itself."""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gmwm.cli.calibrate import NONE_VALID
+from gmwm.cli.console import progress_bar
+from gmwm.cli.hints import with_hint
+from gmwm.cli.options import (
+    arguments_of_read,
+    estimating_options,
+    part_options,
+    printing_options,
+    reading_options,
+    written_models,
+)
+
+
+@click.command()
+@click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-fleet"),
+              show_default=True,
+              help="Folder for calibrations, fleet.parquet, fleet.html.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
+@click.option("--cluster", metavar="ADDRESS",
+              help="Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read "
+                   "the files.")  # fmt: skip
+@click.option("--resume", is_flag=True,
+              help="Go on with what the folder holds; what changed is done again.")  # fmt: skip
+@click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
+              help="Time without aiding in seconds that N and K of a filter are for.")  # fmt: skip
+@reading_options
+@part_options
+@estimating_options
+@printing_options
+def fleet(
+    patterns: tuple[str, ...],
+    output: Path,
+    jobs: int | None,
+    cluster: str | None,
+    resume: bool,
+    horizon: float,
+    models: tuple[str, ...],
+    left: tuple[str, ...],
+    everything: bool,
+    start: float | None,
+    stop: float | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Calibrate many units of a sensor, a recording of each, and compare them.
+
+    PATTERN is a file or, in quotes, a pattern such as 'lot-7/**/*.csv'; files are those of gmwm
+    calibrate. Each unit has a calibration of its own in the folder, as soon as it is done;
+    fleet.parquet has a row per unit, channel and parameter; fleet.html shows how the units
+    differ, which stand apart, and what a data sheet could promise. A file that cannot be used is
+    reported and costs the others nothing. Several recordings of one unit are for gmwm calibrate.
+
+    Exit status: 0 if a unit has a valid model, 1 if none has (the files are written all the same),
+    2 if no file can be used.
+
+    \b
+    Examples:
+      gmwm fleet 'lot-7/*.csv' --rate 100 --gyro-unit deg/s --accel-unit g -o lot-7-out
+      gmwm fleet 'lot-7/*.csv' --rate 100 --gyro-unit deg/s --accel-unit g -o lot-7-out --resume
+    """
+    from gmwm.calibration import SCREENING
+    from gmwm.errors import InputError
+    from gmwm.fleet import fleet as run
+
+    try:
+        with nullcontext() if quiet else progress_bar("fleet", "units") as bar:
+            found = run(
+                patterns, written_models(models) or None,
+                screening=() if "all" in left else [n for n in SCREENING if n not in left],
+                still=not everything, horizon=horizon, start=0.0 if start is None else start,
+                stop=stop, folder=output, resume=resume, jobs=jobs or os.cpu_count() or 1,
+                cluster=cluster, progress=bar, **arguments_of_read(**reading),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)
+        raise
+    if as_json:
+        click.echo(json.dumps(found.to_dict(), allow_nan=False))
+    elif not quiet:
+        click.echo(found)
+        click.echo(f"wrote {output}/calibrations, fleet.parquet and fleet.html")
+    if found.failed:
+        first = next(iter(found.failed.values()))
+        reason = with_hint(InputError(first.text, first.code))
+        count = "1 file" if len(found.failed) == 1 else f"{len(found.failed)} files"
+        click.echo(f"gmwm: {count} cannot be used; the first: {reason}", err=True)
+    if not found.valid:
+        click.echo("gmwm: no unit has a valid model, for the reasons in the report", err=True)
+        click.get_current_context().exit(NONE_VALID)

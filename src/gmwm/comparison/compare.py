@@ -1,0 +1,300 @@
+"""`compare`: several recordings or units of a sensor beside each other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from gmwm._core import checks
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.typing import Progress
+from gmwm.calibration import Calibration, calibrate
+from gmwm.comparison import tuning
+from gmwm.comparison.clock import suspected_clocks
+from gmwm.comparison.curves import Equality
+from gmwm.comparison.result import AxisComparison, SensorComparison
+from gmwm.comparison.structure import (
+    axis_numbers,
+    curve_inflation,
+    joint_fit,
+    spreads,
+)
+from gmwm.errors import InputError, printable
+from gmwm.estimate import Fit, JointFit
+from gmwm.readers import Recording, is_frame
+
+_NOT_NOISE = (
+    "not-static", "tilt", "rate-changes", "step", "transient", "drift-at-start", "slow-period",
+)  # fmt: skip
+"""Codes of notices of a fit whose curve is not that of noise."""
+
+_LONGEST = 28  # characters of a label
+
+
+def compare(
+    sources: Sequence[Any] | Mapping[str, Any],
+    *,
+    horizon: float = 60.0,
+    progress: Progress | None = None,
+) -> SensorComparison:
+    """Compare calibrations of a sensor on several days, or of several units of a kind.
+
+    Structures of models differ between recordings of one sensor far more than curves do. So curves
+    are tested for equality, level by level with their covariances; one structure is selected for
+    all recordings, whose parameters are compared; and N and K for a filter are given by
+    `gmwm.bound`, which any structure has.
+
+    Parameters
+    ----------
+    sources : sequence or mapping of str to each
+        Two or more: `Calibration`, the path of a saved one, or a `Recording` or DataFrame, which
+        is calibrated first. The keys of a mapping name them.
+    horizon : float, optional
+        Time without aiding that the filter numbers are for, s.
+    progress : callable, optional
+        Called as ``progress(done, total, channel)``.
+
+    Returns
+    -------
+    SensorComparison
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two different recordings, one cannot be used, or they have no
+        channel in common.
+
+    Notes
+    -----
+    The test of a channel is the sum of squares of the cube roots of the wavelet variances about
+    their generalized mean, with the covariances that each recording's own model implies: chi-square
+    with (R - 1) J degrees of freedom for R recordings of J levels that are the same noise. Channels
+    are tested together at 5 % (Holm 1979). Channels that differ by less than 10 % of the deviation
+    in every part of the curve are called close: with a million samples a change of temperature
+    shows.
+    """
+    horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
+    calibrations, notices = _different(_labelled(sources))
+    names = list(dict.fromkeys(name for each in calibrations.values() for name in _names(each)))
+    members = {name: _members(name, calibrations) for name in names}
+    for name, (_, out) in members.items():
+        notices += [replace(why, where=name, source=label) for label, why in out.items()]
+    shared = [name for name, (fits, _) in members.items() if len(fits) > 1]
+    if not shared:
+        why = next((n.text for n in notices if n.source), "they have no channel in common")
+        raise InputError(f"there is nothing to compare: {why}")
+    tests = {name: Equality.of(list(members[name][0].values())) for name in shared}
+    p_values = _holm({name: test.p_value for name, test in tests.items()})
+    axes = {}
+    for done, name in enumerate(names):
+        if progress is not None:
+            progress(done, len(names), name)
+        fits, out = members[name]
+        axes[name], found = _axis(name, fits, out, tests.get(name), p_values, horizon)
+        notices += found
+    if progress is not None:
+        progress(len(names), len(names), "")
+    notices += suspected_clocks(calibrations)
+    notices += [_curves_notice(axis) for axis in axes.values() if axis.state in ("close", "differ")]
+    notices.append(_few(len(calibrations)))
+    return SensorComparison(calibrations, axes, horizon, tuple(notices))
+
+
+# -- what is compared -----------------------------------------------------------------------------
+
+
+def _labelled(sources: Any) -> dict[str, Calibration]:
+    """Calibrations by the name of the recording."""
+    single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
+    if single or not isinstance(sources, Mapping | Iterable):
+        raise InputError(
+            f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
+        )
+    if isinstance(sources, Mapping):
+        return {printable(str(label)): _calibration(each) for label, each in sources.items()}
+    found: dict[str, Calibration] = {}
+    for each in sources:
+        calibration = _calibration(each)
+        label = wanted = _label(calibration, len(found) + 1)
+        copy = 2
+        while label in found:
+            label, copy = f"{wanted} ({copy})", copy + 1
+        found[label] = calibration
+    return found
+
+
+def _label(calibration: Calibration, place: int) -> str:
+    """The name of its file without what all files have."""
+    stem = PurePath(calibration.source.replace("\\", "/").split(", ")[0]).name
+    for _ in range(2):
+        stem = stem.rsplit(".", 1)[0] if "." in stem[1:] else stem
+    return printable(stem[:_LONGEST]) or f"recording {place}"
+
+
+def _calibration(source: Any) -> Calibration:
+    if isinstance(source, Calibration):
+        return source
+    if isinstance(source, str | os.PathLike):
+        return Calibration.load(source)
+    if isinstance(source, Recording) or is_frame(source):
+        return calibrate(source)
+    raise InputError(
+        f"{checks.shown(source)} is neither a calibration nor a recording: give what "
+        "gmwm.calibrate returns, the path of a saved one, or what gmwm.read returns"
+    )
+
+
+def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration], list[Notice]]:
+    """Each recording once."""
+    kept: dict[str, Calibration] = {}
+    notices = []
+    for label, each in given.items():
+        same = next((other for other, known in kept.items() if _is_same(each, known)), None)
+        if same is None:
+            kept[label] = each
+            continue
+        text = f"the same recording as {same}"
+        notices.append(
+            Notice("same-recording", "warning", "", text, {"other": same}, "left out", label)
+        )
+    if len(kept) < 2:
+        why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
+        raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
+    return kept, notices
+
+
+def _is_same(a: Calibration, b: Calibration) -> bool:
+    shared = [name for name in a if name in b]
+    return bool(shared) and all(
+        np.array_equal(a[name].wv.variance, b[name].wv.variance) for name in shared
+    )
+
+
+def _names(calibration: Calibration) -> Iterable[str]:
+    return (*calibration, *calibration.skipped)
+
+
+def _members(
+    name: str, calibrations: Mapping[str, Calibration]
+) -> tuple[dict[str, Fit], dict[str, Notice]]:
+    """Fits of a channel that can be compared, and why others cannot."""
+    fits: dict[str, Fit] = {}
+    out: dict[str, Notice] = {}
+    for label, each in calibrations.items():
+        if name in each.skipped:
+            out[label] = Notice("channel-skipped", "warning", "", each.skipped[name].text)
+        elif name not in each:
+            out[label] = Notice("channel-missing", "warning", "", "it has no such channel")
+        else:
+            bad = [n for n in each[name].notices if n.severity == "bad" and n.code in _NOT_NOISE]
+            if bad:
+                values = {"reason": bad[0].code}
+                out[label] = Notice(
+                    "not-noise", "warning", "", bad[0].text, values,
+                    "not compared: the curve is not that of noise alone",
+                )  # fmt: skip
+            else:
+                fits[label] = each[name]
+    for label, why in _unlike(fits).items():
+        out[label] = why
+        del fits[label]
+    return fits, out
+
+
+def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
+    """Those of another rate, unit or wavelet than most have."""
+
+    def kind(fit: Fit) -> tuple[int, str, str]:
+        return round(np.log(fit.wv.dt) / tuning.SAME_RATE), fit.wv.unit, fit.wv.wavelet
+
+    def is_like(a: Fit, b: Fit) -> bool:
+        near = abs(np.log(a.wv.dt / b.wv.dt)) < tuning.SAME_RATE
+        return bool(near and kind(a)[1:] == kind(b)[1:])
+
+    if not fits:
+        return {}
+    # Of equal numbers the higher rate: the order in which they are given changes nothing.
+    usual = max(
+        fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
+    )
+    found = {}
+    for label, fit in fits.items():
+        if is_like(fit, usual):
+            continue
+        own, common = 1.0 / fit.wv.dt, 1.0 / usual.wv.dt
+        code, text = "units-differ", f"in {fit.wv.unit}, the others in {usual.wv.unit}"
+        if fit.wv.unit == usual.wv.unit:
+            code, text = "rates-differ", f"at {own:.6g} Hz, the others at {common:.6g} Hz"
+        values = {"rate": own, "usual": common}
+        found[label] = Notice(code, "warning", "", text, values, "not compared level by level")
+    return found
+
+
+# -- what is found --------------------------------------------------------------------------------
+
+
+def _axis(
+    name: str,
+    fits: dict[str, Fit],
+    out: dict[str, Notice],
+    test: Equality | None,
+    p_values: Mapping[str, float],
+    horizon: float,
+) -> tuple[AxisComparison, list[Notice]]:
+    notices: list[Notice] = []
+    found = joint_fit(list(fits.values())) if len(fits) > 1 else None
+    joint = found if isinstance(found, JointFit) else None
+    if isinstance(found, Notice):
+        notices.append(found)
+    numbers, problems = axis_numbers(name, fits, joint, horizon)
+    notices += problems
+    for label, fit in fits.items():
+        codes = [n.code for n in fit.notices if n.severity == "bad"]
+        if codes:
+            text = f"its own fit is not valid ({', '.join(codes)})"
+            action = "the curve is compared all the same"
+            values = {"reasons": ", ".join(codes)}
+            notices.append(Notice("fit-not-valid", "note", name, text, values, action, label))
+    own = float("nan")
+    if joint and test and test.tau.size:
+        own = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
+    rows = spreads(joint) if joint else ()
+    p = p_values.get(name, float("nan"))
+    return AxisComparison(name, fits, out, test, p, joint, rows, numbers, own), notices
+
+
+def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
+    """p-values for all tests together (Holm 1979); NaN stays."""
+    known = sorted((p, name) for name, p in p_values.items() if np.isfinite(p))
+    adjusted, largest = dict(p_values), 0.0
+    for place, (p, name) in enumerate(known):
+        largest = max(largest, min(1.0, (len(known) - place) * p))
+        adjusted[name] = largest
+    return adjusted
+
+
+def _curves_notice(axis: AxisComparison) -> Notice:
+    severity: Severity = "warning" if axis.state == "differ" else "note"
+    worst = axis.main[0] if axis.main else None
+    values = {"p_value": axis.p_value}
+    if worst is not None:
+        values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
+    return Notice(f"curves-{axis.state}", severity, axis.name, axis.sentence, values)
+
+
+def _few(count: int) -> Notice:
+    """How well so many recordings know their spread."""
+    dof = count - 1
+    tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
+    high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
+    text = (
+        f"{count} recordings know a standard deviation between them to within factors of "
+        f"{low:.2g} and {high:.2g} (95 %)"
+    )
+    return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})

@@ -1,0 +1,328 @@
+"""What a comparison found, axis by axis."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gmwm._core.frames import frame
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice, worst_first
+from gmwm._core.text import wrapped
+from gmwm._core.units import field_units, si_parameter_unit
+from gmwm.calibration import Calibration
+from gmwm.comparison import tuning
+from gmwm.comparison.curves import Difference, Equality
+from gmwm.comparison.structure import AxisNumbers, ParameterSpread
+from gmwm.errors import MissingNameError
+from gmwm.estimate import Fit, JointFit
+from gmwm.estimate.result import plain
+
+if TYPE_CHECKING:
+    import pandas
+
+State = Literal["agree", "close", "differ", "untested"]
+
+STATES: dict[State, str] = {
+    "agree": "agree",
+    "close": "differ by less than 10 %",
+    "differ": "differ",
+    "untested": "not compared",
+}
+"""Verdicts in words, the best first."""
+
+_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
+_NAMES = {"short": "short times", "R": "drift"}
+
+
+def percent(share: float) -> str:
+    """A relative difference; a factor from one on."""
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"a factor of {1.0 + share:.2g}"
+
+
+def _reason(notice: Notice) -> str:
+    """Why a recording is left out, in a word or two."""
+    return str(notice.values.get("reason", notice.code)).replace("-", " ")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisComparison:
+    """One channel in several recordings.
+
+    Attributes
+    ----------
+    name : str
+    fits : dict of str to Fit
+        Recording -> its own fit, of those that are compared.
+    left_out : dict of str to Notice
+        Recording -> why it is not.
+    equality : Equality or None
+        Test of the curves; ``None`` where fewer than two recordings are compared.
+    p_value : float
+        Of that test, made larger for the number of channels (Holm); NaN without a test.
+    joint : JointFit or None
+        The structure that is recommended for all of them.
+    parameters : tuple of ParameterSpread
+        Of the joint model.
+    numbers : AxisNumbers
+        N and K for a filter.
+    curve_inflation : float
+        By how much the amplitudes of the joint model must grow so that its curve is nowhere below
+        that of a recording's own model; NaN without a joint model.
+    """
+
+    name: str
+    fits: Mapping[str, Fit]
+    left_out: Mapping[str, Notice]
+    equality: Equality | None
+    p_value: float
+    joint: JointFit | None
+    parameters: tuple[ParameterSpread, ...]
+    numbers: AxisNumbers
+    curve_inflation: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "fits", "left_out")
+
+    @property
+    def quantity(self) -> str:
+        """The kind of sensor: gyro, accel, or nothing."""
+        return next(iter(self.fits.values())).wv.quantity or "" if self.fits else ""
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """Parts of the curves that differ, the most certain one first; none where they agree."""
+        if self.equality is None or not self.p_value < tuning.LEVEL:
+            return ()
+        return self.equality.evident
+
+    @property
+    def state(self) -> State:
+        """Whether the curves agree, or to within 10 % of the deviation, or differ."""
+        if self.equality is None or np.isnan(self.p_value):
+            return "untested"
+        if not self.p_value < tuning.LEVEL:
+            return "agree"
+        is_notable = any(each.extent > tuning.NOTABLE for each in self.differences)
+        return "differ" if is_notable else "close"
+
+    @property
+    def main(self) -> tuple[Difference, ...]:
+        """The differences that a verdict names: at most three, those above 10 % first."""
+        return tuple(sorted(self.differences, key=lambda d: d.extent <= tuning.NOTABLE)[:3])
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one line."""
+        out = ", ".join(f"{label} ({_reason(n)})" for label, n in self.left_out.items())
+        if self.equality is None or self.state == "untested":
+            return f"not compared: without {out}" if out else "not compared"
+        if self.state == "agree":
+            known = [d for d in self.equality.differences if d.part in "NK"]
+            shown = [f"{percent(d.resolution)} in {d.part}" for d in known]
+            tail = f"; {', '.join(shown)} would show" if shown else ""
+            text = f"agree (p = {self.p_value:.2g}{tail})"
+        else:
+            parts = [
+                f"{_NAMES.get(d.part, d.part)} by {percent(d.extent)} ({d.sigma:.2g} sigma)"
+                for d in self.main
+            ] or [f"shape (p = {self.p_value:.2g})"]
+            words = "differ in" if self.state == "differ" else "differ by less than 10 %:"
+            text = f"{words} {', '.join(parts)}"
+        return f"{text}; without {out}" if out else text
+
+    def number_text(self, letter: str, value: float) -> tuple[str, str]:
+        """An N or a K in the unit of the field, and that unit."""
+        known = field_units(_UNITS[letter], self.quantity)
+        unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
+        text = f"{value * (known[0].per_si if known else 1.0):.3g}"
+        return (f"{float(text):,.0f}" if "e+" in text else text), unit
+
+    def to_dict(self) -> dict[str, Any]:
+        """In JSON types, SI."""
+        equality = self.equality
+        return {
+            "state": self.state,
+            "p_value": plain(self.p_value),
+            "recordings": list(self.fits),
+            "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
+            "differences": [
+                {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest,
+                 "extent": d.extent, "sigma": d.sigma, "resolution": d.resolution,
+                 "ratios": [plain(r) for r in d.ratios.tolist()],
+                 "errors": [plain(r) for r in d.errors.tolist()]}
+                for d in (equality.differences if equality else ())
+            ],
+            "joint": None if self.joint is None else self.joint.to_dict(),
+            "equality_p": plain(self.joint.equality_p) if self.joint else None,
+            "parameters": [
+                {"key": each.key, "joint": each.joint.to_dict(), "spread": plain(each.spread),
+                 "p_value": plain(each.p_value),
+                 "each": [None if e is None else e.to_dict() for e in each.each]}
+                for each in self.parameters
+            ],
+            "numbers": {
+                "each": {label: each.row() for label, each in self.numbers.each.items()},
+                "joint": self.numbers.joint.row() if self.numbers.joint else None,
+                "covering": self.numbers.covering.row() if self.numbers.covering else None,
+                "nees": {label: plain(value) for label, value in self.numbers.nees.items()},
+                "upper_bounds": dict(self.numbers.upper),
+                "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
+            },
+            "curve_inflation": plain(self.curve_inflation),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SensorComparison(Mapping[str, AxisComparison]):
+    """Several recordings or units of a sensor compared: a mapping of channels to `AxisComparison`.
+
+    Attributes
+    ----------
+    calibrations : dict of str to Calibration
+        By recording.
+    axes : dict of str to AxisComparison
+    horizon : float
+        Time without aiding that the filter numbers are for, s.
+    notices : tuple of Notice
+        What was found: channels that are missing or left out, other rates, a suspected clock.
+    """
+
+    calibrations: Mapping[str, Calibration]
+    axes: Mapping[str, AxisComparison]
+    horizon: float
+    notices: tuple[Notice, ...] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        freeze(self, "calibrations", "axes")
+
+    def __getitem__(self, name: str) -> AxisComparison:
+        if name not in self.axes:
+            known = ", ".join(self.axes)
+            raise MissingNameError(f"channel {name!r} was not compared: there are {known}")
+        return self.axes[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.axes)
+
+    def __len__(self) -> int:
+        return len(self.axes)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the recordings, in their order."""
+        return tuple(self.calibrations)
+
+    @property
+    def summary(self) -> str:
+        """How many axes agree."""
+        counts = Counter(axis.state for axis in self.values())
+        parts = [f"{counts[state]} {word}" for state, word in STATES.items() if counts[state]]
+        return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
+
+    def __repr__(self) -> str:
+        return f"<SensorComparison of {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def __str__(self) -> str:
+        """Verdicts, what was found, and the numbers for a filter; 80 columns."""
+        lines = [self.summary]
+        for place, (label, each) in enumerate(self.calibrations.items(), 1):
+            size = f"{each.duration:,.6g} s at {each.rate:.6g} Hz"
+            lines += wrapped(f"{label}: {size}", first=f"{place:>3}  ", indent=5)
+        width = max(map(len, self), default=0)
+        lines.append("")
+        for name, axis in self.items():
+            lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
+        lines += ["", f"Filter numbers for {self.horizon:g} s without aiding that cover all:"]
+        for name, axis in self.items():
+            lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
+        lines += wrapped(self.promise)
+        for notice in worst_first(list(self.notices)):
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join(lines)
+
+    def _numbers(self, axis: AxisComparison) -> str:
+        found = []
+        for letter in _UNITS:
+            value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+            if np.isfinite(value):
+                sign = "<= " if letter in axis.numbers.upper else ""
+                times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
+                shown = " ".join(axis.number_text(letter, value))
+                found.append(f"{letter} {sign}{shown}{times}")
+        own = len(axis.numbers.each)
+        few = f" (of {own} only)" if own < len(self.labels) else ""
+        return (", ".join(found) or "none") + few
+
+    @property
+    def promise(self) -> str:
+        """What the covering numbers promise, and what they do not."""
+        return (
+            "They are never too optimistic for any of the recordings compared, each with its "
+            "fitted model; the uncertainty of these fits is not covered. A further recording of "
+            f"the same kind exceeds the largest N of {len(self.labels)} with a probability of "
+            f"1/{len(self.labels) + 1}, and likewise the largest K."
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the curves, in JSON types and SI units."""
+        return {
+            "schema": "gmwm.sensor-comparison",
+            "schema_version": 1,
+            "horizon_s": self.horizon,
+            "level": tuning.LEVEL,
+            "recordings": [
+                {"label": label, "source": each.source, "rate_hz": each.rate, "n": each.n}
+                for label, each in self.calibrations.items()
+            ],
+            "channels": {name: axis.to_dict() for name, axis in self.items()},
+            "notices": [notice.to_dict() for notice in self.notices],
+        }
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table with one row a channel, in SI units; needs pandas."""
+        nan = float("nan")
+        rows = []
+        for name, axis in self.items():
+            worst = axis.main[0] if axis.main else None
+            rows.append({
+                "channel": name,
+                "state": axis.state,
+                "p_value": axis.p_value,
+                "part": worst.part if worst else "",
+                "extent": worst.extent if worst else nan,
+                "sigma": worst.sigma if worst else nan,
+                "recordings": len(axis.fits),
+                "model": axis.joint.model.title() if axis.joint else "",
+                "N": axis.numbers.value("N"),
+                "N_inflation": axis.numbers.inflation("N"),
+                "K": axis.numbers.value("K"),
+                "K_inflation": axis.numbers.inflation("K"),
+                "curve_inflation": axis.curve_inflation,
+            })  # fmt: skip
+        return frame(rows, tuple(rows[0]) if rows else ("channel",))
+
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        datasheet: str | os.PathLike[str] | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
+        # By name: this room knows none above it, but a result shows itself.
+        written: Path = import_module("gmwm.report").write_sensor_comparison_report(
+            self, path, datasheet=datasheet, provenance=provenance
+        )
+        return written

@@ -1,0 +1,73 @@
+"""Hot loops of the profiled least-squares problem, which each step of a search runs through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray, IntArray
+from gmwm.estimate.problem import nonnegative, without
+
+
+@compiled()
+def profiled(
+    root: FloatArray, curves: FloatArray, linear: IntArray, given: IntArray, target: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals.
+
+    Parameters
+    ----------
+    root : (J, J) ndarray
+        L with L'L the weight matrix.
+    curves : (J, terms) ndarray
+    linear, given : (L,), (G,) ndarray
+        Terms of free and of fixed amplitude.
+    target : (J,) ndarray
+    """
+    rows = target.size
+    rest = target.copy()
+    for i in range(rows):
+        for k in given:
+            rest[i] -= curves[i, k]
+    columns, y = np.zeros((rows, linear.size)), np.zeros(rows)
+    for i in range(rows):
+        for j in range(rows):
+            weight = root[i, j]
+            y[i] += weight * rest[j]
+            for k in range(linear.size):
+                columns[i, k] += weight * curves[j, linear[k]]
+    x, residual = nonnegative(columns, y)
+    return columns, x, residual
+
+
+@compiled()
+def projected(
+    root: FloatArray, columns: FloatArray, x: FloatArray, slopes: FloatArray, factor: FloatArray
+) -> FloatArray:
+    """Weighted slopes of the curves times factors, without what amplitudes above zero make up.
+
+    Parameters
+    ----------
+    root : (J, J) ndarray
+    columns, x : (J, L), (L,) ndarray
+        Weighted columns and their amplitudes.
+    slopes, factor : (J, z), (z,) ndarray
+        Derivatives of the curves by the shapes, and the amplitudes of the terms they belong to.
+    """
+    rows, count = slopes.shape
+    weighted = np.zeros((rows, count))
+    for i in range(rows):
+        for j in range(rows):
+            for k in range(count):
+                weighted[i, k] += root[i, j] * slopes[j, k] * factor[k]
+    size = 0
+    for k in range(x.size):
+        if x[k] > 0.0:
+            size += 1
+    present = np.empty((rows, size))
+    at = 0
+    for k in range(x.size):
+        if x[k] > 0.0:
+            present[:, at] = columns[:, k]
+            at += 1
+    return without(weighted, present)

@@ -1,0 +1,415 @@
+"""Many sensors of one kind: each calibrated by itself, and what they have in common."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing, nullcontext
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow.parquet as pq
+
+from gmwm._core import checks
+from gmwm._core.files import moved_together, replaceable
+from gmwm._core.frames import frame
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice
+from gmwm._core.runs import results
+from gmwm._core.text import wrapped
+from gmwm._core.typing import Progress
+from gmwm._core.units import field_units
+from gmwm.calibration import SCREENING, Calibration
+from gmwm.errors import InputError, MissingNameError
+from gmwm.fleet import tuning
+from gmwm.fleet.paths import OUTPUTS, Paths, recordings
+from gmwm.fleet.spread import Spread, Structures, spreads_of, structures_of
+from gmwm.fleet.store import Store, opened_store
+from gmwm.fleet.table import SCHEMA, Row, arrow, rows_of
+from gmwm.fleet.tolerance import needed_units
+from gmwm.fleet.unit import DERIVED, Task, Unit
+from gmwm.process import Model, Process, as_model
+from gmwm.readers import read
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True, repr=False)
+class Fleet(Mapping[str, Calibration | Notice]):
+    """Units of a sensor: a mapping of paths to a `Calibration` each, or a `Notice` of why not.
+
+    Attributes
+    ----------
+    units : dict
+        Path -> `Unit`.
+    horizon : float
+        Time without aiding of the N and K of a filter, s.
+    options : dict
+        How every unit was calibrated.
+    notices : tuple of Notice
+        Which units have no calibration, and what makes units unlike each other.
+    """
+
+    units: Mapping[str, Unit]
+    horizon: float
+    options: Mapping[str, Any]
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "units", "options")
+
+    def __getitem__(self, path: str) -> Calibration | Notice:
+        if path not in self.units:
+            raise MissingNameError(f"the fleet has no recording {checks.shown(path)}")
+        return self.units[path].result
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.units)
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    @property
+    def done(self) -> dict[str, Calibration]:
+        """Those that are calibrated."""
+        return {path: each for path, each in self.items() if isinstance(each, Calibration)}
+
+    @property
+    def failed(self) -> dict[str, Notice]:
+        """Why the others are not."""
+        return {path: each for path, each in self.items() if isinstance(each, Notice)}
+
+    @property
+    def valid(self) -> bool:
+        """Whether a unit has a valid model of a channel."""
+        return any(unit.valid for unit in self.units.values())
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Of the table; see `gmwm.fleet.SCHEMA`."""
+        return tuple(rows_of(self.units.values()))
+
+    @cached_property
+    def spreads(self) -> tuple[Spread, ...]:
+        """How each parameter of each axis differs over the units."""
+        return spreads_of(self.rows)
+
+    @cached_property
+    def structures(self) -> tuple[Structures, ...]:
+        """Which models were selected, axis by axis."""
+        return structures_of(self.rows)
+
+    def __repr__(self) -> str:
+        failed = f", {len(self.failed)} not" if self.failed else ""
+        return f"<Fleet of {len(self)} units: {len(self.done)} calibrated{failed}>"
+
+    def _repr_html_(self) -> str:
+        html: str = import_module("gmwm.report").fleet_fragment(self)
+        return html
+
+    def __str__(self) -> str:
+        count = sum(unit.valid for unit in self.units.values())
+        lines = [
+            f"{len(self)} units: {len(self.done)} calibrated, {count} of them with a valid model"
+        ]
+        shown = [each for each in self.spreads if each.parameter in DERIVED]
+        if shown:
+            head = f"{'channel':<10} {'number':<9} {'units':>5} {'median':>9} {'spread':>7}"
+            lines += ["", f"{head} {'limit':>9}  unit"]
+        for each in shown:
+            unit, scale = _field(each)
+            spread = f"{100.0 * each.sd:.3g} %" if each.sd >= 0.0 else "-"
+            limit = f"{each.normal_limit * scale:.4g}" if each.sd >= 0.0 else "-"
+            lines.append(
+                f"{each.channel:<10} {each.parameter:<9} {each.n:>5} {each.median * scale:>9.4g} "
+                f"{spread:>7} {limit:>9}  {unit}"
+            )
+        if shown:
+            lines += ["", *wrapped(
+                f"filter: for {self.horizon:g} s without aiding; floor: lowest point of the curve. "
+                "Limit: of 95 % of all units with 95 % confidence, if logarithms are normal."
+            )]  # fmt: skip
+        for axis in self.structures:
+            if axis.different:
+                most = next(iter(axis.counts))
+                text = (
+                    f"{axis.channel}: {axis.counts[most]} of {sum(axis.counts.values())} units are "
+                    f"{most}, {axis.different} of another structure"
+                )
+                lines += wrapped(text, first="- ", indent=2)
+            if axis.invalid:
+                text = f"{axis.channel}: not valid in {some(axis.invalid)}"
+                lines += wrapped(text, first="- ", indent=2)
+        for each in self.spreads:
+            for outlier in each.outliers:
+                lines += wrapped(
+                    f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
+                    f"{outlier.value / each.median:.3g} times the median", first="- ", indent=2,
+                )  # fmt: skip
+        for notice in self.notices:
+            lines += wrapped(str(notice), first="- ", indent=2)
+        return "\n".join(lines)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row per unit, channel and parameter, in SI units; needs pandas."""
+        return frame(self.rows, SCHEMA.names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The table and the notices, in JSON types."""
+        return {
+            "schema": "gmwm.fleet",
+            "schema_version": 1,
+            "horizon_s": self.horizon,
+            "options": dict(self.options),
+            "rows": [dict(row) for row in self.rows],
+            "notices": [notice.to_dict() for notice in self.notices],
+        }
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the self-contained HTML report; see `gmwm.report.write_fleet_report`."""
+        # By name: this room knows none above it, but a result shows itself.
+        written: Path = import_module("gmwm.report").write_fleet_report(self, path)
+        return written
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Write what `fleet` writes: calibrations, the table (Parquet) and the report.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written, is in use, or holds calibrations.
+        """
+        with opened_store(Path(folder), self.options, resume=False) as store:
+            for unit in self.units.values():
+                store.save(unit)
+            self._conclude(store)
+        return Path(folder)
+
+    def _conclude(self, store: Store) -> None:
+        """Write the table and the report, both or none."""
+        _, table, page = OUTPUTS
+        with moved_together(store.folder) as new:
+            pq.write_table(arrow(self.rows), new / table)
+            self.report(new / page)
+
+
+def _field(spread: Spread) -> tuple[str, float]:
+    """The unit in which the field quotes a derived number, and how many of it one SI unit is."""
+    found = field_units(DERIVED[spread.parameter], spread.quantity)
+    return (found[0].unit, found[0].per_si) if found else (spread.unit, 1.0)
+
+
+def fleet(
+    paths: Paths,
+    model: Process | Model | Mapping[str, Process | Model] | None = None,
+    *,
+    screening: Collection[str] = SCREENING,
+    still: bool = True,
+    horizon: float = 60.0,
+    start: float = 0.0,
+    stop: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    jobs: int = 1,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+    **reading: Any,
+) -> Fleet:
+    """Calibrate many units of a sensor, a recording of each.
+
+    A recording that cannot be used is reported and costs the others nothing. Several recordings of
+    one unit are for `gmwm.calibrate`.
+
+    Parameters
+    ----------
+    paths : path, pattern or iterable of them
+        Of the recordings; a pattern is as in ``"lot-7/**/*.csv"``.
+    model : Process, Model or mapping, optional
+        Fitted to every channel, or by channel or sensor ("gyro", "accel"); selected by default.
+    screening, still
+        See `gmwm.calibrate`.
+    horizon : float, optional
+        Time without aiding for which N and K of a filter are found, s; see `gmwm.bound`.
+    start, stop : float, optional
+        Part of each recording, s.
+    folder : path, optional
+        Where each calibration is kept as soon as it is done, the table (``fleet.parquet``) and the
+        report (``fleet.html``) at the end.
+    resume : bool, optional
+        Go on with what the folder holds: recordings that have not changed are not calibrated again.
+    jobs : int, optional
+        Processes on this machine; -1 for one a core.
+    cluster : str, optional
+        Address of a Dask scheduler that does the work instead. Its workers read the recordings.
+    progress : callable, optional
+        Called as ``progress(done, total, "")``.
+    **reading
+        Arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
+
+    Returns
+    -------
+    Fleet
+
+    Raises
+    ------
+    InputError
+        If no recording can be calibrated, an option cannot be used, or the folder is in use, holds
+        calibrations that are not to be resumed (code "earlier-runs") or those of other options
+        (code "other-runs").
+    """
+    place = None if folder is None else Path(folder)
+    items = recordings(paths, place)
+    task = _task(model, screening, still, horizon, start, stop, reading)
+    jobs = jobs if jobs == -1 else checks.whole("jobs", jobs, 1)
+    if place is not None:
+        for name in OUTPUTS[1:]:
+            replaceable(place / name)
+    kept: dict[str, Unit] = {}
+    notices: list[Notice] = []
+    with nullcontext() if place is None else opened_store(place, task.options, resume) as store:
+
+        def report() -> None:
+            if progress is not None:
+                progress(len(kept), len(items), "")
+
+        for item in items:
+            unit = None if store is None else store.kept(item)
+            if unit is not None:
+                kept[item.path] = unit
+        report()
+        todo = [item for item in items if item.path not in kept]
+        with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
+            for item, unit in found:
+                if store is not None:
+                    store.save(unit)
+                kept[item.path] = unit
+                report()
+        units = {item.path: kept[item.path] for item in items}
+        if store is not None:
+            notices += _left_over(store.left_over(items))
+        made = Fleet(units, task.horizon, task.options, (*_about(units.values()), *notices))
+        if not made.done:
+            raise _nothing_done(made)
+        if store is not None:
+            made._conclude(store)
+    return made
+
+
+def _task(
+    model: Any, screening: Collection[str], still: bool, horizon: float, start: float,
+    stop: float | None, reading: Mapping[str, Any],
+) -> Task:  # fmt: skip
+    """How units are calibrated, checked before any work."""
+    from gmwm import __version__
+
+    known = tuple(signature(read).parameters)[1:]
+    for name in reading:
+        checks.choice("argument", name, known)
+    models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
+    for name in screening:
+        checks.choice("screening", name, SCREENING)
+    for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
+        if not checks.is_number(given):
+            raise InputError(f"{name} = {checks.shown(given)}: give seconds")
+    return Task(
+        reading=dict(reading),
+        start=float(start),
+        stop=None if stop is None else float(stop),
+        models={str(name): as_model(each) for name, each in models.items()},
+        screening=tuple(screening),
+        still=checks.truth("still", still),
+        horizon=checks.positive("horizon", horizon, "give a time without aiding in seconds"),
+        version=__version__,
+    )
+
+
+def _nothing_done(made: Fleet) -> InputError:
+    reasons = list(made.failed.values())
+    text = reasons[0].text
+    if len(reasons) > 1:
+        text = f"none of {len(reasons)} recordings can be calibrated; the first: {text}"
+    return InputError(text, reasons[0].code)
+
+
+def _left_over(names: Sequence[str]) -> list[Notice]:
+    if not names:
+        return []
+    text = (
+        f"the folder holds {len(names)} calibrations of other recordings, which are not counted: "
+        f"{some(names)}"
+    )
+    return [Notice("left-over", "note", "", text, {"units": len(names)})]
+
+
+def some(names: Sequence[str]) -> str:
+    """The first names of a list."""
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+
+
+def _about(units: Collection[Unit]) -> list[Notice]:
+    """Which units failed, and what makes the others unlike each other."""
+    notices = [unit.result for unit in units if isinstance(unit.result, Notice)]
+    done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
+    return [*notices, *_copies(units), *_unlike(done)]
+
+
+def _have(names: Sequence[str]) -> str:
+    return "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+
+
+def _channels(calibration: Calibration) -> tuple[str, ...]:
+    return (*calibration, *calibration.skipped)
+
+
+def _copies(units: Collection[Unit]) -> Iterator[Notice]:
+    same: dict[str, list[str]] = {}
+    for unit in units:
+        if unit.digest:
+            same.setdefault(unit.digest, []).append(unit.name)
+    for names in same.values():
+        if len(names) > 1:
+            text = f"the same recording: {some(names)}"
+            yield Notice("same-recording", "warning", "", text, {"units": len(names)},
+                         "each is counted; leave copies out")  # fmt: skip
+
+
+def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
+    """Rates, channels and lengths that are not the same in all units."""
+    if not done:
+        return
+    median = sorted(each.rate for each in done.values())[len(done) // 2]
+    other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
+    if other:
+        text = f"{_have(other)} another sampling rate than {median:g} Hz: {some(other)}"
+        yield Notice("rates-differ", "warning", "", text, {"units": len(other), "rate": median},
+                     "make sure that they are of one kind")  # fmt: skip
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for channel in dict.fromkeys(name for each in done.values() for name in _channels(each)):
+        names = tuple(name for name, each in done.items() if channel not in _channels(each))
+        lacking.setdefault(names, []).append(channel)
+    for names, channels in lacking.items():
+        if names:
+            text = f"{_have(names)} no such channel: {some(names)}"
+            values = {"units": len(names)}
+            yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
+    lengths = {name: each.duration for name, each in done.items()}
+    longest, shortest = max(lengths.values()), min(lengths.values())
+    if longest > tuning.LENGTHS * shortest:
+        name = min(lengths, key=lambda each: lengths[each])
+        text = (
+            f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
+            "scatter more"
+        )
+        yield Notice("lengths-differ", "note", "", text, {"shortest": shortest, "longest": longest})
+    needed = needed_units()
+    if len(done) < needed:
+        text = (
+            f"{len(done)} units: an upper limit without assuming a distribution takes {needed}; "
+            "limits of normal theory extrapolate"
+        )
+        yield Notice("few-units", "note", "", text, {"units": len(done), "needed": needed})

@@ -1,0 +1,151 @@
+"""The folder of a fleet: a calibration of each unit, whole or not there at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from gmwm._core.documents import read_json
+from gmwm._core.files import folder_to_fill, one_writer, written
+from gmwm._core.forms import Form, NotNegative, Text
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.fleet.unit import Item, Number, Unit, digest_of
+
+FOLDER = "calibrations"
+"""Of the files of the units."""
+
+_MEND = "move it away, or give another folder"
+
+
+class _NumberForm(Form):
+    value: NotNegative
+    stderr: NotNegative | None
+    found: bool
+
+
+class _OriginForm(Form):
+    """What a calibration of a fleet has beside it."""
+
+    path: Text
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    options: dict[str, Any]
+    numbers: dict[Text, dict[Text, _NumberForm]]
+
+
+@dataclass(frozen=True)
+class Store:
+    """Calibrations of a fleet on disk.
+
+    Attributes
+    ----------
+    folder : Path
+    options : dict
+        What numbers depend on beside the recordings; see `gmwm.fleet.unit.Task`.
+    """
+
+    folder: Path
+    options: Mapping[str, Any]
+
+    def path(self, name: str) -> Path:
+        return self.folder / FOLDER / f"{name}.json"
+
+    def left_over(self, items: Sequence[Item]) -> list[str]:
+        """Names of calibrations that are of none of these recordings."""
+        own = {item.name for item in items}
+        return sorted(each.stem for each in _calibrations(self.folder) if each.stem not in own)
+
+    def kept(self, item: Item) -> Unit | None:
+        """What an earlier run made of a recording, unless it has changed.
+
+        Raises
+        ------
+        InputError
+            If the file is damaged, or of another fleet (code "other-runs").
+        """
+        path = self.path(item.name)
+        if not path.exists():
+            return None
+        content = read_json(path)
+        try:
+            if "fleet" not in content:
+                raise InputError("was not written by a fleet")
+            origin = _OriginForm.checked(content["fleet"])
+            calibration = Calibration.from_dict(content)
+        except (InputError, TypeError) as error:
+            raise InputError(f"{path}: {error}: {_MEND}") from None
+        earlier = origin["options"]
+        names = sorted({*earlier, *self.options})
+        other = [name for name in names if earlier.get(name) != self.options.get(name)]
+        if other:
+            raise InputError(
+                f"{path} belongs to another fleet (other {', '.join(other)}): give another folder",
+                "other-runs",
+            )
+        try:
+            digest = digest_of(item.path)
+        except InputError:
+            return None  # reading it says why
+        if digest != origin["sha256"]:
+            if origin["path"] != _shown(item.path):
+                raise InputError(
+                    f"{path} is of {origin['path']}, not of {item.path}: give another folder",
+                    "other-runs",
+                )
+            return None
+        numbers = {
+            channel: {name: Number(**each) for name, each in of_channel.items()}
+            for channel, of_channel in origin["numbers"].items()
+        }
+        return Unit(item.path, item.name, calibration, numbers, digest)
+
+    def save(self, unit: Unit) -> None:
+        """Write a unit that has a calibration."""
+        if not isinstance(unit.result, Calibration):
+            return
+        numbers = {
+            channel: {name: each._asdict() for name, each in of_channel.items()}
+            for channel, of_channel in unit.numbers.items()
+        }
+        origin = {"path": _shown(unit.path), "sha256": unit.digest, "options": self.options}
+        content = {**unit.result.to_dict(), "fleet": {**origin, "numbers": numbers}}
+        with written(self.path(unit.name)) as stream:
+            json.dump(content, stream, indent=1, allow_nan=False)
+            stream.write("\n")
+
+
+def _shown(path: str) -> str:
+    """A path as documents hold it: on one line, in characters that every file can have."""
+    from gmwm.errors import printable
+
+    return printable(path)
+
+
+def _calibrations(folder: Path) -> list[Path]:
+    return sorted((folder / FOLDER).glob("*.json"))
+
+
+@contextmanager
+def opened_store(folder: Path, options: Mapping[str, Any], resume: bool) -> Iterator[Store]:
+    """The folder, for one fleet at a time.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, is in use (code "runs-in-use"), or holds calibrations and
+        ``resume`` is not set (code "earlier-runs").
+    """
+    with folder_to_fill(folder), one_writer(folder), folder_to_fill(folder / FOLDER):
+        if not resume and _calibrations(folder):
+            raise InputError(
+                f"{folder} holds calibrations of an earlier fleet: resume it, or give another "
+                "folder",
+                "earlier-runs",
+            )
+        yield Store(folder, options)

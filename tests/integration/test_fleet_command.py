@@ -1,0 +1,90 @@
+"""``gmwm fleet``: what it prints and writes, how it ends, and how it refuses."""
+
+import json
+import sys
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from gmwm import WhiteNoise, cli
+
+READING = ("--rate", "1", "--gyro-unit", "rad/s", "--model", "N", "--leave", "all", "--jobs", "1")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was reported."""
+    monkeypatch.chdir(tmp_path)
+
+    def _run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        return stop.value.code, *capsys.readouterr()
+
+    return _run
+
+
+@pytest.fixture
+def lot(tmp_path):
+    """Two units of white noise, and a file that cannot be read."""
+    (tmp_path / "lot 7").mkdir()
+    for i in range(2):
+        values = WhiteNoise(1e-3).simulate(300, 1.0, seed=i)
+        np.savez(tmp_path / "lot 7" / f"unit {i}.npz", gyro_x=values)
+    (tmp_path / "lot 7" / "bad.npz").write_text("nothing")
+    return "lot 7/*.npz"
+
+
+def test_a_fleet_is_calibrated_and_gone_on_with(run, lot, tmp_path):
+    code, printed, reported = run("fleet", lot, *READING, "-o", "out")
+    assert code == 0
+    assert "3 units: 2 calibrated" in printed
+    assert "- bad: bad.npz is not an NPZ file" in printed
+    assert reported.startswith("gmwm: 1 file cannot be used; the first: bad.npz")
+    names = [path.name for path in sorted((tmp_path / "out").iterdir())]
+    assert names == [".lock", "calibrations", "fleet.html", "fleet.parquet"]
+    table = pq.read_table(tmp_path / "out" / "fleet.parquet")
+    assert set(table["device"].to_pylist()) == {"bad", "unit 0", "unit 1"}
+
+    code, _, reported = run("fleet", lot, *READING, "-o", "out")
+    assert (code, reported.count("\n")) == (2, 1)
+    assert "--resume, or -o FOLDER" in reported
+    code, printed, _ = run("fleet", lot, *READING, "-o", "out", "--resume", "--json")
+    assert code == 0
+    assert json.loads(printed)["schema"] == "gmwm.fleet"
+    code, printed, reported = run("fleet", lot, *READING, "-o", "out", "--horizon", 9, "--resume")
+    assert (code, printed) == (2, "")
+    assert "another fleet (other horizon)" in reported
+
+    # A calibration of a fleet is one as any other.
+    code, printed, _ = run("bound", tmp_path / "out" / "calibrations" / "unit 0.json")
+    assert (code, "gyro_x" in printed) == (0, True)
+
+
+def test_where_no_model_is_valid_it_says_so(run, tmp_path):
+    t = np.arange(300.0)
+    np.savez(tmp_path / "bent.npz", gyro_x=1e-3 * np.sin(t / 9.0) + 1e-5 * (t % 7))
+    code, _, reported = run("fleet", "bent.npz", *READING, "-o", "out", "-q")
+    assert code == 1
+    assert "no unit has a valid model" in reported
+    assert (tmp_path / "out" / "fleet.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("lot 7/bad.npz", *READING), "bad.npz is not an NPZ file"),
+        (("none-*.csv", *READING), "no file matches 'none-*.csv': check the pattern"),
+        (("lot 7/unit*", "--jobs", "1"), "(on the command line: --rate 100 --gyro-unit deg/s)"),
+        (("lot 7/*", *READING, "--cluster", "nonsense://x"), "no Dask scheduler answers"),
+        (("lot 7/*", *READING[:-4], "--leave", "all", "--model", "X"), "--model X"),
+        ((), "Missing argument"),
+    ],
+)
+def test_it_refuses_in_one_sentence_and_writes_nothing(run, lot, tmp_path, arguments, words):
+    code, printed, reported = run("fleet", *arguments, *(("-o", "out") if arguments else ()))
+    assert (code, printed, reported.count("\n")) == (2, "", 1)
+    assert words in reported
+    assert not (tmp_path / "out").exists()

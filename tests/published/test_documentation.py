@@ -1,0 +1,105 @@
+"""The pages: what they show runs, and their links lead somewhere."""
+
+import importlib.util
+import re
+import sys
+
+import pytest
+
+from places import REPOSITORY
+
+DOCS = REPOSITORY / "docs"
+LINK = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)")
+CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
+LARGEST_FIGURE = 100_000  # bytes of an SVG
+
+
+def _load():
+    spec = importlib.util.spec_from_file_location("pages", DOCS / "pages.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["pages"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+pages = _load()
+PAGES = {page.name: page for page in pages.PAGES}
+RUN = [name for name, page in PAGES.items()
+       if any(each.kind in ("python", "sh") for each in pages.blocks_of(page))]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def runner(tmp_path_factory):
+    return pages.Runner(tmp_path_factory.mktemp("pages"))
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_what_a_page_shows_runs(runner, name):
+    runner.run(PAGES[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RUN)
+def test_what_a_page_shows_runs_with_what_is_slow(tmp_path, name):
+    if all(block.mark != "slow" for block in pages.blocks_of(PAGES[name])):
+        pytest.skip("nothing in it is slow")
+    pages.Runner(tmp_path, slow=True).run(PAGES[name])
+
+
+def test_a_block_that_fails_is_named(tmp_path):
+    page = tmp_path / "a.md"
+    page.write_text("# Page\n\n```python\nx = 1\n```\n\n```python\nx + y\n```\n")
+    with pytest.raises(AssertionError, match=r"a\.md:7: NameError"):
+        pages.Runner(tmp_path).run(page)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("```sh\nrm -rf x\n```\n", "not run: WHY"),
+        ("```sh\ngmwm health nowhere.csv\n```\n", "does not exist"),
+    ],
+)
+def test_commands_are_run(tmp_path, text, problem):
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    with pytest.raises(AssertionError, match=problem):
+        pages.Runner(tmp_path).run(page)
+
+
+def _anchors(text):
+    """As GitHub and the site make them of headings."""
+    titles = HEADING.findall(CODE.sub("", text))
+    plain = (re.sub(r"[^\w\- ]", "", title.lower()) for title in titles)
+    return {title.strip().replace(" ", "-") for title in plain}
+
+
+@pytest.mark.parametrize("name", [*PAGES, "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"])
+def test_links_lead_somewhere(name):
+    page = PAGES.get(name, REPOSITORY / name)
+    for target, anchor in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))):
+        path = (page.parent / target).resolve() if target else page
+        assert path.exists(), target
+        if anchor:
+            assert anchor in _anchors(path.read_text(encoding="utf-8")), f"{target}#{anchor}"
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_figures_are_small_and_made_by_what_the_page_shows(name):
+    text = PAGES[name].read_text(encoding="utf-8")
+    for figure in re.findall(r"!\[[^\]]*\]\((?:docs/)?img/([\w-]+\.svg)\)", text):
+        assert (DOCS / "img" / figure).stat().st_size < LARGEST_FIGURE
+        assert f'savefig("{figure}")' in text
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_files_of_the_source_are_called_so(name):
+    text = PAGES[name].read_text(encoding="utf-8")
+    if re.search(r"\b(examples|benchmarks|tests)/|^pytest ", text, re.MULTILINE):
+        assert "source checkout" in text
+
+
+def test_every_page_is_on_the_site():
+    listed = set(re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.MULTILINE))
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed

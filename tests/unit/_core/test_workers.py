@@ -1,0 +1,46 @@
+"""Whoever does the work, and whoever of them ends, every item is done once."""
+
+import os
+import signal
+
+import pytest
+
+from gmwm import InputError
+from gmwm._core.runs import results
+
+
+class Square:
+    """Squares; at some numbers the process ends, at some of them only the first time."""
+
+    def __init__(self, folder, once=(), always=()):
+        self.folder, self.once, self.always = folder, once, always
+
+    def __call__(self, number):
+        mark = self.folder / f"{number}-{os.getpid()}"
+        before = list(self.folder.glob(f"{number}-*"))
+        mark.touch()
+        if number in self.always or (number in self.once and not before):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number**2
+
+
+def test_what_a_killed_process_was_at_is_done_again(tmp_path):
+    """And an item at which every process ends is reported, not tried for ever."""
+    work = Square(tmp_path, once=(1,), always=(4,))
+    found = list(results(work, range(8), jobs=2, lost=lambda number: -number))
+    assert sorted(found) == [(n, -4 if n == 4 else n**2) for n in range(8)]
+    assert len(list(tmp_path.glob("4-*"))) == 3
+    assert str(os.getpid()) not in {path.name.partition("-")[2] for path in tmp_path.iterdir()}
+
+
+def test_one_job_does_the_work_itself(tmp_path):
+    assert dict(results(Square(tmp_path), (3, 2))) == {3: 9, 2: 4}
+    assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}
+
+
+def test_a_lost_item_is_an_error_by_default():
+    from gmwm._core.runs.workers import _refused
+
+    with pytest.raises(InputError, match="3 processes ended at 'a b'") as caught:
+        _refused("a b")
+    assert caught.value.code == "worker-lost"

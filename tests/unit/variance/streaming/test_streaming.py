@@ -1,0 +1,251 @@
+"""Wavelet variance of streams against that of the whole series."""
+
+import itertools
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import gmwm
+from gmwm.errors import InputError
+
+FINE = 10
+"""Levels of 1 to 512 samples, all windows of which are seen."""
+
+
+def noise(n, seed, offset=0.0, walk=0.02):
+    rng = np.random.default_rng(seed)
+    return offset + rng.normal(size=n) + walk * np.cumsum(rng.normal(size=n))
+
+
+def with_gaps(x, rng, number, longest):
+    x = x.copy()
+    for _ in range(number):
+        begin = rng.integers(0, x.size)
+        x[begin : begin + rng.integers(1, longest + 1)] = np.nan
+    return x
+
+
+def streamed(x, cuts=(), **options):
+    stream = gmwm.StreamingVariance(0.1, **options)
+    for block in np.split(x, sorted(cuts)):
+        stream.update(block)
+    return stream
+
+
+def merged(x, cuts):
+    edges = [0, *sorted(cuts), x.size]
+    return [streamed(x[a:b], start=a) for a, b in itertools.pairwise(edges) if b > a]
+
+
+def everything(wv):
+    found = [wv.tau, wv.variance, wv.mean, wv.blocks, wv.block, wv.n, wv.fourth_cumulant]
+    if wv.gaps is not None:
+        found += [wv.gaps.missing, wv.gaps.counts, wv.gaps.change, wv.gaps.inflation]
+    return found
+
+
+def assert_same(first, second, rtol=0.0):
+    scale = np.sqrt(np.max(first.variance))
+    for a, b in zip(everything(first), everything(second), strict=True):
+        np.testing.assert_allclose(a, b, rtol=rtol, atol=rtol * scale, equal_nan=True)
+
+
+def assert_close_to_all_windows(found, whole):
+    """To rounding where all windows are seen, within 1 % of a standard error elsewhere."""
+    assert found.tau.tolist() == whole.tau.tolist()
+    np.testing.assert_allclose(found.variance[:FINE], whole.variance[:FINE], rtol=1e-10)
+    np.testing.assert_allclose(
+        found.mean[:FINE], whole.mean[:FINE], atol=1e-10 * np.sqrt(np.max(whole.variance))
+    )
+    error = np.sqrt(np.diag(whole.covariance))
+    assert np.max(np.abs(found.variance - whole.variance) / error) < 0.01
+    assert np.max(np.abs(found.mean - whole.mean) / np.sqrt(whole.variance)) < 0.01
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.integers(8, 12_000),
+    st.integers(0, 2**31),
+    st.floats(-1e6, 1e6),
+    st.lists(st.integers(0, 12_000), max_size=6),
+)
+def test_any_blocks_are_the_series(n, seed, offset, cuts):
+    x = noise(n, seed, offset)
+    found = streamed(x, [min(cut, n) for cut in cuts]).result()
+    assert_same(found, streamed(x).result())
+    assert_close_to_all_windows(found, gmwm.wavelet_variance(x, dt=0.1))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.integers(8, 20_000),
+    st.integers(0, 2**31),
+    st.lists(st.integers(0, 20_000), max_size=4),
+    st.integers(0, 12),
+    st.booleans(),
+)
+def test_parts_merge_to_the_whole_in_any_order(n, seed, cuts, gaps, flood):
+    rng = np.random.default_rng(seed)
+    x = with_gaps(noise(n, seed, 1e3), rng, gaps, n // 4 if flood else 40)
+    x[: min(8, n)] = noise(min(8, n), seed, 1e3)  # enough to be a series
+    whole = streamed(x)
+    parts = merged(x, [min(cut, n) for cut in cuts])
+    left = parts[0]
+    for part in parts[1:]:
+        left = left.merge(part)
+    right = parts[-1]
+    for part in parts[-2::-1]:
+        right = part.merge(right)
+    for found in (left, right):
+        assert found.n == n
+        np.testing.assert_array_equal(found._series[0].gaps, whole._series[0].gaps)
+        assert_same(found.result(), whole.result(), rtol=1e-7)
+
+
+def test_a_merged_part_goes_on():
+    x = noise(40_000, 1)
+    both = streamed(x[:12_345]).merge(streamed(x[12_345:20_001], start=12_345))
+    both.update(x[20_001:])
+    assert_same(both.result(), streamed(x).result(), rtol=1e-9)
+
+
+def test_single_samples_and_empty_blocks():
+    x = noise(300, 2)
+    stream = gmwm.StreamingVariance(0.1)
+    for value in x:
+        stream.update([])
+        stream.update([value])
+    assert_same(stream.result(), streamed(x).result())
+    # A result is of what was there so far.
+    assert_close_to_all_windows(stream.result(), gmwm.wavelet_variance(x, dt=0.1))
+
+
+def test_reversed_series_have_the_same_variances_and_opposite_means():
+    x = with_gaps(noise(2**15, 3), np.random.default_rng(3), 20, 50)
+    x[[0, -1]] = 0.0  # gaps at the ends are none
+    there, back = streamed(x).result(), streamed(x[::-1].copy()).result()
+    np.testing.assert_allclose(there.variance, back.variance, rtol=1e-9)
+    np.testing.assert_allclose(there.mean, -back.mean, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def six():
+    """Two channels of a walk, checkpointed in the middle."""
+    return np.stack([noise(20_000, 4, 9.81), noise(20_000, 5, walk=0.0)], axis=1)
+
+
+def test_channels_are_series(six):
+    units = {"gyro_x": "rad/s", "accel_z": "m/s^2"}
+    stream = gmwm.StreamingVariance(0.1, units)
+    for block in np.array_split(six, 7):
+        stream.update(block)
+    found = stream.result()
+    assert list(found) == list(units)
+    for i, (name, unit) in enumerate(units.items()):
+        assert (found[name].name, found[name].unit) == (name, unit)
+        assert_same(found[name], streamed(np.ascontiguousarray(six[:, i])).result())
+    assert found["gyro_x"].quantity == "gyro"
+    assert "gyro_x, accel_z" in repr(stream)
+
+
+def test_checkpoints_go_on_to_the_last_bit(six, tmp_path):
+    stream = gmwm.StreamingVariance(0.1, ("a", "b"))
+    stream.update(six[:7001])
+    stream.save(tmp_path / "stream.npz")
+    again = gmwm.StreamingVariance.load(tmp_path / "stream.npz")
+    copy = pickle.loads(pickle.dumps(stream))  # as processes send it
+    for each in (stream, again, copy):
+        each.update(six[7001:])
+    for name, found in stream.result().items():
+        assert_same(found, again.result()[name])
+        assert_same(found, copy.result()[name])
+
+
+def test_a_fit_of_a_stream():
+    model = gmwm.WhiteNoise() + gmwm.RandomWalk()
+    truth = gmwm.WhiteNoise(0.2) + gmwm.RandomWalk(0.003)
+    x = gmwm.simulate(truth, n=200_000, dt=0.1, seed=6)
+    ours = gmwm.fit(model, streamed(x).result())
+    whole = gmwm.fit(model, gmwm.wavelet_variance(x, dt=0.1))
+    for key, error in whole.stderr.items():
+        assert abs(ours.params[key] - whole.params[key]) < 0.02 * error
+
+
+# -- numbers that are hard to add up ---------------------------------------------------------------
+
+
+def exact_moments(steps, m):
+    """Mean and mean square of the coefficients of integers, without any rounding till the end."""
+    integral = np.concatenate([[0], np.cumsum(steps.astype(object))])
+    w = integral[2 * m :] - 2 * integral[m:-m] + integral[: -2 * m]
+    return float(sum(w)) / (2 * m * w.size), float(sum(w * w)) / (4 * m * m * w.size)
+
+
+@pytest.mark.parametrize("drift", [0, 3])
+def test_offsets_of_a_million_times_the_noise(drift):
+    rng = np.random.default_rng(7)
+    # Steps of 2^-20 of the noise, which floating-point numbers hold beside the offset.
+    steps = rng.normal(scale=2**20, size=30_000).astype(np.int64)
+    steps += 10**6 * 2**20 + drift * np.arange(steps.size) * 2**10
+    found = streamed(steps * 2.0**-20).result()
+    for level in (0, 4, 9):
+        mean, square = exact_moments(steps, 2**level)
+        assert found.variance[level] == pytest.approx(square * 2.0**-40, rel=1e-12)
+        assert found.mean[level] == pytest.approx(mean * 2.0**-20, abs=1e-13 + 1e-12 * abs(mean))
+
+
+def test_coarse_levels_of_a_drifting_offset():
+    rng = np.random.default_rng(8)
+    n = 2**18
+    x = rng.normal(size=n) + 1e6 + 5e-3 * np.arange(n)
+    x[0] = -1e6  # what everything refers to
+    found = streamed(x).result()
+    integral = np.concatenate([[0.0], np.cumsum(x.astype(np.longdouble) - 1e6)])
+    for level in range(FINE, found.tau.size):
+        m = 2**level
+        step = m // 512
+        w = (integral[2 * m :] - 2 * integral[m:-m] + integral[: -2 * m])[::step] / (2 * m)
+        assert found.variance[level] == pytest.approx(float(np.mean(w * w)), rel=1e-9)
+
+
+# -- what cannot be used ---------------------------------------------------------------------------
+
+
+def test_infinite_blocks_change_nothing():
+    stream = streamed(noise(10_000, 9))
+    before = stream.result()
+    block = noise(5000, 10)
+    block[4321] = np.inf
+    with pytest.raises(InputError, match=r"infinite at index 4321 \(sample 14,321\)"):
+        stream.update(block)
+    assert_same(stream.result(), before)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: gmwm.StreamingVariance(0.0), "dt"),
+        (lambda: gmwm.StreamingVariance(0.1, ("a", "a")), "name of its own"),
+        (lambda: gmwm.StreamingVariance(0.1, ()), "one at least"),
+        (lambda: gmwm.StreamingVariance(0.1, {"a": "deg/s"}), "rad/s"),
+        (lambda: gmwm.StreamingVariance(0.1, start=-1), "start"),
+        (lambda: gmwm.StreamingVariance(0.1).update(np.zeros((3, 2))), "shape"),
+        (lambda: gmwm.StreamingVariance(0.1).update(["x"]), "not a number"),
+        (lambda: streamed(np.zeros(7)).result(), "8 or more"),
+        (lambda: streamed(np.full(100, 3.0)).result(), r"constant \(3\)"),
+        (lambda: streamed(np.full(100, np.nan)).result(), "0 samples"),
+        (lambda: streamed(np.array([1.0, np.nan, 2.0, np.nan] * 9)).result(), "no two samples"),
+        (lambda: streamed(noise(99, 0)).merge(streamed(noise(99, 0))), "ends at 99"),
+        (
+            lambda: streamed(noise(99, 0)).merge(gmwm.StreamingVariance(0.2, start=99)),
+            "dt is 0.1 and 0.2",
+        ),
+        (lambda: streamed(noise(99, 0)).merge(3), "no streaming variance"),
+        (lambda: gmwm.StreamingVariance.load(__file__), "write it with save"),
+    ],
+)
+def test_a_sentence_for_what_cannot_be_used(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
