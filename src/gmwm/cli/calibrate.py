@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("start", "stop", "layout", "topics")
+_WHOLE = ("form", "start", "stop", "layout", "topics")
 """Options of reading for which the whole file is read."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
