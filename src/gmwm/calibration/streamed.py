@@ -63,11 +63,14 @@ def calibrate_stream(
                     f"{data.gaps.missing:,} of {data.n:,} samples missing, more than half",
                     "mostly-missing",
                 )
-            chosen = None if given is not None else select(data)
-            fit = chosen.fit if chosen is not None else estimate(given, data)
+            if given is not None:
+                fit = estimate(given, data)
+            else:
+                chosen = select(data)
+                fit = chosen.fit
+                if chosen.rivals:
+                    tied[name] = chosen
             fits[name] = with_departures(fit, [found.source])
-            if chosen is not None and chosen.rivals:
-                tied[name] = chosen
         except InputError as error:  # of this channel; the others go on
             skipped[name] = Notice(error.code or "not-estimable", "bad", name, str(error))
     if progress is not None:

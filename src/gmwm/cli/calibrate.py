@@ -84,7 +84,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @click.option("--memory", type=float, metavar="GB",
-              help="For the samples; a longer file of text, NPY, Parquet or Feather is read a block "
+              help="For the samples; a longer text, NPY, Parquet or Feather file is read a block "
                    "at a time, and shocks, lines and motion are not looked for then. By default a "
                    "quarter of the machine's.")  # fmt: skip
 @printing_options

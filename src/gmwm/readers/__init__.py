@@ -6,7 +6,12 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY
-from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
+from gmwm.readers.at_rest import (
+    TurningGravity,
+    block_means,
+    steady_turn,
+    turning_gravity,
+)
 from gmwm.readers.blocks import notices_of_blocks, read_blocks
 from gmwm.readers.cells import DATE, seconds_of
 from gmwm.readers.csv_table import CsvTable
@@ -37,5 +42,6 @@ __all__ = [
     "read_blocks",
     "seconds_of",
     "stated_seconds",
+    "steady_turn",
     "turning_gravity",
 ]
