@@ -277,10 +277,9 @@ def fleet(
             if progress is not None:
                 progress(len(kept), len(items), "")
 
-        for item in items if store is not None else ():
-            unit = store.kept(item)
-            if unit is not None:
-                kept[item.path] = unit
+        if store is not None:
+            earlier = ((item, store.kept(item)) for item in items)
+            kept |= {item.path: unit for item, unit in earlier if unit is not None}
         report()
         todo = [item for item in items if item.path not in kept]
         with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
@@ -395,8 +394,8 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
     for names, channels in lacking.items():
         if names:
             text = f"{_have(names)} no such channel: {some(names)}"
-            values = {"units": len(names)}
-            yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
+            where = ", ".join(channels)
+            yield Notice("channels-differ", "warning", where, text, {"units": len(names)})
     lengths = {name: each.duration for name, each in done.items()}
     longest, shortest = max(lengths.values()), min(lengths.values())
     if longest > tuning.LENGTHS * shortest:
