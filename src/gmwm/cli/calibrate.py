@@ -245,8 +245,8 @@ def write_files(
             try:
                 export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
-                lines = [f"imu.yaml has N and K for {TARGETS['kalibr'].horizon:g} s without aiding; "
-                         "gmwm export --horizon S for others"]  # fmt: skip
+                horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
+                lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     kalibr = folder / "imu.yaml"

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from gmwm.calibration import Calibration
+from gmwm._core.notices import Notice
+from gmwm.calibration import Calibration, white_density
 from gmwm.comparison import tuning
 
 _KINDS = {"Sinusoid": "line", "Resonance": "resonance"}
@@ -61,6 +63,50 @@ class ClockRatio:
     def expected_densities(self) -> float:
         """What `densities` would be if nothing but the clock differed."""
         return float(self.ratio**-0.5)
+
+
+def suspected_clocks(calibrations: Mapping[str, Calibration]) -> list[Notice]:
+    """Ratios of clocks that recordings suggest, to that of the recording that has fewest."""
+    known = {label: features(each) for label, each in calibrations.items()}
+    found: dict[tuple[str, str], ClockRatio] = {}
+    for a, b in combinations(calibrations, 2):
+        if known[a] and known[b]:
+            changes = _densities(calibrations[a], calibrations[b])
+            ratio = clock_ratio(known[a], known[b], changes)
+            if ratio is not None:
+                found[a, b] = ratio
+    if not found:
+        return []
+    reference = min(calibrations, key=lambda label: sum(label in pair for pair in found))
+    own = {pair: ratio for pair, ratio in found.items() if reference in pair} or found
+    return [_notice(*pair, ratio) for pair, ratio in own.items()]
+
+
+def _notice(a: str, b: str, found: ClockRatio) -> Notice:
+    shown = ", ".join(f"{f:.4g} -> {g:.4g}" for f, g in found.frequencies)
+    text = (
+        f"its clock may differ by a factor of {found.ratio:.4f} from that of {a}: lines and "
+        f"resonances {shown} Hz, N {found.densities:.4f} times ({found.expected_densities:.4f} "
+        f"expected; median of {found.channels} channels)"
+    )
+    values = {
+        "ratio": found.ratio,
+        "reference": a,
+        "lines": len(found.frequencies),
+        "densities": found.densities,
+        "expected": found.expected_densities,
+    }
+    return Notice("clock-ratio", "warning", "", text, values, "check the rates of both", b)
+
+
+def _densities(first: Calibration, second: Calibration) -> dict[str, float]:
+    """N of the second recording over N of the first, by channel; lines have no part in it."""
+    found = {}
+    for name in (name for name in first if name in second):
+        before, after = white_density(first[name]), white_density(second[name])
+        if before > 0.0 and after > 0.0:
+            found[name] = after / before
+    return found
 
 
 def features(calibration: Calibration) -> tuple[Feature, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import PurePath
 from typing import Any
 
@@ -15,9 +14,9 @@ from scipy.stats import chi2
 from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
-from gmwm.calibration import Calibration, calibrate, white_density
+from gmwm.calibration import Calibration, calibrate
 from gmwm.comparison import tuning
-from gmwm.comparison.clock import ClockRatio, clock_ratio, features
+from gmwm.comparison.clock import suspected_clocks
 from gmwm.comparison.curves import Equality
 from gmwm.comparison.result import AxisComparison, SensorComparison
 from gmwm.comparison.structure import (
@@ -101,7 +100,7 @@ def compare(
         notices += found
     if progress is not None:
         progress(len(names), len(names), "")
-    notices += _clock_notices(calibrations, tests, members)
+    notices += suspected_clocks(calibrations)
     notices += [_curves_notice(axis) for axis in axes.values() if axis.state in ("close", "differ")]
     notices.append(_few(len(calibrations)))
     return SensorComparison(calibrations, axes, horizon, tuple(notices))
@@ -299,69 +298,3 @@ def _few(count: int) -> Notice:
         f"{low:.2g} and {high:.2g} (95 %)"
     )
     return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})
-
-
-# -- the clock ------------------------------------------------------------------------------------
-
-
-def _clock_notices(
-    calibrations: Mapping[str, Calibration],
-    tests: Mapping[str, Equality],
-    members: Mapping[str, tuple[dict[str, Fit], Any]],
-) -> list[Notice]:
-    """Suspected ratios of clocks to that of the recording that has fewest."""
-    known = {label: features(each) for label, each in calibrations.items()}
-    found: dict[tuple[str, str], ClockRatio] = {}
-    for a, b in combinations(calibrations, 2):
-        if known[a] and known[b]:
-            ratio = clock_ratio(known[a], known[b], _densities(a, b, calibrations, tests, members))
-            if ratio is not None:
-                found[a, b] = ratio
-    if not found:
-        return []
-    reference = min(calibrations, key=lambda label: sum(label in pair for pair in found))
-    own = {pair: ratio for pair, ratio in found.items() if reference in pair} or found
-    return [_clock_notice(*pair, ratio) for pair, ratio in own.items()]
-
-
-def _densities(
-    a: str,
-    b: str,
-    calibrations: Mapping[str, Calibration],
-    tests: Mapping[str, Equality],
-    members: Mapping[str, tuple[dict[str, Fit], Any]],
-) -> dict[str, float]:
-    """N of the second recording over N of the first: of the curves, or of models."""
-    found = {}
-    for name in calibrations[a]:
-        if name not in calibrations[b]:
-            continue
-        labels = list(members[name][0])
-        part = None
-        if name in tests and {a, b} <= set(labels):
-            part = next((d for d in tests[name].differences if d.part == "N"), None)
-        if part is not None:
-            ratio = float(part.ratios[labels.index(b)] / part.ratios[labels.index(a)])
-        else:
-            first, second = (white_density(calibrations[label][name]) for label in (a, b))
-            ratio = second / first if first > 0.0 else 0.0
-        if np.isfinite(ratio) and ratio > 0.0:
-            found[name] = ratio
-    return found
-
-
-def _clock_notice(a: str, b: str, found: ClockRatio) -> Notice:
-    shown = ", ".join(f"{f:.4g} -> {g:.4g}" for f, g in found.frequencies)
-    text = (
-        f"the clock may run {found.ratio:.4f} times as stated against {a}: lines and resonances "
-        f"at {shown} Hz, N {found.densities:.4f} times ({found.expected_densities:.4f} expected; "
-        f"median of {found.channels} channels)"
-    )
-    values = {
-        "ratio": found.ratio,
-        "reference": a,
-        "lines": len(found.frequencies),
-        "densities": found.densities,
-        "expected": found.expected_densities,
-    }
-    return Notice("clock-ratio", "warning", "", text, values, "check the rate of both", b)

@@ -16,8 +16,14 @@ from scipy.stats import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.comparison import tuning
 from gmwm.estimate import Fit
-from gmwm.estimate.problem import Moments, Scales, weight_root
-from gmwm.process import Model, RateRamp
+from gmwm.estimate.problem import (
+    Scales,
+    bias_of_detrending,
+    detrended_covariance,
+    gls_slope,
+    weight_root,
+)
+from gmwm.process import Model
 
 PARTS = ("short", "Q", "N", "B", "K", "R")
 """Parts of an Allan plot: times of the sensor's filter, then slopes -1, -1/2, 0, +1/2, +1."""
@@ -37,8 +43,7 @@ class Curve:
     variance : (J,) ndarray
         Without a drift where one was removed, u^2.
     relative : (J, J) ndarray
-        Covariance of ``variance`` over the product of the variances, as the recording's own model
-        implies it.
+        Covariance of ``variance`` over the product of the variances, as models imply it.
     """
 
     tau: FloatArray
@@ -46,27 +51,39 @@ class Curve:
     relative: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, *, drifting: bool = False) -> Curve:
+    def of(cls, fit: Fit, noises: Sequence[Model], *, drifting: bool) -> Curve:
         """The data of a fit, at the levels that are known well enough.
+
+        The covariances are those of the mean spectrum of all recordings. If these are equal, it is
+        nearer to the truth than each: a walk that one of them misses changes the covariances at
+        long averaging times by half.
 
         Parameters
         ----------
         fit : Fit
-        drifting : bool, optional
-            Whether a drift is removed, also one that its model does not have.
+        noises : sequence of Model
+            Those of all recordings, without drifts.
+        drifting : bool
+            Whether a drift is removed, also one that the fitted model does not have.
         """
-        terms = tuple(term for term in fit.model.terms if not term.is_drift)
-        if not terms:  # straight lines of the Allan plot may leave a ramp alone
-            return cls(np.empty(0), np.empty(0), np.empty((0, 0)))
-        noise, scales = Model(terms), Scales.of(fit.wv)
-        moments = Moments(fit.wv, None, False, scales)
+        wv, scales, share = fit.wv, Scales.of(fit.wv), 1.0 / len(noises)
+        spectra = [scales.spectrum(noise) for noise in noises]
+        lines = [(f, a * share**0.5) for noise in noises for f, a in noise.lines()]
+
+        def psd(f: FloatArray, dt: float) -> FloatArray:
+            return share * np.sum([each(f, dt) for each in spectra], axis=0)
+
+        covariance, variance = wv.covariance_under(psd, lines), wv.variance
         if drifting:
-            moments = Moments.of(fit.wv, noise + RateRamp(), scales).under(noise)
-        implied = scales.curve(noise)
-        relative = moments.covariance(noise) / np.outer(implied, implied)
-        known = (moments.target > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)
+            slope = gls_slope(wv, psd)
+            means = wv.mean_covariance_under(psd)
+            covariance = detrended_covariance(covariance, means, wv.drift_response, slope)
+            variance = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        implied = share * np.sum([scales.curve(noise) for noise in noises], axis=0)
+        relative = covariance / np.outer(implied, implied)
+        known = (variance > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)
         first = slice(0, known.size if known.all() else int(np.argmin(known)))
-        return cls(fit.wv.tau[first], moments.target[first], relative[first, first])
+        return cls(wv.tau[first], variance[first], relative[first, first])
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +182,9 @@ class Equality:
         684-688); the common curve is their mean by generalized least squares.
         """
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
-        curves = [Curve.of(fit, drifting=drifting) for fit in fits]
+        terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]
+        noises = [Model(each) for each in terms if each]  # lines of an Allan plot may be a ramp
+        curves = [Curve.of(fit, noises, drifting=drifting) for fit in fits]
         levels = sorted(curve.tau.size for curve in curves)[-2]
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
         variance, share = np.full((2, len(curves), levels), np.nan)

@@ -270,9 +270,9 @@ class SensorComparison(Mapping[str, AxisComparison]):
         """What the covering numbers promise, and what they do not."""
         return (
             "They are never too optimistic for any of the recordings compared, each with its "
-            "fitted model; the uncertainty of these fits is not covered. A further unit of the "
-            f"same kind has a larger N with a probability of 1/{len(self.labels) + 1}, "
-            "and so for K."
+            "fitted model; the uncertainty of these fits is not covered. A further recording of "
+            f"the same kind exceeds the largest N of {len(self.labels)} with a probability of "
+            f"1/{len(self.labels) + 1}, and likewise the largest K."
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -277,9 +277,10 @@ def fleet(
             if progress is not None:
                 progress(len(kept), len(items), "")
 
-        if store is not None:
-            earlier = ((item, store.kept(item)) for item in items)
-            kept |= {item.path: unit for item, unit in earlier if unit is not None}
+        for item in items:
+            unit = None if store is None else store.kept(item)
+            if unit is not None:
+                kept[item.path] = unit
         report()
         todo = [item for item in items if item.path not in kept]
         with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
@@ -394,8 +395,8 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
     for names, channels in lacking.items():
         if names:
             text = f"{_have(names)} no such channel: {some(names)}"
-            where = ", ".join(channels)
-            yield Notice("channels-differ", "warning", where, text, {"units": len(names)})
+            values = {"units": len(names)}
+            yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
     lengths = {name: each.duration for name, each in done.items()}
     longest, shortest = max(lengths.values()), min(lengths.values())
     if longest > tuning.LENGTHS * shortest:
@@ -404,8 +405,7 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
             f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
             "scatter more"
         )
-        values = {"shortest": shortest, "longest": longest}
-        yield Notice("lengths-differ", "note", "", text, values)
+        yield Notice("lengths-differ", "note", "", text, {"shortest": shortest, "longest": longest})
     needed = needed_units()
     if len(done) < needed:
         text = (

@@ -146,3 +146,8 @@ averaging times: 2 (1/4 + 1/12)."""
 
 LEAST_OF_BLOCK = 0.5
 """Part of a block of samples that must be there for its mean to count."""
+
+# -- threads ---------------------------------------------------------------------------------------
+
+SAMPLES_PER_THREAD = 1 << 20
+"""Fewer take less time than threads need to begin."""

@@ -96,7 +96,7 @@ def _changes(logs: FloatArray) -> list[int]:
     sign = np.sign(change) * (np.abs(change) > max(np.log(tuning.LOUDER_THAN_REST), far * scale))
     edges = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
     ends = [0]
-    for a, b in pairwise(edges):
+    for a, b in pairwise(edges.tolist()):
         if sign[a]:
             middle = (a + int(np.argmax(np.abs(change[a:b]))) + lag // 2 + 1) * width
             split = _split(logs, max(ends[-1], middle - lag * width), middle + lag * width)
