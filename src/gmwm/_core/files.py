@@ -9,9 +9,8 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from io import BufferedReader
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 from gmwm.errors import InputError
 
@@ -111,7 +110,7 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     return found
 
 
-def opened(path: str | os.PathLike[str]) -> BufferedReader:
+def opened(path: str | os.PathLike[str]) -> BinaryIO:
     """A file, open for reading.
 
     Raises
