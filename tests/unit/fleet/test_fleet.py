@@ -159,7 +159,8 @@ def test_every_unit_has_a_calibration_of_its_own(lot, outputs):
 
 
 def test_what_is_done_is_not_done_again(lot, outputs, copied, worked):
-    again = gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
+    usual = {"clock": "header", "topic": (), "channels": None, "layout": None}
+    again = gmwm.fleet(lot, folder=copied, resume=True, **QUICK, **usual)
     assert worked == []
     assert again.to_dict() == outputs[1].to_dict()
 
