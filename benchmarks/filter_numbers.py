@@ -228,6 +228,18 @@ def flight() -> None:
     for name, truth in (("demo sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
         print(f"INS/GNSS on a loiter, {name}, at the end of outages")
         _flown(truth)
+    print("after 30 s of the last, N+K for some axes and the full model for the others")
+    numbers, scenario = gmwm.bound(QUIET.models), loiter_with_outages(OUTAGES, DT)
+    for some in ({"gyro_x", "gyro_y"}, {"gyro_z"}, {"accel_x", "accel_y", "accel_z"}):
+        believed = SensorModels.of(
+            {axis: numbers[axis].model if axis in some else model
+             for axis, model in QUIET.models.items()},
+            {axis: numbers[axis].initial_sd for axis in some},
+        )  # fmt: skip
+        analysis = covariance_analysis(scenario, QUIET, believed)
+        at = analysis.index(scenario.outages[1].end)
+        true, own = (np.hypot(*sd[at, :2]) for sd in (analysis.sd, analysis.predicted_sd))
+        print(f"{', '.join(sorted(some)):<32}{true:>10.4g}{own:>10.4g}", flush=True)
 
 
 def _flown(truth: SensorModels) -> None:

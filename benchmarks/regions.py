@@ -35,7 +35,7 @@ SENSOR = {
     "gyro": WhiteNoise(1e-4) + GaussMarkov(5e-5, 60.0),
     "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0),
 }
-SETS, RUNS, OUTAGES = 10, 24, (10.0, 60.0)
+SETS, RUNS, OUTAGES = 10, 100, (10.0, 60.0)
 
 
 def _say(text: str) -> None:
@@ -55,8 +55,8 @@ def chains() -> None:
     """Worst direction of any chain of integrators for any drawn parameter set."""
     _say(
         f"{DRAWS} parameter sets of the {LEVEL:.0%} region of a fit, bounds for {HORIZON:g} s. "
-        "Chains of 1 to 3 integrals, settled 0 and 120 s: largest eigenvalue at 0.1, 1 and 10 horizons, "
-        "with the bound of the region and of the estimate; sets that the latter leaves out"
+        "Chains of 1 to 3 integrals, settled 0 and 120 s: largest eigenvalue at 0.1, 1 and 10 "
+        "horizons with the bound of the region and of the estimate; sets that the latter leaves out"
     )
     print(f"{'truth':<12}{'hours':>6}  {'form':<8}{'region':>10}{'estimate':>10}{'sets':>6}")
     for name, (truth, hours) in FITS.items():

@@ -1,6 +1,6 @@
 """A factor graph of GTSAM with numbers by several rules: its NEES beside the certified one.
 
-Run with ``python benchmarks/smoother.py [--runs 40] [--free]``; the tables of
+Run with ``python benchmarks/smoother.py [--runs 40] [--free] [--gravity 9.81]``; the tables of
 docs/filter-numbers.md. An IMU at 100 Hz, moved as by hand, and a relative pose every second for a
 minute (``KEYFRAME_SD``). All are smoothed at once, with combined preintegration between keyframes.
 The trajectory is what the graph's own integration makes of error-free samples: no error is left
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
+from textwrap import fill
 
 import gtsam
 import numpy as np
@@ -52,8 +53,8 @@ TRUTHS = {
     },
 }  # fmt: skip
 LINE = 1000.0  # s, where the line of slope +1/2 touches an Allan deviation
-JUDGED = ("orientation", "velocity", "position", "gyro bias", "accel bias", "turn", "step")
-"""At the last keyframe, and of the pose a second later relative to it, with the velocity there."""
+HEADS = ("attit.", "veloc.", "posit.", "gyro b", "acc. b",
+         "turn", "cert.", "here", "step", "cert.", "here")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -66,10 +67,10 @@ class Motion:
     states: list[gtsam.NavState]
 
     @classmethod
-    def of(cls, seconds: int, free: bool) -> Motion:
+    def of(cls, seconds: int, free: bool, gravity: float = GRAVITY) -> Motion:
         """By hand, or none."""
         t = DT * (np.arange(PER * seconds) + 0.5)[:, None]
-        gravity = 0.0 if free else GRAVITY
+        gravity = 0.0 if free else gravity
         size = 0.0 if free else 1.0
         rate = size * 0.7 * np.sin(np.array([2.1, 1.7, 1.3]) * t + np.array([0.0, 1.0, 2.0]))
         moved = size * 1.5 * np.sin(np.array([1.9, 2.3, 1.1]) * t + np.array([0.5, 1.5, 2.5]))
@@ -130,10 +131,14 @@ def rules(truth: dict[str, Model]) -> dict[str, dict[str, tuple[float, float, fl
 
 
 def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
-    """NEES of turn and step: of `gmwm.certify`, and the same after as many keyframes as here."""
-    models = {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
-    found = gmwm.certify(truth, models, outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
-    result = [check.nees for check in found.of("keyframes")]
+    """NEES of turn and step by `gmwm.certify`."""
+    found = gmwm.certify(truth, _models(rule), outages=(1.0,), keyframe=1.0, bias_sd=TURN_ON)
+    return [check.nees for check in found.of("keyframes")]
+
+
+def expected(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
+    """The same after as many keyframes as here."""
+    models, result = _models(rule), []
     for axis in Axes.of(truth, DT, TURN_ON).axes:
         chain = replace(axis.between(1.0), settled=SECONDS - 1.0)
         errors = chain.errors(axis.model, models[axis.name], DT, (1.0,), true_sd=axis.bias_sd,
@@ -142,8 +147,16 @@ def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float
     return result
 
 
+def _models(rule: dict[str, tuple[float, float, float]]) -> dict[str, Model]:
+    return {q: WhiteNoise(N) + RandomWalk(K) for q, (N, K, _) in rule.items()}
+
+
 def nees(motion: Motion, truth: SensorModels, rules_: dict, seed: int) -> dict[str, np.ndarray]:
-    """Normalised errors squared per degree of freedom, in the order of `JUDGED`, by rule."""
+    """Normalised errors squared per degree of freedom, by rule.
+
+    Of attitude, velocity, position and biases at the last keyframe, and of the turn and of the
+    step with the velocity to the next.
+    """
     rng = np.random.default_rng(seed)
     seconds = len(motion.states) - 1
     errors = truth.simulate(PER * seconds, DT, rng)
@@ -225,29 +238,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--free", action="store_true")
+    parser.add_argument("--gravity", type=float, default=GRAVITY)
     options = parser.parse_args()
-    motion = Motion.of(SECONDS, options.free)
+    motion = Motion.of(SECONDS, options.free, options.gravity)
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
-    print(
-        f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom at the last keyframe, and"
+    text = (
+        f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
+        "of the next pose relative to it (turn; step and velocity), which the IMU alone gives; "
+        f"beside, that of gmwm.certify, of an axis after {KEYFRAMES} keyframes, and after the "
+        f"{SECONDS - 1} here. Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}."
     )
-    print("of the next pose relative to it (turn; step and velocity), which the IMU alone gives,")
-    print(f"beside that of gmwm.certify, after {KEYFRAMES} keyframes, and that after {SECONDS - 1}")
-    print(f"Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}")
-    heads = [
-        *JUDGED[:5],
-        *(h for each in JUDGED[5:] for h in (each, "certified", f"after {SECONDS - 1}")),
-    ]
-    print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>12}" for head in heads))
+    print(fill(text, 96))
+    print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))
     for name, models in TRUTHS.items():
         by_rule = rules(models)
         truth = SensorModels.of(models, TURN_ON)
         runs = [nees(motion, truth, by_rule, seed) for seed in range(options.runs)]
         for rule, numbers in by_rule.items():
             *state, turn, step = np.mean([run[rule] for run in runs], axis=0)
-            by_certify = certified(models, numbers)
-            cells = [*state, turn, *by_certify[::2], step, *by_certify[1::2]]
-            print(f"{name:<12}{rule:<12}" + "".join(f"{c:>12.3g}" for c in cells), flush=True)
+            turns, steps = zip(certified(models, numbers), expected(models, numbers), strict=True)
+            cells = [*state, turn, *turns, step, *steps]
+            print(f"{name:<12}{rule:<12}" + "".join(f"{c:>8.3g}" for c in cells), flush=True)
 
 
 if __name__ == "__main__":

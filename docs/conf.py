@@ -9,6 +9,7 @@ SOURCE = DOCS.parent / "src"
 sys.path.insert(0, str(SOURCE))
 
 import gmwm  # noqa: E402
+import gmwm.ins  # noqa: E402
 
 project, author, copyright = "gmwm", "the gmwm authors", "the gmwm authors"
 version = release = gmwm.__version__
@@ -17,7 +18,8 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
-suppress_warnings = ["myst.xref_ambiguous"]
+# "n" in the type "(n, 3) ndarray" is looked up as a name, and found several times.
+suppress_warnings = ["ref.python"]
 default_role = "code"  # `name` in a docstring
 
 napoleon_google_docstring = False

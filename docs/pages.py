@@ -6,9 +6,9 @@
     python docs/pages.py --figures           # and keep the figures that they save, in docs/img
     python docs/pages.py --show              # with what they print
 
-The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose first
-line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->`` or
-``<!-- not run: WHY -->``, leaves it out.
+The blocks of a page run in order in one empty folder, Python in one namespace. A YAML block whose
+first line is ``# NAME.yaml`` is written to that file. A comment before a block, ``<!-- slow -->``
+or ``<!-- not run: WHY -->``, leaves it out.
 """
 
 from __future__ import annotations
@@ -162,9 +162,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         runner = Runner(Path(scratch), given.slow, given.show)
         for page in given.pages:
-            start = time.perf_counter()
+            start = time.process_time()
             folder = runner.run(page.resolve())
-            print(f"{page.name}: {time.perf_counter() - start:.1f} s", file=sys.stderr)
+            print(
+                f"{page.name}: {time.process_time() - start:.1f} s of the processor",
+                file=sys.stderr,
+            )
             for figure in folder.glob("*.svg") if given.figures else ():
                 shutil.copy(figure, DOCS / "img" / figure.name)
 

@@ -72,9 +72,12 @@ def bound(
 @_with_options
 @click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
               help="Times without aiding for which they shall be good, in seconds.")  # fmt: skip
+@click.option("--keyframe", type=float, metavar="S",
+              help="Interval of keyframes or scans, in place of outages, for relative "
+                   "poses.")  # fmt: skip
 def reduce(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    as_json: bool, outages: str,
+    as_json: bool, outages: str, keyframe: float | None,
 ) -> None:  # fmt: skip
     """Give the numbers with which a small filter is consistent in given outages.
 
@@ -90,7 +93,7 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration, form, times, shared=shared, progress=bar,
+            calibration, form, times, keyframe=keyframe, shared=shared, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
     show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))

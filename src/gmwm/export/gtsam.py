@@ -5,6 +5,8 @@ the noise covariances over dt to the increments, times dt^2, and dt times those 
 four are densities, N^2 and K^2 (``PreintegrationCombinedParams.h``). The noise is that of the
 sensor's axes, before ``body_P_sensor``.
 
+The C++ file is a header: a function, since statements stand in none outside of one.
+
 Up to release 4.2 the parameters also have ``biasAccOmegaInt``, the identity by default, of which a
 step adds dt: a gyro noise of 1 rad/s/sqrt(Hz). Release 4.3 has it no more.
 """
@@ -51,19 +53,23 @@ def _python(imu: Imu) -> Sequence[str]:
 
 def _cpp(imu: Imu) -> Sequence[str]:
     lines = [
+        "#pragma once",
+        "",
         "#include <gtsam/navigation/CombinedImuFactor.h>",
         "",
-        f"// {_GRAVITY}",
-        "auto params = gtsam::PreintegrationCombinedParams::MakeSharedU(9.81);",
+        "inline auto imuParams() {",
+        f"  auto params = gtsam::PreintegrationCombinedParams::MakeSharedU(9.81);  // {_GRAVITY}",
     ]
     for name, quantity, letter, unit in _COVARIANCES:
         values = ", ".join(_squares(imu, quantity, letter))
         member = name[0].lower() + name[1:]
-        lines.append(f"params->{member} = gtsam::Vector3({values}).asDiagonal();  // {unit}")
+        lines.append(f"  params->{member} = gtsam::Vector3({values}).asDiagonal();  // {unit}")
     return [
         *lines,
-        "// Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz), swamps the rest:",
-        "// params->biasAccOmegaInt.setZero();",
+        "  // Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz), swamps the rest:",
+        "  // params->biasAccOmegaInt.setZero();",
+        "  return params;",
+        "}",
     ]
 
 

@@ -132,12 +132,26 @@ def bound_of(
             initial_sd=sd,
             method="bound",
             predicted=found,
-            notices=(*target.notices, *loose, *about(axis, level)),
+            notices=(*target.notices, *_optimistic(found), *loose, *about(axis, level)),
             quantity=axis.quantity,
             stderr=stderr,
         )
         for axis, target, found, loose in zip(group, targets, errors, looseness, strict=True)
     ]
+
+
+def _optimistic(found: Sequence[Predicted]) -> tuple[Notice, ...]:
+    """Where what the numbers leave out is too large for that."""
+    worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
+    if not worst.nees > tuning.OPTIMISTIC:
+        return ()
+    text = (
+        f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding; what "
+        "the numbers leave out is not small here"
+    )
+    values = {"nees": worst.nees, "time": worst.time}
+    mend = "estimate it as a state, or take it off the data"
+    return (Notice("optimistic", "warning", "", text, values, mend),)
 
 
 def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
@@ -183,6 +184,8 @@ def _causes(
             factors = (v / o if o > 0.0 else float("inf") for v, o in zip(pair, over, strict=True))
             return Cause(kind, name, *pair, *factors)
 
+        if N > tuning.OTHER_UNITS * first.N:
+            notices.append(_units(kind, N / first.N))
         causes.append(Cause(kind, "in use", N, K, 1.0, 1.0))
         causes.append(row("error model, slow terms and all", first, (N, K)))
         if all(axis.fit is not None for axis in group):
@@ -215,6 +218,12 @@ def _causes(
             every = _bound(_with(group, list(terms.values())), horizon)
             causes.append(row("all together", every, (N, K)))
     return causes, notices
+
+
+def _units(kind: str, factor: float) -> Notice:
+    text = f"N in use is {factor:.3g} times that of the error model: it may be in other units"
+    mend = f"give it in {SI_UNIT.get(kind, 'u')}/sqrt(Hz)"
+    return Notice("other-units", "warning", kind, text, {"factor": factor}, mend)
 
 
 def _bound(group: Sequence[Axis], horizon: float, level: float | None = None) -> FilterNumbers:

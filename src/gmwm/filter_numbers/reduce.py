@@ -117,14 +117,15 @@ def _reduced(
     def cost(logs: FloatArray) -> float:
         # Finite beyond the farthest too, where a line search may try: differences are taken of it.
         model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
-        total = 0.0
-        for axis, chain in zip(group, chains, strict=True):
-            errors = chain.errors(
-                axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
-            )
-            uneven = tuning.EVENNESS * np.log(errors.nees()) ** 2
-            total += float(np.sum(errors.score() + uneven))
-        return total / len(group) + tuning.INERTIA * float(logs @ logs)
+        errors = [
+            chain.errors(axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd)
+            for axis, chain in zip(group, chains, strict=True)
+        ]
+        score = np.mean([each.score() for each in errors], axis=0)
+        # Of all axes together: one that shares its numbers may well be cautious, another bold.
+        uneven = np.log(np.mean([each.nees() for each in errors], axis=0)) ** 2
+        inertia = tuning.INERTIA * float(logs @ logs)
+        return float(np.sum(score + tuning.EVENNESS * uneven)) + inertia
 
     best = minimize(
         cost, np.zeros(len(names)), method="BFGS",

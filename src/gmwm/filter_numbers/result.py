@@ -392,7 +392,7 @@ def _stacked(title: str, group: Mapping[str, FilterNumbers]) -> list[str]:
         # Errors are known of some axes only.
         columns = max(map(tuple, parts), key=len)
         cells = [[f"{part[key]:.4g}" if key in part else "-" for key in columns] for part in parts]
-        widths = [max(10, *map(len, column)) for column in zip(columns, *cells, strict=True)]
+        widths = [max(9, *map(len, column)) for column in zip(columns, *cells, strict=True)]
         for name, row in zip((title, *group), (columns, *cells), strict=True):
             values = (f" {cell:>{w}}" for cell, w in zip(row, widths, strict=True))
             lines.append(f"{name:<{width}}" + "".join(values))

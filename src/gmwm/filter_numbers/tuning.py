@@ -69,6 +69,10 @@ process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a ha
 (1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
 (NEES 1.07); see docs/filter-numbers.md."""
 
+OPTIMISTIC = 1.05
+"""NEES per degree of freedom, above which a bound is called too optimistic for what it leaves out
+(ramps, slow lines, quantization without white noise above it)."""
+
 LOOSE = 1.2
 """Predicted over true standard deviation at the horizon, above which a bound is called loose."""
 
@@ -158,6 +162,11 @@ VIBRATION_MEMORY = 60.0
 
 LARGE = 2.0
 """Factor by which a cause makes numbers larger, above which a state for it is better."""
+
+OTHER_UNITS = 40.0
+"""Times the N of the error model, above which N in use may be in other units: values in deg/s are
+57 times as large, in m/s/sqrt(h) 60, in deg/sqrt(h) 3,438; people enlarge theirs up to 20 times
+(https://github.com/ethz-asl/kalibr/issues/663)."""
 
 CONSISTENT = (0.5, 2.0)
 """NEES per degree of freedom within which numbers are called consistent."""

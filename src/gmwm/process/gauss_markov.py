@@ -128,8 +128,8 @@ class Resonance(Process):
 
     Notes
     -----
-    Autocovariance sigma^2 exp(-zeta w0 t) [cos(wd t) + (zeta w0/wd) sin(wd t)], t >= 0, with w0 = 2 pi
-    f0, wd = w0 sqrt(1 - zeta^2) (Gelb, *Applied Optimal Estimation*, 1974, sec. 2.2): two
+    Autocovariance sigma^2 exp(-zeta w0 t) [cos(wd t) + (zeta w0/wd) sin(wd t)] for t >= 0 with
+    w0 = 2 pi f0, wd = w0 sqrt(1 - zeta^2) (Gelb, *Applied Optimal Estimation*, 1974, sec. 2.2): two
     exponentials of complex rate, to which the formulas of the first order apply.
     """
 
@@ -230,7 +230,7 @@ def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
 
 @compiled()
 def _real_haar(rate: float, m: FloatArray) -> FloatArray:
-    """Haar wavelet variance of the process of unit variance and a real rate: the inner loop of fits.
+    """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
     Parameters
     ----------

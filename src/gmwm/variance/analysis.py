@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
-from gmwm.variance.cumulant import fourth_cumulant
+from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.gaps import Runs
+from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -81,7 +83,7 @@ def wavelet_variance(
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
     _check_width(channel, runs, wavelet)
-    values = values - float(np.nanmean(values))
+    values = values - survey(values)[1] / runs.present
     levels = Levels.of(values, runs, wavelet, channel.dt)
     moments = levels.moments()
     driftless = None
@@ -111,18 +113,15 @@ def wavelet_variance(
         efficiency=efficiency,
         driftless=driftless,
         gaps=levels.effects(),
-        fourth_cumulant=0.0 if robust else _fourth_cumulant(values),
+        fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
 
 
-def _fourth_cumulant(values: FloatArray) -> float:
-    """Of a series, NaN where samples are missing."""
-    differences = np.diff(values)
-    square = differences[~np.isnan(differences)] ** 2
-    mean = float(np.mean(square))
-    # Relative to the mean, which may be so small that its square is none.
-    return fourth_cumulant(mean, mean**2 * float(np.mean((square / mean) ** 2)), square.size)
+def fourth_cumulant(values: FloatArray) -> float:
+    """Of the independent part of a series, NaN where samples are missing, u^4."""
+    count, square, fourth = difference_powers(values)
+    return cumulant_of_powers(square / count, fourth / count, count)
 
 
 def where_of(channel: Channel) -> str:
@@ -146,19 +145,20 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
         raise InputError(
             f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
         )
-    bad = np.flatnonzero(np.isinf(values))
+    missing, total, low, high = survey(values)
+    bad = np.flatnonzero(np.isinf(values)) if not np.isfinite(total) else np.zeros(0)
     if bad.size:
         raise InputError(
             f"{where} has {bad.size} infinite samples, the first at index {bad[0]}: remove or "
             "repair them, or set them to NaN for missing"
         )
-    runs = Runs.of(values)
+    runs = Runs.of(values) if missing else Runs((0,), (values.size,), values.size)
     if runs.longest < MIN_SAMPLES:
         raise InputError(
             f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
             "can be determined of its noise"
         )
-    check_varies(channel)
+    check_varies(replace(channel, values=np.array([low, high])))
     return values, runs
 
 

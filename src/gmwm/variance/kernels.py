@@ -8,32 +8,147 @@ from numpy.typing import NDArray
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
+CHUNK = 1 << 14
+FINE = 12  # levels of averaging times 1 ... 2048 samples, of one chunk at a time
+_TILE = 1 << 16  # samples of the other levels that stay in the cache
+_LEAST_COLUMNS = 8
+_ROW = 1 << FINE  # shortest averaging time of the other levels
+_PIECE = 256
+
+# Sums in any order, so that they run on vector registers.
+_ANY_ORDER = {"reassoc", "contract", "nsz"}
+
+
+@compiled(fastmath=_ANY_ORDER)
+def _sums_and_moments(
+    out: FloatArray, first: FloatArray, second: FloatArray
+) -> tuple[float, float]:
+    """Of two series the sum; returns the sum and the sum of squares of the difference."""
+    total, square = 0.0, 0.0
+    for i in range(out.size):
+        out[i] = first[i] + second[i]
+        difference = second[i] - first[i]
+        total += difference
+        square += difference * difference
+    return total, square
+
 
 @compiled()
-def haar_moments(integral: FloatArray, runs: NDArray[np.int64], m: int) -> tuple[float, float]:
-    """Mean and mean square of the Haar MODWT coefficients that lie within a run.
+def _sums(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
+    for i in range(out.size):
+        out[i] = first[i] + second[i]
+
+
+@compiled(fastmath=_ANY_ORDER)
+def _second_differences(
+    first: FloatArray, second: FloatArray, third: FloatArray
+) -> tuple[float, float]:
+    total, square = 0.0, 0.0
+    for i in range(first.size):
+        w = first[i] - 2.0 * second[i] + third[i]
+        total += w
+        square += w * w
+    return total, square
+
+
+@compiled()
+def fine_moments(
+    values: FloatArray, start: int, stop: int, end: int, levels: int, found: FloatArray
+) -> None:
+    """Sums over the windows of a run that begin at certain places, for levels from 1 sample on.
+
+    Sums of 2 m samples are those of m samples, m apart: all levels are taken of a chunk that stays
+    in the cache, and nothing cancels.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        About their mean.
+    start, stop : int
+        First window, and the one after the last.
+    end : int
+        Of the run.
+    levels : int
+        At most `FINE`.
+    found : (levels, 3) ndarray
+        To which number, sum and sum of squares of the coefficients are added.
+    """
+    reach = 2 << (levels - 1)
+    scratch = np.empty((2, CHUNK + reach))
+    for begin in range(start, min(stop, end), CHUNK):
+        own = min(CHUNK, stop - begin)
+        now = values[begin : min(begin + own + reach - 1, end)]
+        number = now.size
+        m = 1
+        for level in range(levels):
+            count = number - 2 * m + 1
+            if count <= 0:
+                break
+            following = scratch[level % 2, :count]
+            used = min(own, count)
+            total, square = _sums_and_moments(following[:used], now[:used], now[m : m + used])
+            _sums(following[used:], now[used:count], now[m + used : m + count])
+            scale = 0.5 / m
+            found[level, 0] += used
+            found[level, 1] += total * scale
+            found[level, 2] += square * scale * scale
+            now = following
+            m *= 2
+
+
+@compiled()
+def coarse_moments(
+    integral: FloatArray,
+    start: int,
+    end: int,
+    columns: tuple[int, int],
+    averaging: NDArray[np.int64],
+    found: FloatArray,
+) -> None:
+    """The same for longer averaging times, of some columns of the run in rows of `_ROW` samples.
+
+    All levels are taken of a tile of some columns that stays in the cache: one read of the data.
 
     Parameters
     ----------
     integral : (n + 1,) ndarray
-        Cumulative sum of the series, starting with 0; missing samples add nothing.
-    runs : (P, 2) ndarray
-        First sample of each run, and the one after its last; one of 2 m samples at least.
-    m : int
-        Averaging time in samples.
+        Cumulative sum of the series, starting with 0.
+    start, end : int
+        Of the run.
+    columns : tuple of int
+        The first, and the one after the last, of `_ROW`.
+    averaging : (L,) ndarray
+        Multiples of `_ROW`, in samples.
+    found : (L, 3) ndarray
+        To which number, sum and sum of squares of the coefficients are added.
     """
-    count = 0
-    total = 0.0
-    square = 0.0
-    for p in range(runs.shape[0]):
-        stop = runs[p, 1] - 2 * m + 1
-        for t in range(runs[p, 0], stop):
-            w = integral[t + 2 * m] - 2.0 * integral[t + m] + integral[t]
-            total += w
-            square += w * w
-        count += max(stop - runs[p, 0], 0)
-    scale = 0.5 / m
-    return total * scale / count, square * scale * scale / count
+    length = end - start + 1
+    most = (length - 1) // _ROW + 1
+    width = max(_TILE // most, _LEAST_COLUMNS)
+    tile = np.empty(most * width)
+    longer = (length - 1) % _ROW + 1  # columns that have one row more than the others
+    for part in range(2):
+        low = max(columns[0], longer if part else 0)
+        high = min(columns[1], _ROW if part else longer)
+        rows = most - part
+        for first in range(low, high, width):
+            own = min(width, high - first)
+            for r in range(rows):
+                place = start + r * _ROW + first
+                tile[r * own : (r + 1) * own] = integral[place : place + own]
+            for level in range(averaging.size):
+                m = averaging[level]
+                shift = m // _ROW * own
+                count = rows * own - 2 * shift
+                if count <= 0:
+                    break
+                total, square = _second_differences(
+                    tile[:count], tile[shift : shift + count], tile[2 * shift : 2 * shift + count]
+                )
+                scale = 0.5 / m
+                found[level, 0] += count
+                found[level, 1] += total * scale
+                found[level, 2] += square * scale * scale
 
 
 @compiled()
@@ -59,21 +174,71 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
 
 @compiled()
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
-    """Cumulative sum of ``values - mean`` with Kahan's compensation, starting with 0.
+    """Cumulative sum of ``values - mean``, starting with 0; what pieces add is compensated.
 
-    Missing samples (NaN) add nothing.
+    Missing samples (NaN) add nothing. Within a piece of 256 samples the sum begins anew, in four of
+    them at a time, since each addition waits for the one before.
     """
-    result = np.empty(values.size + 1)
+    n = values.size
+    result = np.empty(n + 1)
     result[0] = 0.0
-    total = 0.0
-    lost = 0.0
-    for t in range(values.size):
-        if np.isnan(values[t]):
-            result[t + 1] = total
-            continue
-        y = values[t] - mean - lost
+    total, lost = 0.0, 0.0
+    whole = n // (4 * _PIECE) * (4 * _PIECE)
+    sums = np.zeros(4)
+    for begin in range(0, whole, 4 * _PIECE):
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for i in range(begin, begin + _PIECE):
+            p, q = values[i] - mean, values[i + _PIECE] - mean
+            r, s = values[i + 2 * _PIECE] - mean, values[i + 3 * _PIECE] - mean
+            a += 0.0 if np.isnan(p) else p
+            b += 0.0 if np.isnan(q) else q
+            c += 0.0 if np.isnan(r) else r
+            d += 0.0 if np.isnan(s) else s
+            result[i + 1], result[i + _PIECE + 1] = a, b
+            result[i + 2 * _PIECE + 1], result[i + 3 * _PIECE + 1] = c, d
+        sums[0], sums[1], sums[2], sums[3] = a, b, c, d
+        for piece in range(4):
+            first = begin + piece * _PIECE + 1
+            for i in range(first, first + _PIECE):
+                result[i] = total + (result[i] - lost)
+            y = sums[piece] - lost
+            following = total + y
+            lost = (following - total) - y
+            total = following
+    for i in range(whole, n):
+        y = values[i] - mean
+        y = (0.0 if np.isnan(y) else y) - lost
         following = total + y
         lost = (following - total) - y
         total = following
-        result[t + 1] = total
+        result[i + 1] = total
     return result
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz"})
+def difference_powers(values: FloatArray) -> tuple[int, float, float]:
+    """Number, and sums of the second and fourth powers, of first differences that exist."""
+    count, square, fourth = 0, 0.0, 0.0
+    for i in range(values.size - 1):
+        difference = values[i + 1] - values[i]
+        there = difference == difference  # NaN is not
+        power = difference * difference if there else 0.0
+        count += there
+        square += power
+        fourth += power * power
+    return count, square, fourth
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz"})
+def survey(values: FloatArray) -> tuple[int, float, float, float]:
+    """Number of missing samples; sum, smallest and largest of the others."""
+    missing, total = 0, 0.0
+    low, high = np.inf, -np.inf
+    for i in range(values.size):
+        value = values[i]
+        there = value == value  # NaN is not
+        missing += not there
+        total += value if there else 0.0
+        low = value if value < low else low
+        high = value if value > high else high
+    return missing, total, low, high

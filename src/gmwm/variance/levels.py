@@ -24,7 +24,8 @@ from gmwm.variance.gaps.effects import (
     window_count,
 )
 from gmwm.variance.gaps.filling import Filling
-from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
+from gmwm.variance.kernels import cumulative, haar_coefficients
+from gmwm.variance.moments import haar_moments
 from gmwm.variance.pilot import pilot_psd
 
 
@@ -49,8 +50,6 @@ class Levels:
         Wavelet variances of the error of the filling, relative.
     filled : (J,) ndarray of bool
         Levels for which gaps are filled.
-    slope : float
-        Of the least-squares line, per sample.
     """
 
     values: FloatArray
@@ -61,7 +60,6 @@ class Levels:
     change: FloatArray
     error: FloatArray
     filled: NDArray[np.bool_]
-    slope: float
 
     @classmethod
     def of(cls, values: FloatArray, runs: Runs, wavelet: str, dt: float) -> Levels:
@@ -71,7 +69,7 @@ class Levels:
             kind = known_wavelet(wavelet)
             m = m[[kind.width(j + 1) <= runs.longest for j in range(m.size)]]
         none = np.zeros(m.size)
-        plain = cls(values, runs, m, wavelet, None, none, none, none > 0.0, _slope(values))
+        plain = cls(values, runs, m, wavelet, None, none, none, none > 0.0)
         if runs.is_complete or wavelet != "haar":
             return plain
         gaps = Gaps.of(runs)
@@ -134,6 +132,11 @@ class Levels:
             filled=filled[:exist],
         )
 
+    @cached_property
+    def slope(self) -> float:
+        """Of the least-squares line through the samples that exist, per sample."""
+        return _slope(self.values)
+
     # -- what exists -------------------------------------------------------------------------------
 
     def edges(self, level: int) -> IntArray:
@@ -173,6 +176,11 @@ class Levels:
         inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
         return GapEffects(n - self.runs.present, self.counts, self.change, inflation)
 
+    @cached_property
+    def _integral(self) -> FloatArray:
+        """Cumulative sum of the series without filled gaps."""
+        return cumulative(self.values, 0.0)
+
     # -- coefficients ------------------------------------------------------------------------------
 
     def _series(self) -> Iterator[tuple[NDArray[np.intp], FloatArray, FloatArray]]:
@@ -180,20 +188,23 @@ class Levels:
         if self.filling is not None:
             yield from self.filling.series(self.values, self.averaging, self.slope)
             return
-        yield np.arange(self.averaging.size), self.values, cumulative(self.values, 0.0)
+        yield np.arange(self.averaging.size), self.values, self._integral
 
     def moments(self) -> FloatArray:
         """Mean and mean square of each level's coefficients, (J, 2)."""
         if self.wavelet != "haar":
             return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()])
-        found = []
+        found = [np.zeros((0, 2))]
         plain = None
-        for levels, _, integral in self._series():
+        for levels, values, integral in self._series():
             plain = integral if plain is None else plain
-            for j in levels:
-                own = integral if self.filled[j] else plain
-                found.append(haar_moments(own, self.edges(j), int(self.averaging[j])))
-        return np.array(found).reshape(-1, 2)
+            # Neighbours that are made of the same series, all together.
+            for own in np.split(levels, np.flatnonzero(np.diff(self.filled[levels])) + 1):
+                if own.size:
+                    series = (values, integral) if self.filled[own[0]] else (self.values, plain)
+                    edges = self.edges(int(own[0]))
+                    found.append(haar_moments(*series, edges, self.averaging[own]))
+        return np.concatenate(found)
 
     def coefficients(self, *, level: bool = False) -> Iterator[FloatArray]:
         """The coefficients of each level, over all runs; without the series' line if ``level``."""
@@ -229,23 +240,27 @@ class Levels:
 
     def unfilled(self, moments: FloatArray) -> FloatArray:
         """Variances without what filling added; it took nothing from a drift, (J,)."""
+        if not np.any(self.change):
+            return moments[:, 1]
         return moments[:, 1] - self.change * self.driftless(moments)
 
     def block_means(self) -> tuple[FloatArray, int]:
         """Means of blocks, NaN where a gap is not filled for the coarsest level, and their size."""
         values, integral = self._coarsest()
         n = self.runs.n
-        most = tuning.MOST_BLOCKS if not np.any(np.isnan(values)) else tuning.MOST_BLOCKS_WITH_GAPS
+        whole = self.runs.is_complete or not np.any(np.isnan(values))
+        most = tuning.MOST_BLOCKS if whole else tuning.MOST_BLOCKS_WITH_GAPS
         block = -(-n // most)
-        whole = (n // block) * block
-        means = np.diff(integral[: whole + 1 : block]) / block
-        means[np.any(np.isnan(values[:whole]).reshape(-1, block), axis=1)] = np.nan
+        end = (n // block) * block
+        means = np.diff(integral[: end + 1 : block]) / block
+        if not whole:
+            means[np.any(np.isnan(values[:end]).reshape(-1, block), axis=1)] = np.nan
         return means, block
 
     def _coarsest(self) -> tuple[FloatArray, FloatArray]:
         """The series that the coarsest level is made of, and its cumulative sum."""
         if self.filling is None or not self.filled[-1]:
-            return self.values, cumulative(self.values, 0.0)
+            return self.values, self._integral
         *_, (_, values, integral) = self.filling.series(
             self.values, self.averaging[-1:], self.slope
         )

@@ -131,7 +131,7 @@ STREAMING_EDGE = 16
 lies within a half window then, but for a sixteenth."""
 
 STREAMING_LEAST_EDGE = 4
-"""Samples of such a part, if it is not more than half of the averaging time."""
+"""Samples of such a part at least, but for shorter averaging times."""
 
 STREAMING_LEAST = 0.375
 """Part of the samples of half a window that must be there; with half of all samples missing singly,
@@ -146,3 +146,8 @@ averaging times: 2 (1/4 + 1/12)."""
 
 LEAST_OF_BLOCK = 0.5
 """Part of a block of samples that must be there for its mean to count."""
+
+# -- threads ---------------------------------------------------------------------------------------
+
+SAMPLES_PER_THREAD = 1 << 20
+"""Fewer take less time than threads need to begin."""

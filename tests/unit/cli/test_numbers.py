@@ -71,6 +71,8 @@ def test_reduce(run, calibration):
     assert code == 0
     found = SensorNumbers.from_dict(json.loads(printed))
     assert found.to_dict() == gmwm.reduce(gmwm.load(calibration), outages=(5.0, 20.0)).to_dict()
+    code, printed, _ = run("reduce", calibration, "--keyframe", "0.5", "--json")
+    assert (code, json.loads(printed)["channels"]["gyro_x"]["horizon_s"]) == (0, 0.5)
     assert list(found["gyro_x"].nees) == [5.0, 20.0, 200.0]
 
 

@@ -7,6 +7,8 @@ The file that is parsed is the one that is written.
 
 import json
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from math import exp, radians, sqrt
@@ -384,6 +386,54 @@ def test_gtsam_runs_it():
         assert found == pytest.approx(expected, rel=TOLERANCE)
     assert np.diag(covariance)[9:12] == pytest.approx(np.square(K["accel"]) * t, rel=1e-5)
     assert np.diag(covariance)[12:15] == pytest.approx(np.square(K["gyro"]) * t, rel=1e-5)
+
+
+GTSAM_HEADER = """
+#pragma once
+#include <memory>
+namespace gtsam {
+struct Diagonal { double x, y, z; };
+struct Vector3 {
+  Vector3(double x, double y, double z) : x(x), y(y), z(z) {}
+  Diagonal asDiagonal() const { return {x, y, z}; }
+  double x, y, z;
+};
+struct Matrix3 {
+  Matrix3& operator=(const Diagonal& d) { trace = d.x + d.y + d.z; return *this; }
+  double trace = 0.0;
+};
+struct PreintegrationCombinedParams {
+  Matrix3 accelerometerCovariance, gyroscopeCovariance, biasAccCovariance, biasOmegaCovariance;
+  static std::shared_ptr<PreintegrationCombinedParams> MakeSharedU(double) {
+    return std::make_shared<PreintegrationCombinedParams>();
+  }
+};
+}
+"""
+"""The names that GTSAM's own header has for the file."""
+
+USE = """#include "gtsam_imu.h"
+int main() { return imuParams()->accelerometerCovariance.trace > 0.0 ? 0 : 1; }
+"""
+
+OTHER = """#include "gtsam_imu.h"
+double other() { return imuParams()->gyroscopeCovariance.trace; }
+"""
+
+
+@pytest.mark.slow  # starts a compiler
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+def test_the_header_of_gtsam_compiles(tmp_path):
+    # In two files of a program: a function that is not inline would be there twice.
+    own = tmp_path / "gtsam" / "navigation"
+    own.mkdir(parents=True)
+    (own / "CombinedImuFactor.h").write_text(GTSAM_HEADER)
+    texts = {"gtsam_imu.h": file_of("gtsam-cpp"), "main.cpp": USE, "other.cpp": OTHER}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-I.", "main.cpp", "other.cpp"]
+    subprocess.run([*command, "-o", "run"], cwd=tmp_path, check=True, timeout=120)
+    subprocess.run([tmp_path / "run"], check=True, timeout=60)
 
 
 def test_every_program_is_tested_here():

@@ -236,6 +236,27 @@ def test_numbers_do_not_shrink_as_the_record_grows():
 # ---- A whole confidence region ----
 
 
+def test_what_is_left_out_and_is_not_small_is_a_warning():
+    # A ramp that outgrows its constant, and quantization of an angle without white noise above it.
+    ramp = WhiteNoise(1e-4) + RateRamp(1e-5)
+    coarse = Model((QuantizationNoise(1e-2), RandomWalk(1e-6)))
+    for truth in (ramp, coarse, ONE, QuantizationNoise(1e-6) + ONE):
+        found = gmwm.bound({"gyro_x": truth})["gyro_x"]
+        warned = [n for n in found.notices if n.code == "optimistic"]
+        assert len(warned) == (max(found.nees.values()) > 1.05) == (truth in (ramp, coarse))
+        assert all(n.values["nees"] == max(found.nees.values()) for n in warned)
+
+
+def test_a_loose_form_names_the_one_that_is_worth_its_state():
+    truth = {"accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
+    plain, tight = (gmwm.bound(truth, form)["accel_x"] for form in ("N+K", "N+K+GM"))
+    (notice,) = (n for n in plain.notices if n.code == "loose-form")
+    assert notice.values["tightness"] == plain.tightness[60.0] > 1.2
+    assert notice.values["with_state"] == pytest.approx(tight.tightness[60.0], abs=1e-6)
+    short = gmwm.bound(truth, horizon=1.0)["accel_x"]
+    assert not any(n.code == "loose-form" for each in (tight, short) for n in each.notices)
+
+
 @pytest.fixture(scope="module")
 def fitted():
     return gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(7200, 1.0, 11), 1.0)

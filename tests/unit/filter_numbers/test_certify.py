@@ -72,6 +72,15 @@ def test_its_errors_are_those_of_a_covariance_analysis(sheet):
         assert check.nees == pytest.approx(analysis.nees()[at])
 
 
+def test_numbers_in_other_units_are_named():
+    degrees = {"gyro": (np.degrees(1e-4), np.degrees(1e-6)), "accel": (2e-3, 1e-4)}
+    models = {"gyro_x": ONE, "accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
+    found = [n for n in gmwm.certify(models, degrees, dt=0.1).notices if n.code == "other-units"]
+    assert [n.where for n in found] == ["gyro"]
+    assert 40.0 < found[0].values["factor"] < 80.0
+    assert "rad/s/sqrt(Hz)" in str(found[0])
+
+
 def test_the_numbers_that_it_recommends_pass(sheet):
     again = gmwm.certify(SENSOR, sheet.recommended, dt=0.1)
     for check in again.checks:

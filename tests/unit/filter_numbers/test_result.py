@@ -16,6 +16,7 @@ from gmwm import (
 )
 from gmwm._core.notices import Notice
 from gmwm.filter_numbers import Predicted
+from places import GOLDEN
 
 NOTICE = Notice("quantization-left-out", "note", "", "quantization noise is left out", {"Q": 1e-6})
 WALK = FilterNumbers(
@@ -102,10 +103,22 @@ def test_text_names_units_and_every_number():
 def test_columns_stand_under_their_names_where_some_axes_have_no_errors(order):
     axes = {"none": WALK, "known": replace(WALK, stderr={"N": 1e-6, "K": 2e-7})}
     text = str(SensorNumbers({name: axes[name] for name in order}))
-    head, *rows = [line for line in text.splitlines() if line.startswith(("gyro", "none", "known"))]
-    ends = [head.index(name) + len(name) for name in ("N +-", "K +-", "NEES 60 s", "sd 600 s")]
-    cells = {row.split()[0]: [row[:end].split()[-1] for end in ends] for row in rows}
+    starts = ("gyro", "predicted", "none", "known")
+    lines = [line for line in text.splitlines() if line.startswith(starts)]
+    cells = {}
+    for head, *rows in (lines[:3], lines[3:6]):
+        for name in (n for n in ("N +-", "K +-", "NEES 60 s", "sd 600 s") if n in head):
+            end = head.index(name) + len(name)
+            for row in rows:
+                cells.setdefault(row.split()[0], []).append(row[:end].split()[-1])
     assert cells == {"none": ["-", "-", "0.91", "1.4"], "known": ["1e-06", "2e-07", "0.91", "1.4"]}
+
+
+def test_tables_fit_a_terminal():
+    known = replace(WALK, stderr={"N": 1.234e-6, "K": 2.345e-7})
+    text = str(SensorNumbers({"gyro_x": known, "accel_x": TWO}, "static.csv"))
+    assert max(map(len, text.splitlines())) <= 80
+    assert text == (GOLDEN / "filter_numbers.txt").read_text()
 
 
 def test_table():

@@ -176,7 +176,7 @@ class Filling:
                     integral = cumulative(values, 0.0)
                 done |= new
             levels.append(j)
-        yield np.array(levels), values, integral
+        yield np.array(levels, dtype=int), values, integral
 
     def _fill(
         self, chosen: NDArray[np.bool_], values: FloatArray, integral: FloatArray, slope: float
