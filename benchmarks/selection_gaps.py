@@ -71,9 +71,7 @@ def main() -> None:
     given = parser.parse_args()
     warnings.simplefilter("ignore", gmwm.FitWarning)
     print(f"{given.samples:,} samples, {given.runs} series each\n")
-    print(
-        f"{'gaps':>12} {'right':>6} {'right or equivalent':>20} {'ramps':>6} {'valid':>6}  true model"
-    )
+    print(f"{'gaps':>12} {'right':>6} {'right or equivalent':>20} {'ramps':>6} {'valid':>6}  truth")
     for name in given.gaps:
         lost = GAPS[name]
         for index, truth in enumerate(SETS[given.truths]):

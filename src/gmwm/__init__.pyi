@@ -3,6 +3,7 @@ from .budget import ErrorBudget as ErrorBudget, ErrorRow as ErrorRow, error_budg
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
+    calibrate_stream as calibrate_stream,
     load as load,
     without_departures as without_departures,
 )
@@ -69,12 +70,14 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
+    StreamedRecording as StreamedRecording,
     StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
+    stream as stream,
     wavelet_variance as wavelet_variance,
 )
 

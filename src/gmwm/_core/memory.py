@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from gmwm.errors import InputError
@@ -17,7 +19,9 @@ OUT_OF_MEMORY = (
 )
 
 _SHARE = 0.5  # of what is available: other programs need some, and estimates are rough
+_SHARE_OF_MACHINE = 0.25  # for the samples of a recording: what is made of them takes as much
 _WHERE_UNKNOWN = 4 << 30
+_LIMIT: ContextVar[int | None] = ContextVar("limit", default=None)
 _CGROUP = Path("/sys/fs/cgroup")
 
 
@@ -29,6 +33,9 @@ def budget() -> int:
     InputError
         If the variable holds something else than a positive number.
     """
+    limit = _LIMIT.get()
+    if limit is not None:
+        return limit
     given = os.environ.get(VARIABLE)
     if given is None:
         return int(_SHARE * _available())
@@ -36,6 +43,27 @@ def budget() -> int:
         if 0.0 < float(given) < 1e9:
             return int(float(given) * (1 << 30))
     raise InputError(f"{VARIABLE} = {given!r}: give a positive number of gigabytes, e.g. 8")
+
+
+@contextmanager
+def limited(gigabytes: float | None) -> Iterator[None]:
+    """Allow so much, or a quarter of the machine, unless `VARIABLE` says how much.
+
+    Raises
+    ------
+    InputError
+        If it is not positive.
+    """
+    if gigabytes is not None and not 0.0 < gigabytes < 1e9:
+        raise InputError(f"memory = {gigabytes!r}: give a positive number of gigabytes, e.g. 8")
+    allowed = None if gigabytes is None else int(gigabytes * (1 << 30))
+    if allowed is None and VARIABLE not in os.environ:
+        allowed = min(budget(), int(_SHARE_OF_MACHINE * _installed()))
+    token = _LIMIT.set(allowed)
+    try:
+        yield
+    finally:
+        _LIMIT.reset(token)
 
 
 def require(needed: float, what: str) -> None:
@@ -67,11 +95,16 @@ def _gigabytes(count: float) -> str:
     return f"{count / (1 << 30):.3g} GB"
 
 
+def _installed() -> int:
+    """Bytes of the machine."""
+    with suppress(OSError, ValueError, AttributeError):  # AttributeError: not on Windows
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return _WHERE_UNKNOWN
+
+
 def _available() -> int:
     """Bytes that the system says it can give, of a container no more than its limit."""
-    found = _WHERE_UNKNOWN
-    with suppress(OSError, ValueError, AttributeError):  # AttributeError: not on Windows
-        found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    found = _installed()
     with suppress(OSError, ValueError, IndexError, StopIteration):
         lines = Path("/proc/meminfo").read_text().splitlines()
         found = next(int(each.split()[1]) for each in lines if each.startswith("MemAvail")) << 10

@@ -4,6 +4,7 @@ from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
 from gmwm.calibration.departure_notices import without_departures
 from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.screening import SCREENING
+from gmwm.calibration.streamed import calibrate_stream
 from gmwm.calibration.summary import (
     Level,
     floor,
@@ -20,6 +21,7 @@ __all__ = [
     "Departure",
     "Level",
     "calibrate",
+    "calibrate_stream",
     "departures",
     "floor",
     "load",

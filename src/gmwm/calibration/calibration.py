@@ -295,7 +295,7 @@ def calibrate(
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
         for name in alive:
-            _model_of(name, model)
+            model_of(name, model)
     if not alive:
         raise InputError(_nothing_alive(recordings, dead))
     for each in recordings:
@@ -318,7 +318,7 @@ def calibrate(
         try:
             parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
             data = parts[0] if len(parts) == 1 else parts
-            given_model = _model_of(name, model)
+            given_model = model_of(name, model)
             if given_model is not None:
                 return with_departures(estimated(given_model, data), sources[name]), None
             selection = select(data, extra=offered[name])
@@ -362,7 +362,7 @@ def calibrate(
         source=source,
         rate=given[0].rate,
         n=sum(each.n for each in given),
-        notices=(*notices, *(_ambiguity(name, each) for name, each in tied.items())),
+        notices=(*notices, *(ambiguity(name, each) for name, each in tied.items())),
         rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
         left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
     )
@@ -474,7 +474,7 @@ def _judged(fitted: Fit, spoiling: Collection[Notice]) -> Fit:
     return replace(fitted, notices=(*found, *fitted.notices)) if found else fitted
 
 
-def _model_of(
+def model_of(
     name: str, model: Process | Model | Mapping[str, Process | Model] | None
 ) -> Process | Model | None:
     if not isinstance(model, Mapping):
@@ -484,7 +484,7 @@ def _model_of(
     return model[name]
 
 
-def _ambiguity(name: str, selection: Selection) -> Notice:
+def ambiguity(name: str, selection: Selection) -> Notice:
     """Which models tie, and the parameters of which that leaves less known."""
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
+_WHOLE = ("start", "stop", "layout", "topics")
+"""Options of reading for which the whole file is read."""
+
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
@@ -80,6 +83,10 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--memory", type=float, metavar="GB",
+              help="For the samples; a longer text, NPY, Parquet or Feather file is read a block "
+                   "at a time, and shocks, lines and motion are not looked for then. By default a "
+                   "quarter of the machine's.")  # fmt: skip
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -90,6 +97,7 @@ def calibrate(
     target: str | None,
     datasheet: Path | None,
     jobs: int,
+    memory: float | None,
     as_json: bool,
     quiet: bool,
     **reading: Any,
@@ -114,7 +122,7 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     from gmwm._core.files import folder_to_fill
-    from gmwm.calibration import SCREENING, calibrate as run
+    from gmwm.calibration import SCREENING, calibrate as run, calibrate_stream
     from gmwm.report import read_datasheet
 
     given = written_models(models)
@@ -124,7 +132,7 @@ def calibrate(
 
         checks.choice("--export", target, tuple(TARGETS))
     with folder_to_fill(output) as folder:
-        recordings = [read_recording(file, **reading) for file in files]
+        recordings, in_blocks = _recordings(files, memory, reading)
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
         if datasheet is not None:  # what is wrong with it is known before the work
@@ -134,12 +142,17 @@ def calibrate(
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = run(
-                recordings, model, screening=chosen, still=not everything, jobs=jobs, progress=bar
-            )
+            result = (
+                calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
+                if in_blocks
+                else run(
+                    recordings, model, screening=chosen, still=not everything, jobs=jobs,
+                    progress=bar,
+                )
+            )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
-        own = recordings[0] if len(recordings) == 1 else None
+        own = recordings[0] if len(recordings) == 1 and not in_blocks else None
         written = write_files(result, folder, own, datasheet, origin)
     if target is not None:
         written = f"{written}\n{export_into(folder, result, target)}"
@@ -151,6 +164,31 @@ def calibrate(
     if not any(fit.valid for fit in result.values()):
         click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
         click.get_current_context().exit(NONE_VALID)
+
+
+def _recordings(
+    files: tuple[Path, ...], memory: float | None, reading: Mapping[str, Any]
+) -> tuple[list[Recording], bool]:
+    """The recordings, or the first block of the only one, which is to be read by blocks."""
+    from gmwm._core.memory import limited
+    from gmwm.readers import read_blocks
+
+    with limited(memory):
+        try:
+            return [read_recording(file, **reading) for file in files], False
+        except InputError as error:
+            whole = [name for name in _WHOLE if reading.get(name)]
+            if error.code != "memory" or len(files) > 1 or whole:
+                raise
+    return [next(read_blocks(files[0], **_of_stream(reading)))], True
+
+
+def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
+    """What `gmwm.calibrate_stream` is given for the options."""
+    from gmwm.cli.options import arguments_of_read
+
+    asked = arguments_of_read(**{k: v for k, v in reading.items() if k not in ("start", "stop")})
+    return {name: asked[name] for name in ("rate", "units", "channels", "time")}
 
 
 def show(result: Calibration) -> None:

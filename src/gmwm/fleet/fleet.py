@@ -277,8 +277,8 @@ def fleet(
             if progress is not None:
                 progress(len(kept), len(items), "")
 
-        for item in items if store is not None else ():
-            unit = store.kept(item)
+        for item in items:
+            unit = None if store is None else store.kept(item)
             if unit is not None:
                 kept[item.path] = unit
         report()
@@ -405,8 +405,7 @@ def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
             f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
             "scatter more"
         )
-        values = {"shortest": shortest, "longest": longest}
-        yield Notice("lengths-differ", "note", "", text, values)
+        yield Notice("lengths-differ", "note", "", text, {"shortest": shortest, "longest": longest})
     needed = needed_units()
     if len(done) < needed:
         text = (

@@ -120,7 +120,7 @@ class Spread:
         """Upper limit of 95 % of the units with 95 % confidence, if (logarithms) are normal."""
         if not self.sd >= 0.0:
             return float("nan")
-        return self._back(np.mean(self._scaled) + one_sided_factor(self.n) * self.sd)
+        return self._back(float(np.mean(self._scaled)) + one_sided_factor(self.n) * self.sd)
 
     @property
     def normal_limits(self) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gmwm import filter_numbers
 from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.frozen import freeze
@@ -19,7 +20,6 @@ from gmwm._core.runs import ENDED
 from gmwm.calibration import Calibration, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.filter_numbers import bound
 from gmwm.process import Model
 from gmwm.readers import Recording, read
 
@@ -200,7 +200,10 @@ def digest_of(path: str) -> str:
     try:
         if not os.path.isdir(path):
             with opened(path) as stream:
-                return hashlib.file_digest(stream, "sha256").hexdigest()
+                digest = hashlib.sha256()
+                while part := stream.read(1 << 20):
+                    digest.update(part)
+                return digest.hexdigest()
         parts = [f"{each.name} {digest_of(str(each))}\n"
                  for each in sorted(Path(path).iterdir()) if each.is_file()]  # fmt: skip
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
@@ -214,7 +217,7 @@ def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     low = floor(fit)
     found = {"floor_B": Number(low.bias_instability, None, bool(low.tau < fit.wv.tau[-1]))}
     try:
-        numbers = bound(fit, horizon=horizon)
+        numbers = filter_numbers.bound(fit, horizon=horizon)
         for letter, value, level in (
             ("N", numbers.N, noise_density), ("K", numbers.K, random_walk),
         ):  # fmt: skip

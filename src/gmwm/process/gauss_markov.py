@@ -230,7 +230,7 @@ def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
 
 @compiled()
 def _real_haar(rate: float, m: FloatArray) -> FloatArray:
-    """Haar wavelet variance of the process of unit variance and a real rate: the inner loop of fits.
+    """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
     Parameters
     ----------

@@ -6,7 +6,13 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY
-from gmwm.readers.at_rest import TurningGravity, block_means, turning_gravity
+from gmwm.readers.at_rest import (
+    TurningGravity,
+    block_means,
+    steady_turn,
+    turning_gravity,
+)
+from gmwm.readers.blocks import notices_of_blocks, read_blocks
 from gmwm.readers.cells import DATE, seconds_of
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import is_frame, is_text
@@ -31,8 +37,11 @@ __all__ = [
     "is_text",
     "label",
     "meaning",
+    "notices_of_blocks",
     "read",
+    "read_blocks",
     "seconds_of",
     "stated_seconds",
+    "steady_turn",
     "turning_gravity",
 ]

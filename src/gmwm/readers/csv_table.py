@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -100,27 +100,54 @@ class CsvTable:
             At the first line with a wrong number of fields or with text for a number; if there
             is none, for the first number that is infinite; if there is not enough memory.
         """
-        infinite = _Infinite()
         allowed = memory.budget()
         self._require(self._estimated_samples(len(columns)))
         held = 0
         parts: list[list[FloatArray]] = [[] for _ in columns]
-        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
-            found = _parse_with_arrow(block, self.layout, columns)
-            if found is None:
-                found = _parse_by_field(line, block, self, columns, infinite)
+        for found in self._parsed(columns):
             for part, values in zip(parts, found, strict=True):
                 part.append(values)
                 held += values.size
             if held * tuning.BYTES_PER_SAMPLE > allowed:
                 self._require(max(held, self._estimated_samples(len(columns))))
-        infinite.complain(self.source)
         # One column at a time lets the blocks go before the next one is joined.
         joined = {column: np.concatenate(parts.pop(0)) for column in columns}
         for column, scale in self.layout.scales.items():
             if column in joined:
                 joined[column] *= scale
         return joined
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` or a little more at a time."""
+        parts: list[list[FloatArray]] = []
+        held = 0
+        for found in self._parsed(columns):
+            parts.append(found)
+            held += found[0].size
+            if held >= rows:
+                yield self._joined(columns, parts)
+                parts, held = [], 0
+        if held:
+            yield self._joined(columns, parts)
+
+    def _joined(
+        self, columns: Sequence[int], parts: Sequence[Sequence[FloatArray]]
+    ) -> dict[int, FloatArray]:
+        return {
+            column: np.concatenate([part[i] for part in parts])
+            * self.layout.scales.get(column, 1.0)
+            for i, column in enumerate(columns)
+        }
+
+    def _parsed(self, columns: Sequence[int]) -> Iterator[list[FloatArray]]:
+        """Columns of one block of text after another."""
+        infinite = _Infinite()
+        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+            found = _parse_with_arrow(block, self.layout, columns)
+            if found is None:
+                found = _parse_by_field(line, block, self, columns, infinite)
+            yield found
+        infinite.complain(self.source)
 
     def _require(self, samples: float) -> None:
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)

@@ -140,14 +140,7 @@ def _part(
 ) -> Part:
     """The recording of a table, and when it begins."""
     stated = _stated_rate(table, rate)
-    columns = Columns(table.source, table.names)
-    roles = assign_roles(columns, table.tentative, units, channels, time)
-    if not roles.channels:
-        raise InputError(
-            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
-            'e.g. channels={"gyro_x": 1}',
-            "channel-unknown",
-        )
+    roles = roles_of(table, units, channels, time)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
@@ -185,6 +178,35 @@ def _part(
         jitter=timing.jitter if timing is not None else None,
     )
     return Part(recording, start)
+
+
+def roles_of(
+    table: Table,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Roles:
+    """Which column of a table is which channel."""
+    columns = Columns(table.source, table.names)
+    roles = assign_roles(columns, table.tentative, units, channels, time)
+    if not roles.channels:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
+    return roles
+
+
+def read_table(
+    table: Table,
+    rate: float | None,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+) -> Recording:
+    """The recording of a table; the arguments are those of `read`."""
+    return _part(table, rate, units, channels, time).recording
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

@@ -39,6 +39,14 @@ TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
 """Share of the changes of gravity that turning explains, and relative error of the rate, from which
 on it shows a wrong unit; units differ by a factor of 57 and more."""
 
+LEAST_CONE, LAGS_OF_TURN, FEWEST_TURNING = 0.01, (1, 4, 16), 20
+"""rad by which gravity leaves its mean where a sensor turns steadily (at rest by 0.3 deg), seconds
+over which its changes are compared, and how many of these a recording has at least."""
+
+USUAL_BIAS = 0.052
+"""rad/s (3 deg/s): biases at rest of most MEMS gyros are smaller by their data sheets; those of the
+cheapest are not."""
+
 LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 """u: fourth powers of the data must not overflow."""
 
@@ -174,3 +182,14 @@ RECORDS_AT_ONCE = 1 << 16
 
 LONGEST_OF_WRAP = 100.0
 """Steps within which a counter that ran over goes on."""
+
+# -- recordings that are read a block at a time ---------------------------------------------------
+
+ROWS_OF_BLOCK = 1 << 18
+"""Of a block: 2 MB a column."""
+
+FEWEST_OF_BLOCK = 4096
+"""Rows of which a clock is seen as well as of a long recording."""
+
+ROWS_BACK_OF_BLOCK = 2
+"""By which stamps may be early at the seam of two blocks: a late row before."""

@@ -7,7 +7,7 @@ from gmwm.variance.gaps import Runs
 from gmwm.variance.modwt import Modwt, imodwt, modwt
 from gmwm.variance.pilot import pilot_psd
 from gmwm.variance.pooled import PooledVariance
-from gmwm.variance.streaming import StreamingVariance
+from gmwm.variance.streaming import StreamedRecording, StreamingVariance, stream
 from gmwm.variance.wavelet import WaveletVariance
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Modwt",
     "PooledVariance",
     "Runs",
+    "StreamedRecording",
     "StreamingVariance",
     "WaveletVariance",
     "as_channel",
@@ -25,5 +26,6 @@ __all__ = [
     "imodwt",
     "modwt",
     "pilot_psd",
+    "stream",
     "wavelet_variance",
 ]

@@ -13,7 +13,7 @@ from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
-from gmwm.variance.cumulant import fourth_cumulant
+from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.gaps import Runs
 from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
@@ -113,15 +113,15 @@ def wavelet_variance(
         efficiency=efficiency,
         driftless=driftless,
         gaps=levels.effects(),
-        fourth_cumulant=0.0 if robust else _fourth_cumulant(values),
+        fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
 
 
-def _fourth_cumulant(values: FloatArray) -> float:
-    """Of a series, NaN where samples are missing."""
+def fourth_cumulant(values: FloatArray) -> float:
+    """Of the independent part of a series, NaN where samples are missing, u^4."""
     count, square, fourth = difference_powers(values)
-    return fourth_cumulant(square / count, fourth / count, count)
+    return cumulant_of_powers(square / count, fourth / count, count)
 
 
 def where_of(channel: Channel) -> str:

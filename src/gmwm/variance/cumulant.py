@@ -7,7 +7,7 @@ import numpy as np
 from gmwm.variance import tuning
 
 
-def fourth_cumulant(square: float, fourth: float, count: float) -> float:
+def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
     """Of the independent part of a series, u^4; 0 if not above chance.
 
     Cumulants of independent samples add up, so that first differences have twice that of the

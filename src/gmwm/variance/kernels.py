@@ -55,7 +55,7 @@ def _second_differences(
 def fine_moments(
     values: FloatArray, start: int, stop: int, end: int, levels: int, found: FloatArray
 ) -> None:
-    """Sums over the windows of a run that begin at certain places, for levels of 1, 2, 4 ... samples.
+    """Sums over the windows of a run that begin at certain places, for levels from 1 sample on.
 
     Sums of 2 m samples are those of m samples, m apart: all levels are taken of a chunk that stays
     in the cache, and nothing cancels.

@@ -131,7 +131,7 @@ STREAMING_EDGE = 16
 lies within a half window then, but for a sixteenth."""
 
 STREAMING_LEAST_EDGE = 4
-"""Samples of such a part, if it is not more than half of the averaging time."""
+"""Samples of such a part at least, but for shorter averaging times."""
 
 STREAMING_LEAST = 0.375
 """Part of the samples of half a window that must be there; with half of all samples missing singly,

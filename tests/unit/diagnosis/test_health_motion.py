@@ -7,6 +7,7 @@ import pytest
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.diagnosis import rest_of
 from gmwm.diagnosis.motion import find_motion
 
 RATE = 100.0
@@ -213,3 +214,33 @@ def test_fits_of_what_was_tilted_are_not_valid(moved):
 def test_static_stretches_alone_are_valid(moved):
     cal = gmwm.calibrate(moved(np.zeros((30_000, 3))), WhiteNoise())
     assert all(fit.valid for fit in cal.values())
+
+
+@pytest.mark.parametrize(
+    ("speed", "axis"),
+    [(6.0, (0.0, 1.0, 0.0)), (6.0, (0.0, 0.1, 1.0)), (1.0, (0.0, 0.6, 0.8)), (20.0, (1, 0, 0))],
+)
+@pytest.mark.parametrize("only", ["", "accel"])
+def test_a_turntable_that_turns_all_the_time(moved, speed, axis, only):
+    axis = np.array(axis) / np.linalg.norm(axis)
+    rec = moved(turn(12_000, 0, 120, speed, axis), only=only)
+    motion = find_motion(rec)
+    assert motion.turns_steadily
+    assert motion.static == ()
+    (move,) = motion.moves
+    assert np.degrees(move.rate) == pytest.approx(speed, rel=0.1)
+    assert rest_of(rec).stretches == ()
+    (notice,) = gmwm.health(rec).of(code="not-static")
+    assert notice.values["rate"] == move.rate
+
+
+def test_drifts_and_walks_of_accelerometers_do_not_turn(record):
+    rng = np.random.default_rng(6)
+    n = 30_000
+    force = 0.02 * rng.normal(size=(n, 3)) + [0.0, 0.0, GRAVITY]
+    walk = np.cumsum(rng.normal(size=(n, 3)), axis=0) * 1.0 / np.sqrt(n)
+    drift = np.linspace(0.0, 1.0, n)[:, None] * rng.normal(size=3)
+    for slow in (walk, drift, walk + drift):
+        series = dict(zip("xyz", (force + slow).T, strict=True))
+        rec = record(**{f"accel_{axis}": each for axis, each in series.items()})
+        assert not find_motion(rec).turns_steadily

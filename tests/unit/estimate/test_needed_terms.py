@@ -1,4 +1,4 @@
-"""A term is needed where the model without it misses an averaging time, and not where it does not."""
+"""A term is needed where the model without it misses an averaging time, and only there."""
 
 import pytest
 

@@ -128,3 +128,13 @@ def test_missing_axes_and_samples_are_survived(write):
     assert len(notices(read(path, rate=100.0))) <= 1
     path = write(rows[:, 1:], header("deg/s", "g", NAMES[1:]))
     assert not notices(read(path, rate=100.0))
+
+
+@pytest.mark.parametrize(("mean", "reported"), [(0.105, True), (0.04, False), (0.8, False)])
+def test_a_mean_rate_that_few_gyros_have_at_rest(write, mean, reported):
+    path = write(imu(bias=(0.0, mean, 0.0)), header("rad/s", "m/s^2"))
+    found = [each for each in read(path, rate=100.0).notices if each.code == "mean-rate"]
+    assert len(found) == reported
+    if reported:
+        assert found[0].severity == "warning"
+        assert found[0].values["mean"] == pytest.approx(mean, rel=1e-2)

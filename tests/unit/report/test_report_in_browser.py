@@ -12,7 +12,7 @@ import yaml
 
 import gmwm
 from browser import Browser, needs_chromium
-from gmwm import GaussMarkov, WhiteNoise
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.report import write_report
 
 pytestmark = needs_chromium
@@ -256,3 +256,17 @@ def test_paper(tab):
     pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf()))
     assert 2 <= pages <= 6
     assert trace(tab, "model") is not None
+
+
+def test_a_comparison_fits_a_telephone_and_fetches_nothing(calibration, tab, tmp_path):
+    one = replace(calibration, fits={"gyro_x": calibration["gyro_x"]}, source="one.csv")
+    samples = (WhiteNoise(5e-4) + RandomWalk(3e-4)).simulate(8000, 0.01, 77)
+    other = replace(one.fits["gyro_x"], wv=gmwm.wavelet_variance(samples, 0.01))
+    wv = replace(other.wv, name="gyro_x", quantity="gyro", unit="rad/s")
+    two = replace(one, fits={"gyro_x": replace(other, wv=wv)}, source="two.csv")
+    found = gmwm.compare([one, two])
+    tab.size(420)
+    tab.open(found.report(tmp_path / "compare.html"))
+    assert tab.run("document.documentElement.scrollWidth") <= 420
+    assert tab.run("document.querySelectorAll('.multiples svg').length") == 1
+    assert [each for each in tab.requests() if not each.startswith(("file:", "data:"))] == []

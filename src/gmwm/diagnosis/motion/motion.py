@@ -13,7 +13,7 @@ from scipy.stats import norm
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.readers import AXES, Channel, Recording, block_means, turning_gravity
+from gmwm.readers import AXES, Channel, Recording, block_means, steady_turn, turning_gravity
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _LIMIT = {"gyro": tuning.TURNS, "accel": tuning.TILTS * _GRAVITY}
@@ -60,10 +60,13 @@ class Motion:
     moves : tuple of Move
     static : tuple of (float, float)
         Begin and end of each static stretch, s.
+    turns_steadily : bool
+        Whether gravity turns at one rate from the first sample to the last.
     """
 
     moves: tuple[Move, ...]
     static: tuple[tuple[float, float], ...]
+    turns_steadily: bool = False
 
     def joined(self, events: tuple[tuple[int, int], ...], dt: float) -> tuple[tuple[int, int], ...]:
         """Sample intervals, those of one tilt made one: its begin and its end are shocks."""
@@ -121,7 +124,10 @@ def find_motion(recording: Recording) -> Motion:
     for sensor, values in level.items():
         for channel, series in zip(_channels(recording, sensor), values.T, strict=True):
             changing |= _changing(series, _LIMIT[sensor], _white(channel.values, size))
-    if np.any(changing):
+    turn = steady_turn(recording, size)
+    if turn > 0.0:
+        still = []
+    elif np.any(changing):
         still = _still(level["gyro"], _runs(~changing))
     else:
         still = [] if _never_rests(recording, level["gyro"], size) else [(0, known.size)]
@@ -133,12 +139,12 @@ def find_motion(recording: Recording) -> Motion:
     moves = []
     for (_, last), (first, _) in pairwise([(0, 0), *still, (known.size, known.size)]):
         if first > last:
-            rate = _fastest(level["gyro"], still, slice(last, first))
+            rate = max(_fastest(level["gyro"], still, slice(last, first)), turn)
             around = slice(max(last - tuning.SHORTEST_STATIC, 0), first + tuning.SHORTEST_STATIC)
             tilt = _angle(level["accel"][around])
             span = float(begins[last]), float(ends[first - 1])
             moves.append(Move(*span, (first - last) * size * recording.dt, rate, tilt))
-    return Motion(tuple(moves), static)
+    return Motion(tuple(moves), static, turn > 0.0)
 
 
 def _channels(recording: Recording, sensor: str) -> list[Channel]:

@@ -26,7 +26,8 @@ def motion_notices(motion: Motion) -> list[Notice]:
         rate, tilt = max(move.rate for move in moves), max(move.tilt for move in moves)
         verb = "it moves"
         if rate > tuning.TURNS:
-            verb = f"it turns at up to {readable(rate, 'rad/s')}"
+            most = "" if motion.turns_steadily else "up to "
+            verb = f"it turns at {most}{readable(rate, 'rad/s')}"
         elif tilt > tuning.TILTS:
             verb = f"it tilts by {np.degrees(tilt):.2g} deg"
         text = f"not static: {verb} {_times([(m.start, m.stop) for m in moves])}"

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from gmwm._core.typing import BoolArray, FloatArray
@@ -58,13 +59,15 @@ def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
     logs = np.log(np.maximum(values, least)[:, np.isfinite(least)])
     if not logs.size:
         return nothing
-    loud, ratio = nothing.loud.copy(), 1.0
-    for series in (*logs.T, np.mean(logs, axis=1)):
-        where, level = _loud_blocks(series)
-        if where.any():
-            loud[known[where]] = True
-            ratio = max(ratio, float(np.exp(0.5 * level)))
-    return Loudness(loud, ratio)
+    found = [_loud_blocks(series) for series in (*logs.T, np.mean(logs, axis=1))]
+    axes = [axis for axis, (where, _) in enumerate(found[:-1]) if where.any()]
+    # The axes that vibrate know together when they do; else those that do not at the same time.
+    together, _ = _loud_blocks(np.mean(logs[:, axes], axis=1)) if axes else found[-1]
+    chosen = together if together.any() else np.any([where for where, _ in found], axis=0)
+    loud = nothing.loud.copy()
+    loud[known] = chosen
+    level = max((level for where, level in found if where.any()), default=0.0)
+    return Loudness(loud, float(np.exp(0.5 * level)))
 
 
 def _loud_blocks(logs: FloatArray) -> tuple[BoolArray, float]:
@@ -79,7 +82,12 @@ def _loud_blocks(logs: FloatArray) -> tuple[BoolArray, float]:
     added = float(np.sum(share * np.expm1(above[loud])))
     lasts = np.max(lengths[loud], initial=0) >= tuning.SHORTEST_STILL / tuning.STILL_BLOCK
     harms = added > tuning.HARMFUL_SCATTER and (lasts or np.sum(share) > tuning.LEAST_SHAKEN)
-    return np.repeat(loud & harms, lengths), float(np.max(above[loud], initial=0.0))
+    if not harms:
+        return np.zeros(logs.size, dtype=bool), 0.0
+    # A change that was missed leaves something at rest in a loud stretch.
+    smooth = median_filter(logs, tuning.BLOCKS_OF_FLOOR + 1, mode="nearest") - np.min(levels[long])
+    half = np.repeat(np.where(loud, 0.5 * above, np.inf), lengths)
+    return smooth > half, float(np.max(above[loud]))
 
 
 def _changes(logs: FloatArray) -> list[int]:
@@ -96,7 +104,7 @@ def _changes(logs: FloatArray) -> list[int]:
     sign = np.sign(change) * (np.abs(change) > max(np.log(tuning.LOUDER_THAN_REST), far * scale))
     edges = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
     ends = [0]
-    for a, b in pairwise(edges):
+    for a, b in pairwise(edges.tolist()):
         if sign[a]:
             middle = (a + int(np.argmax(np.abs(change[a:b]))) + lag // 2 + 1) * width
             split = _split(logs, max(ends[-1], middle - lag * width), middle + lag * width)

@@ -132,8 +132,10 @@ def rest_of(recording: Recording) -> Still | None:
     It is not if it moves, or if it scatters more at some times than at others and begins or ceases
     to do so within seconds, as what vibrates. A tilt between two attitudes at rest is no motion.
     """
-    moves = find_motion(recording).moves
-    if not all(move.is_tilt for move in moves):
+    motion = find_motion(recording)
+    if motion.turns_steadily:
+        return Still((), 0.0, (), recording.duration)
+    if not all(move.is_tilt for move in motion.moves):
         return find_still(recording)
     blocks = blocks_of(recording)
     if blocks is None or not blocks.loudness.loud.any():

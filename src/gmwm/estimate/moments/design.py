@@ -103,7 +103,7 @@ class Design:
         return lambda shape: self.scales.curve(self._with_shape(term, shape))
 
     def _slopes_at(self, term: Term) -> Callable[[Shape], FloatArray | None]:
-        """Derivatives of its curve by the coordinates of its shape, where a closed form is known."""
+        """Derivatives of its curve by the coordinates of its shape, if in closed form."""
         if term.free_scale:
             return self.scales.unit_slopes(term.process)
         return lambda shape: None

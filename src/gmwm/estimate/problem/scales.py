@@ -75,7 +75,7 @@ class Scales:
         return lambda _: found
 
     def unit_slopes(self, process: Process) -> Callable[[Shape], FloatArray | None]:
-        """Derivative of `unit_curves` by the coordinates of the shape, (J, s), where it is known."""
+        """Derivative of `unit_curves` by the coordinates of the shape, (J, s), where known."""
         if self.wavelet != "haar" or self.is_simulated(process):
             return lambda shape: None
         return lambda shape: process.unit_haar_slopes(shape, self.tau, self.dt)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.typing import FloatArray
+from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
 
@@ -98,3 +99,47 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
         return None
     factor, explained, change = np.median(found, axis=0)
     return TurningGravity(float(factor), float(explained), float(change))
+
+
+def steady_turn(recording: Recording, size: int) -> float:
+    """Rate at which gravity turns in the frame of a sensor, if that is always the same turn.
+
+    The constant rate w of da/dt = -w x a by least squares, from changes over several times. Noise
+    and drifts have none that explains most of the changes and turns by a radian in all.
+
+    Parameters
+    ----------
+    recording : Recording
+    size : int
+        Samples of the blocks whose means are compared.
+
+    Returns
+    -------
+    float
+        rad/s; 0 if there is none, or an axis is missing.
+    """
+    force = triad(recording, "accel")
+    if force is None:
+        return 0.0
+    means = block_means(force, size)
+    if np.all(np.isnan(means)):
+        return 0.0
+    wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
+    if not np.nanmax(wander) > tuning.LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
+        return 0.0
+    for lag in tuning.LAGS_OF_TURN:
+        if means.shape[0] < tuning.FEWEST_TURNING * lag:
+            break
+        change = means[lag:] - means[:-lag]
+        known = ~np.any(np.isnan(change), axis=1)
+        x, y, z = 0.5 * (means[lag:] + means[:-lag])[known].T
+        none = np.zeros(x.size)
+        # -w x a, by the components of w.
+        turned = np.array([[none, z, -y], [-z, none, x], [y, -x, none]])
+        design, wanted = turned.reshape(3, -1).T, change[known].T.ravel()
+        rate, *_ = np.linalg.lstsq(design, wanted, rcond=None)
+        rest, total = wanted - design @ rate, float(wanted @ wanted)
+        rate = float(np.linalg.norm(rate)) / (lag * size * recording.dt)
+        if rest @ rest < 0.5 * total and rate * recording.duration > 1.0:
+            return rate
+    return 0.0

@@ -55,7 +55,7 @@ def rest_notices(
     swapped = _swapped(recording, rate, force, are_columns_given)
     if swapped:
         return swapped
-    return (*_gravity(recording, force, given), *_gyro_unit(recording, rate))
+    return (*_gravity(recording, force, given), *(_gyro_unit(recording, rate) or _mean_rate(rate)))
 
 
 class _Sensor:
@@ -195,6 +195,18 @@ def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]
         values["likely"] = likely[0]
         action = f"{action}: {' or '.join(likely)}, not {rate.unit}, would explain it"
     return (Notice("gyro-unit", "warning", "gyro", text, values, action),)
+
+
+def _mean_rate(rate: _Sensor | None) -> tuple[Notice, ...]:
+    """A mean that few gyros have at rest."""
+    if rate is None or rate.size < tuning.USUAL_BIAS:
+        return ()
+    text = (
+        f"a mean rate of {rate.size / _DENSITY:.3g} deg/s is more than the bias of most gyros: "
+        "it turned from the first sample to the last, or is a cheap gyro that was not calibrated"
+    )
+    action = "make sure that it was at rest"
+    return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, action),)
 
 
 def _by_turning(recording: Recording, others: Mapping[str, float]) -> tuple[str, list[str]] | None:

@@ -39,7 +39,7 @@ def find_shifts(stamps: FloatArray, jumps: Jumps) -> list[tuple[int, float]]:
     reported = np.zeros(stamps.size, dtype=bool)
     reported[jumps.set_at] = True
     reported[jumps.rows[jumps.is_off_grid]] = True
-    taken = reported[: count * size].reshape(count, size).any(axis=1)
+    taken = np.any(reported[: count * size].reshape(count, size), axis=1)
     change[taken[2:] | taken[1:-1] | taken[:-2]] = 0.0
     found = []
     while change.size:

@@ -12,7 +12,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -149,6 +149,13 @@ class ArrayTable:
                     "give every column the same length"
                 )
         return found
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` at a time; only what is mapped is not read as a whole."""
+        longest = max(self.arrays[column].like.shape[0] for column in columns)
+        for begin in range(0, longest, rows):
+            part = replace(self, arrays=tuple(array[begin : begin + rows] for array in self.arrays))
+            yield part.load(columns)
 
     def where(self, row: int) -> str:
         """Say which row."""

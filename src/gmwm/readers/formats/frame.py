@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -35,6 +35,8 @@ class FrameTable:
     rows : int
     read : callable
         Index of a column -> its values, a `pyarrow.ChunkedArray`.
+    parts : callable
+        Indices of columns and a number of rows -> their values, so many rows at a time.
     """
 
     source: str
@@ -42,6 +44,7 @@ class FrameTable:
     types: tuple[Any, ...]
     rows: int
     read: Callable[[int], Any]
+    parts: Callable[[Sequence[int], int], Iterator[Sequence[Any]]]
     rate: float | None = None
     tentative: bool = False
     notices: tuple[Notice, ...] = ()
@@ -55,13 +58,26 @@ class FrameTable:
             If a column holds no numbers, one is infinite, or there is not enough memory.
         """
         memory.require(tuning.BYTES_PER_SAMPLE * self.rows * len(columns), self.source)
-        return {column: self._column(column) for column in columns}
+        return {column: self._column(column, self._read(column), {}) for column in columns}
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` or fewer at a time."""
+        first: dict[int, int] = {}
+        with damage_named(self.source):
+            for part in self.parts(columns, rows):
+                pairs = zip(columns, part, strict=True)
+                yield {column: self._column(column, values, first) for column, values in pairs}
+
+    def _read(self, column: int) -> Any:
+        with damage_named(self.source):
+            return self.read(column)
 
     def where(self, row: int) -> str:
         """Say which row."""
         return f"row {row} (counted from 0)"
 
-    def _column(self, column: int) -> FloatArray:
+    def _column(self, column: int, values: Any, first: dict[int, int]) -> FloatArray:
+        """Values of a column; stamps are counted from the first, which is noted if it is new."""
         import pyarrow as pa
 
         kind = self.types[column]
@@ -70,10 +86,9 @@ class FrameTable:
         if not (is_time or _is_number(kind)):
             raise InputError(f"{place} holds {kind}: give numbers")
         with damage_named(self.source):
-            values = self.read(column)
             is_stamp = pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME
             if is_time or is_stamp:
-                return _from_first(values)
+                return _from_first(values, column, first)
             found = np.array(values.cast(pa.float64(), safe=False).to_numpy(), dtype=float)
         check_usable(place, found, self.where)
         return found
@@ -87,13 +102,13 @@ def _is_number(kind: Any) -> bool:
     )
 
 
-def _from_first(values: Any) -> FloatArray:
+def _from_first(values: Any, column: int, known: dict[int, int]) -> FloatArray:
     """Stamps less the first one, so that nanoseconds since 1970 keep their digits."""
     import pyarrow as pa
 
     missing = values.is_null().to_numpy()
     ticks = values.cast(pa.int64(), safe=False).fill_null(0).to_numpy()
-    first = ticks[np.argmin(missing)] if ticks.size else 0
+    first = known.setdefault(column, int(ticks[np.argmin(missing)]) if ticks.size else 0)
     return np.where(missing, np.nan, (ticks - first).astype(float))
 
 
@@ -129,7 +144,7 @@ def open_frame(data: Any) -> FrameTable:
             table = data.to_arrow() if hasattr(data, "to_arrow") else pa.table(data)
     except (pa.ArrowException, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"{source} is not a table of numbers: {error}") from error
-    return _table(source, table.schema, table.num_rows, table.column)
+    return _table(source, table.schema, table.num_rows, table.column, partial(_slices, table))
 
 
 def open_parquet(path: Path) -> FrameTable:
@@ -145,7 +160,9 @@ def open_parquet(path: Path) -> FrameTable:
     with damage_named(path.name):
         file = parquet.ParquetFile(path, memory_map=True)
         schema, rows = file.schema_arrow, file.metadata.num_rows
-        return _table(path.name, schema, rows, partial(_parquet_column, path))
+        return _table(
+            path.name, schema, rows, partial(_parquet_column, path), partial(_parquet_parts, path)
+        )
 
 
 def _parquet_column(path: Path, column: int) -> Any:
@@ -154,6 +171,21 @@ def _parquet_column(path: Path, column: int) -> Any:
     file = parquet.ParquetFile(path, memory_map=True)
     # By name, since a nested column has several leaves.
     return file.read(columns=[file.schema_arrow.names[column]]).column(0)
+
+
+def _parquet_parts(path: Path, columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    file = parquet.ParquetFile(path)  # not mapped: what was read would stay in memory
+    names = [file.schema_arrow.names[column] for column in columns]
+    for batch in file.iter_batches(batch_size=rows, columns=names):
+        yield [pa.chunked_array([batch.column(name)]) for name in names]
+
+
+def _slices(table: Any, columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
+    for begin in range(0, table.num_rows, rows):
+        yield [table.column(column).slice(begin, rows) for column in columns]
 
 
 def open_feather(path: Path) -> FrameTable:
@@ -168,15 +200,21 @@ def open_feather(path: Path) -> FrameTable:
 
     with damage_named(path.name):
         table = feather.read_table(path, memory_map=True)
-    return _table(path.name, table.schema, table.num_rows, table.column)
+    return _table(path.name, table.schema, table.num_rows, table.column, partial(_slices, table))
 
 
-def _table(source: str, schema: Any, rows: int, read: Callable[[int], Any]) -> FrameTable:
+def _table(
+    source: str,
+    schema: Any,
+    rows: int,
+    read: Callable[[int], Any],
+    parts: Callable[[Sequence[int], int], Iterator[Sequence[Any]]],
+) -> FrameTable:
     names = tuple(_name(each.name, each.type) for each in schema)
     if not names:
         raise InputError(f"{source} holds no columns: save samples in it")
     # An index of pandas that only counts the rows is none of its columns.
-    return FrameTable(source, names, tuple(each.type for each in schema), rows, read)
+    return FrameTable(source, names, tuple(each.type for each in schema), rows, read, parts)
 
 
 def _name(name: str, kind: Any) -> str:

@@ -20,7 +20,7 @@ from gmwm.estimate import Estimate, Fit
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import rendered, resource
 from gmwm.report.several.multiples import COLOURS, multiple
-from gmwm.report.text import duration_text, short
+from gmwm.report.text import duration_text, number, short
 
 _SIDE_BY_SIDE = 6
 """Recordings whose values stand in columns of their own; of more the range is shown."""
@@ -116,7 +116,7 @@ def _axis(
         "model": axis.joint.model.title() if axis.joint else "none",
         "joint_valid": axis.joint is not None and axis.joint.valid,
         "joint_codes": _codes(axis.joint),
-        "equality": _p(axis.joint.equality_p) if axis.joint else "",
+        "equality": _p(axis.joint.equality_p, "= ") if axis.joint else "",
         "rows": [
             _row(each, axis, labels) for each in axis.parameters if each.joint.kind != "fixed"
         ],
@@ -137,7 +137,7 @@ def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...])
     cells = [_cell(by_label.get(label)) for label in labels]
     if len(labels) > _SIDE_BY_SIDE:
         known = [e.usual.value for e in spread.each if e is not None and e.kind == "estimated"]
-        text = f"{short(min(known))} to {short(max(known))}" if known else "none"
+        text = f"{number(min(known))} to {number(max(known))}" if known else "none"
         cells = [{"value": text, "interval": f"{len(known)} of {len(spread.each)}"}]
     return {
         "key": spread.key,
@@ -155,19 +155,19 @@ def _cell(estimate: Estimate | None) -> dict[str, str]:
         return {"value": "–", "interval": ""}
     usual = estimate.usual
     if estimate.kind == "bound":
-        return {"value": f"< {short(usual.upper)}", "interval": "95 % bound"}
+        return {"value": f"< {number(usual.upper)}", "interval": "95 % bound"}
     if estimate.kind == "estimated":
-        interval = f"{short(usual.lower)} to {short(usual.upper)}"
-        return {"value": short(usual.value), "interval": interval}
-    return {"value": short(usual.value), "interval": estimate.kind}
+        interval = f"{number(usual.lower)} to {number(usual.upper)}"
+        return {"value": number(usual.value), "interval": interval}
+    return {"value": number(usual.value), "interval": estimate.kind}
 
 
 def _share(value: float) -> str:
     return f"{100.0 * value:.1f} %" if value < 1.0 else f"{100.0 * value:.0f} %"
 
 
-def _p(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.2g}" if value >= 1e-4 else "< 0.0001"
+def _p(value: float, sign: str = "") -> str:
+    return "" if np.isnan(value) else f"{sign}{value:.2g}" if value >= 1e-4 else "< 0.0001"
 
 
 def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict[str, str]:

@@ -136,7 +136,7 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
     groups = []
     derived = [each for each in fleet.spreads if each.parameter in DERIVED]
     for quantity in dict.fromkeys(each.quantity for each in derived):
-        numbers = []
+        numbers: list[dict[str, Any]] = []
         for parameter in DERIVED:
             own = [e for e in derived if (e.quantity, e.parameter) == (quantity, parameter)]
             if own:

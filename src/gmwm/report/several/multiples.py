@@ -78,6 +78,9 @@ def multiple(
         parts.append(_points(labels.index(label), at, y(_log(factor, fit.wv.variance)), *ends))
     if axis.equality is not None and axis.equality.tau.size:
         parts.append(_ratios(axis, labels, x, shifts))
+    else:
+        middle = 0.5 * (_LEFT + _RIGHT), 0.5 * (_LOW + _BOTTOM) + 4.0
+        parts.append(_text(*middle, "nothing to compare with", "middle"))
     title = f"Allan deviation of {axis.name} in {unit} against averaging time in s"
     return (
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{escape(title)}">'

@@ -96,7 +96,7 @@ def effects(
     # Sum of the squared autocorrelation of white noise over all lags.
     alike = np.maximum(tuning.ALIKE * m / step, 1.0)
     # Most are left out for a gap that takes an end of half a window.
-    edge = np.maximum(m / tuning.STREAMING_EDGE, np.minimum(m / 2.0, tuning.STREAMING_LEAST_EDGE))
+    edge = np.maximum(m / tuning.STREAMING_EDGE, np.minimum(m, tuning.STREAMING_LEAST_EDGE))
     number = np.array([np.sum(gaps[int(np.ceil(np.log2(max(each, 1.0)))) :, 0]) for each in edge])
     run = np.maximum(complete - windows, 0.0) / np.maximum(number, 1.0)
     growth = 1.0 + (1.0 / left - 1.0) * np.minimum(run * left / alike, 1.0)

@@ -173,7 +173,7 @@ def gappy_windows(
         there[i + 1] = there[i] + present[i]
     for level in range(levels[0], levels[1]):
         m = 1 << level
-        edge = max(m // EDGE, min(m // 2, LEAST_EDGE), 1)
+        edge = max(m // EDGE, min(m, LEAST_EDGE))
         whole = float(m << row)
         count = 0
         mean, square, scarcity, fourth = 0.0, 0.0, 0.0, 0.0

@@ -10,7 +10,7 @@ from gmwm.readers import Channel
 from gmwm.variance import tuning
 from gmwm.variance.analysis import MIN_SAMPLES, check_varies, where_of
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.cumulant import fourth_cumulant
+from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.streaming.gaps import effects, unmasked
 from gmwm.variance.streaming.series import Series
 from gmwm.variance.wavelet import WaveletVariance
@@ -64,7 +64,7 @@ def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletV
         quantity=channel.quantity,
         unit=channel.unit or "u",
         gaps=gaps,
-        fourth_cumulant=fourth_cumulant(
+        fourth_cumulant=cumulant_of_powers(
             4.0 * float(square[0]), 16.0 * done.fourth_power, float(windows[0])
         ),
     )

@@ -1,0 +1,165 @@
+"""A long recording, a block at a time: what does not fit into memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Protocol, cast
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.clock import agree
+from gmwm.readers.formats import open_tables
+from gmwm.readers.reader import read_table, roles_of
+from gmwm.readers.recording import Recording
+from gmwm.readers.roles import Reference
+from gmwm.readers.table import Table
+
+
+class _Divisible(Table, Protocol):
+    """A table that gives some rows at a time."""
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]: ...
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """Some rows of a table, as a table: they are read already."""
+
+    whole: Table
+    arrays: Mapping[int, FloatArray]
+    before: int
+
+    source = property(lambda self: self.whole.source)
+    names = property(lambda self: self.whole.names)
+    tentative = property(lambda self: self.whole.tentative)
+    rate = property(lambda self: self.whole.rate)
+    notices = property(lambda self: self.whole.notices)
+
+    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
+        return {column: self.arrays[column] for column in columns}
+
+    def where(self, row: int) -> str:
+        return self.whole.where(self.before + row)
+
+
+def read_blocks(
+    path: str | os.PathLike[str] | Any,
+    rate: float | None = None,
+    units: Mapping[str, str] | None = None,
+    channels: Mapping[str, Reference] | Collection[str] | None = None,
+    time: Reference | Literal[False] | None = None,
+    *,
+    rows: int = tuning.ROWS_OF_BLOCK,
+) -> Iterator[Recording]:
+    """Read a static recording a block at a time, as `gmwm.read` does as a whole.
+
+    Parameters
+    ----------
+    path, rate, units, channels, time
+        As in `gmwm.read`, of delimited text, NPY, Parquet, Feather or a table in memory.
+    rows : int, optional
+        Of a block, about.
+
+    Yields
+    ------
+    Recording
+        Consecutive parts on one grid of the sampling interval of the first; rows that are missing
+        between two of them are NaN at the beginning of the second.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used, or not a block at a time.
+    """
+    tables = open_tables(path)
+    if len(tables) > 1 or not hasattr(tables[0], "segments"):
+        raise InputError(
+            f"{tables[0].source} cannot be read a block at a time: convert it to Parquet, CSV or "
+            "NPY, or read fewer channels",
+            "memory",
+        )
+    table = cast(_Divisible, tables[0])
+    first: Recording | None = None
+    end: float | None = None  # time stamp of the last row, in the unit of the column
+    done = 0
+    for arrays, stamps in _segments(table, rate, units or {}, channels, time, rows):
+        found = read_table(_Segment(table, arrays, done), rate, units or {}, channels, time)
+        if first is None:
+            first = found
+        found = _on_the_grid(found, first, stamps, end, done)
+        end = None if stamps is None else float(stamps[-1])
+        done += next(iter(arrays.values())).size
+        yield found
+
+
+def _segments(
+    table: _Divisible,
+    rate: float | None,
+    units: Mapping[str, str],
+    channels: Mapping[str, Reference] | Collection[str] | None,
+    time: Reference | Literal[False] | None,
+    rows: int,
+) -> Iterator[tuple[dict[int, FloatArray], FloatArray | None]]:
+    """Columns of some rows after others; a rest too short to tell a rate is joined to the last."""
+    roles = roles_of(table, units, channels, time)
+    wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
+    held: dict[int, FloatArray] | None = None
+    for arrays in table.segments(wanted, rows):
+        if held is not None and next(iter(arrays.values())).size < tuning.FEWEST_OF_BLOCK:
+            arrays = {i: np.concatenate([held[i], values]) for i, values in arrays.items()}
+            held = None
+        if held is not None:
+            yield held, None if roles.time is None else held[roles.time]
+        held = arrays
+    if held is None:
+        raise InputError(f"{table.source} holds no samples: record longer")
+    yield held, None if roles.time is None else held[roles.time]
+
+
+def _on_the_grid(
+    found: Recording,
+    first: Recording,
+    stamps: FloatArray | None,
+    end: float | None,
+    rows: int,
+) -> Recording:
+    """A part with the rows that are missing between it and the one before."""
+    if not agree(found.rate, first.rate):
+        raise InputError(
+            f"{first.source}: the sampling rate changes, from {first.rate:.6g} to "
+            f"{found.rate:.6g} Hz about row {rows:,}: cut the file there"
+        )
+    missing = 0
+    if stamps is not None and end is not None:
+        step = (stamps[-1] - stamps[0]) / (found.n - 1)
+        missing = round((stamps[0] - end) / step) - 1
+        if missing < -tuning.ROWS_BACK_OF_BLOCK:
+            raise InputError(
+                f"{first.source}: time stamps go back about row {rows:,}: cut the file there"
+            )
+    gone = np.full(max(missing, 0), np.nan)
+    return replace(
+        found,
+        channels=tuple(
+            replace(c, values=np.concatenate([gone, c.values]) if gone.size else c.values,
+                    dt=first.dt)
+            for c in found.channels
+        ),
+    )  # fmt: skip
+
+
+def notices_of_blocks(first: Recording, missing: Mapping[str, int], n: int) -> tuple[Notice, ...]:
+    """Those of the first block that hold for all, and how much is missing in all of them."""
+    kept = [notice for notice in first.notices if notice.code != "missing-samples"]
+    for name, count in missing.items():
+        if count:
+            text = f"{count:,} of {n:,} samples missing"
+            values = {"missing": count}
+            kept.append(Notice("missing-samples", "note", name, text, values))
+    return tuple(kept)

@@ -1,0 +1,96 @@
+"""Wavelet variances of a recording that is read a block at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.units import SI_UNIT
+from gmwm.readers import Recording, notices_of_blocks, read_blocks
+from gmwm.variance.streaming.streaming import StreamingVariance
+from gmwm.variance.wavelet import WaveletVariance
+
+
+@dataclass(frozen=True)
+class StreamedRecording:
+    """What is left of a recording that was read a block at a time.
+
+    Attributes
+    ----------
+    variances : dict of str to WaveletVariance
+        By channel.
+    skipped : dict of str to Notice
+        Channels that have none, and why.
+    source : str
+    dt : float
+        Sampling interval, s.
+    n : int
+        Samples per channel, missing ones included.
+    notices : tuple of Notice
+        What the reader noticed in the first block, and what is missing in all of them.
+    """
+
+    variances: Mapping[str, WaveletVariance]
+    skipped: Mapping[str, Notice]
+    source: str
+    dt: float
+    n: int
+    notices: tuple[Notice, ...]
+
+
+def stream(path: Any, **reading: Any) -> StreamedRecording:
+    """Wavelet variances of a file of any length, read once, a block at a time.
+
+    Parameters
+    ----------
+    path : str, path or table
+        Delimited text, NPY, Parquet or Feather; or a table in memory.
+    **reading
+        ``rate``, ``units``, ``channels``, ``time`` as in `gmwm.read`; ``rows`` of a block.
+
+    Returns
+    -------
+    StreamedRecording
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used, or not a block at a time.
+
+    Examples
+    --------
+    >>> wv = gmwm.stream("static.csv", units={"gyro": "deg/s"}).variances  # doctest: +SKIP
+    >>> gmwm.select(wv["gyro_x"])  # doctest: +SKIP
+    """
+    parts = read_blocks(path, **reading)
+    first = next(parts)
+    names = [channel.name for channel in first.inertial]
+    units = {c.name: c.unit if c.unit in SI_UNIT.values() else "" for c in first.inertial}
+    variance = StreamingVariance(first.dt, units)
+    missing = dict.fromkeys(names, 0)
+    _add(first, variance, missing)
+    for part in parts:
+        _add(part, variance, missing)
+    results = variance.results()
+    return StreamedRecording(
+        variances={k: v for k, v in results.items() if isinstance(v, WaveletVariance)},
+        skipped={
+            name: Notice(error.code or "not-estimable", "bad", name, str(error))
+            for name, error in results.items()
+            if not isinstance(error, WaveletVariance)
+        },
+        source=first.source,
+        dt=first.dt,
+        n=variance.n,
+        notices=notices_of_blocks(first, missing, variance.n),
+    )
+
+
+def _add(part: Recording, variance: StreamingVariance, missing: dict[str, int]) -> None:
+    for name in missing:
+        missing[name] += part[name].missing
+    variance.update(np.stack([part[name].values for name in missing], axis=1))

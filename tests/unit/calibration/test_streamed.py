@@ -1,0 +1,57 @@
+"""Calibration of files beyond a memory budget."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gmwm
+from gmwm.cli.main import cli
+from gmwm.errors import InputError
+
+MODEL = gmwm.WhiteNoise() + gmwm.RandomWalk()
+UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("streamed") / "static.csv"
+    truth = gmwm.WhiteNoise(1e-3) + gmwm.RandomWalk(1e-3)
+    columns = [gmwm.simulate(truth, n=20_000, dt=0.01, seed=seed) for seed in (1, 2)]
+    rows = np.stack([*columns, np.full(20_000, 9.81)], axis=1)
+    np.savetxt(path, rows, "%.9g", ",", header="gyro_x,gyro_y,accel_z", comments="")
+    return path
+
+
+def test_models_are_those_of_the_whole(file):
+    found = gmwm.calibrate_stream(file, MODEL, rate=100, units=UNITS, rows=3000)
+    whole = gmwm.calibrate(gmwm.read(file, rate=100, units=UNITS), MODEL, screening=())
+    assert list(found) == list(whole) == ["gyro_x", "gyro_y"]
+    for name, fit in whole.items():
+        for key, error in fit.stderr.items():
+            assert abs(found[name].params[key] - fit.params[key]) < 0.02 * error
+    assert found.skipped.keys() == {"accel_z"}
+    assert found.n == 20_000
+    assert [notice.code for notice in found.notices if notice.severity == "warning"] == ["streamed"]
+    assert not found.is_examined
+
+
+def test_the_command_reads_blocks_beyond_its_memory(file, tmp_path):
+    asked = ["calibrate", str(file), "--rate", "100", "--gyro-unit", "rad/s", "--accel-unit",
+             "m/s^2", "--model", "N + K", "-q", "-o", str(tmp_path / "out")]  # fmt: skip
+    done = CliRunner().invoke(cli, [*asked, "--memory", "0.0005"])
+    assert done.exit_code == 0, done.output
+    stored = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert "streamed" in [notice["code"] for notice in stored["notices"]]
+    assert sorted(stored["channels"]) == ["gyro_x", "gyro_y"]
+    assert (tmp_path / "out" / "report.html").exists()
+    refused = CliRunner().invoke(cli, [*asked, "--memory", "0.0005", "--start", "1"])
+    assert refused.exit_code == 2
+    assert "memory" in refused.output
+
+
+def test_a_file_without_a_usable_channel(tmp_path):
+    np.save(tmp_path / "flat.npy", np.zeros((5000, 3)))
+    with pytest.raises(InputError, match=r"flat.npy: .*constant"):
+        gmwm.calibrate_stream(tmp_path / "flat.npy", rate=100, units={"gyro": "rad/s"})

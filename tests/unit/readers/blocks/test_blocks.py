@@ -1,0 +1,94 @@
+"""Files that are read a block at a time, against the same files read as a whole."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+import gmwm
+from gmwm.errors import InputError
+from gmwm.readers import read_blocks
+
+UNITS = {"gyro": "deg/s", "accel": "m/s^2"}
+N = 30_000
+ROWS = 7000
+
+
+@pytest.fixture(scope="module")
+def columns():
+    """Two channels with stamps of which rows are missing, some at the seam of two blocks."""
+    rng = np.random.default_rng(1)
+    time = np.arange(N) / 100.0
+    gyro, accel = rng.normal(size=N), 9.81 + 0.01 * rng.normal(size=N)
+    gyro[1234] = np.nan
+    kept = np.ones(N, dtype=bool)
+    kept[2000:2007] = False
+    kept[ROWS + 5 : ROWS + 12] = False
+    return {"time_s": time[kept], "gyro_x": gyro[kept], "accel_z": accel[kept]}
+
+
+@pytest.fixture(scope="module", params=["csv", "parquet", "stamps", "npy"])
+def file(request, columns, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("blocks")
+    path = folder / f"static.{'parquet' if request.param == 'stamps' else request.param}"
+    if request.param == "csv":
+        text = "\n".join(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))
+        path.write_text(",".join(columns) + "\n" + text.replace("nan", "") + "\n")
+        return path, {}
+    if request.param == "npy":
+        np.save(path, np.stack(list(columns.values()), axis=1))
+        return path, {"channels": {"gyro_x": 1, "accel_z": 2}, "time": 0}
+    table = pa.table(columns)
+    if request.param == "stamps":
+        ticks = 1_700_000_000_000_000 + np.rint(columns["time_s"] * 1e6).astype(np.int64)
+        table = table.set_column(0, "time", pa.array(ticks, pa.timestamp("us")))
+    parquet.write_table(table, path)
+    return path, {}
+
+
+def test_blocks_are_the_recording(file):
+    path, options = file
+    whole = gmwm.read(path, units=UNITS, **options)
+    parts = list(read_blocks(path, units=UNITS, rows=ROWS, **options))
+    assert len(parts) > 1
+    for name, channel in whole.items():
+        found = np.concatenate([part[name].values for part in parts])
+        np.testing.assert_array_equal(found, channel.values)
+    assert parts[0].dt == pytest.approx(whole.dt, rel=1e-6)
+    assert whole.n == N
+
+
+def test_variances_of_a_file_are_those_of_its_samples(file):
+    path, options = file
+    found = gmwm.stream(path, units=UNITS, rows=ROWS, **options)
+    whole = gmwm.read(path, units=UNITS, **options)
+    assert found.n == N
+    assert [n.values["missing"] for n in found.notices if n.code == "missing-samples"] == [15, 14]
+    for name, channel in whole.items():
+        alone = gmwm.StreamingVariance(channel.dt)
+        alone.update(channel.values)
+        wv = found.variances[name]
+        np.testing.assert_array_equal(wv.variance, alone.result().variance)
+        assert (wv.name, wv.quantity) == (name, channel.quantity)
+
+
+def test_a_change_of_rate_and_stamps_that_go_back(tmp_path):
+    rng = np.random.default_rng(2)
+    slow = np.arange(10_000) / 50.0
+    for name, time, message in (
+        ("changes", np.concatenate([slow, slow[-1] + np.arange(1, 9001) / 100.0]), "rate changes"),
+        ("back", np.concatenate([slow, slow]), "go back"),
+    ):
+        path = tmp_path / f"{name}.parquet"
+        parquet.write_table(pa.table({"time_s": time, "gyro_x": rng.normal(size=time.size)}), path)
+        with pytest.raises(InputError, match=message):
+            list(read_blocks(path, units=UNITS, rows=10_000))
+
+
+def test_a_log_is_not_divided(tmp_path):
+    np.savez(tmp_path / "a.npz", gyro=np.zeros((100, 3)), rate=100.0)
+    assert len(list(read_blocks(tmp_path / "a.npz", units=UNITS))) == 1
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"gyro": np.random.default_rng(0).normal(size=(100, 3))})
+    assert len(list(read_blocks(tmp_path / "a.mat", rate=100.0, units=UNITS))) == 1
