@@ -98,3 +98,8 @@ def test_files_of_the_source_are_called_so(name):
     text = PAGES[name].read_text(encoding="utf-8")
     if re.search(r"\b(examples|benchmarks|tests)/|^pytest ", text, re.MULTILINE):
         assert "source checkout" in text
+
+
+def test_every_page_is_on_the_site():
+    listed = set(re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.MULTILINE))
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
