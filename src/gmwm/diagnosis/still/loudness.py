@@ -49,7 +49,9 @@ def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
         Without loud blocks where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
-    known = np.flatnonzero(~np.any(np.isnan(scatter), axis=1))
+    # Without rounding a block that does not scatter at all is dead, not quiet.
+    dead = (scatter == 0.0) & (step == 0.0)
+    known = np.flatnonzero(~np.any(np.isnan(scatter) | dead, axis=1))
     count = known.size // tuning.BLOCKS_OF_LEVEL
     if count < tuning.FEWEST_BLOCKS:
         return nothing
