@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -26,6 +27,7 @@ from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.calibration.stages import current, stage
 from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
@@ -295,9 +297,10 @@ def calibrate(
     """
     given = _recordings(recording)
     _check_together(given)
-    if still and screening:
-        given = [part for each in given for part in stretches_at_rest(each)]
-    treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    with stage("health"):
+        if still and screening:
+            given = [part for each in given for part in stretches_at_rest(each)]
+        treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -320,22 +323,34 @@ def calibrate(
         if progress is not None:
             progress(len(finished), len(alive), name)
 
+    watch = current()
+
     def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
+        with watch.running() if watch is not None else nullcontext():
+            return estimate(name)
+
+    def estimate(name: str) -> tuple[Fit, Selection | None] | InputError:
         try:
             channels, given_model = alive[name], model_of(name, model)
             removed: list[tuple[Departure, ...]] = [()] * len(channels)
             for rounds in range(tuning.REMOVALS + 1):
-                parts = [
-                    variance_without(channel, gone, robust=name in robust)
-                    for channel, gone in zip(channels, removed, strict=True)
-                ]
+                with stage("variance"):
+                    parts = [
+                        variance_without(channel, gone, robust=name in robust)
+                        for channel, gone in zip(channels, removed, strict=True)
+                    ]
                 data = parts[0] if len(parts) == 1 else parts
                 selection: Selection | None = None
-                if given_model is None:
-                    selection = select(data, extra=offered[name])
-                fit = selection.fit if selection else estimated(cast("Model", given_model), data)
-                there = [departures(fit, part) for part in parts]
+                with stage("model"):
+                    if given_model is not None:
+                        fit = estimated(given_model, data)
+                    else:
+                        selection = select(data, extra=offered[name])
+                        fit = selection.fit
+                        _ = selection.rivals  # found here, where channels are done side by side
+                with stage("departures"):
+                    there = [departures(fit, part) for part in parts]
                 evident = [tuple(each for each in some if each.is_evident) for some in there]
                 if not (remove_departures and any(evident)) or rounds == tuning.REMOVALS:
                     break
