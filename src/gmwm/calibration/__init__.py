@@ -1,8 +1,8 @@
 """The main job: every channel of a recording, screening, a summary."""
 
 from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
-from gmwm.calibration.departure_notices import without_departures
 from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.removal import without_departures
 from gmwm.calibration.screening import SCREENING
 from gmwm.calibration.stages import Stopwatch, stage
 from gmwm.calibration.streamed import calibrate_stream

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("start", "stop", "layout", "topics")
+_WHOLE = ("form", "start", "stop", "layout", "topics")
 """Options of reading for which the whole file is read."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
@@ -73,6 +73,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @reading_options
 @part_options
 @estimating_options
+@click.option("--remove-departures", is_flag=True,
+              help="Subtract steps, transients at the start and slow periods that are found, and "
+                   "calibrate what is left.")  # fmt: skip
 @click.option(
     "--export",
     "target",
@@ -95,6 +98,7 @@ def calibrate(
     models: tuple[str, ...],
     left: tuple[str, ...],
     everything: bool,
+    remove_departures: bool,
     target: str | None,
     datasheet: Path | None,
     jobs: int,
@@ -136,6 +140,11 @@ def calibrate(
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"):
             recordings, in_blocks = _recordings(files, memory, reading)
+        if in_blocks and remove_departures:
+            raise InputError(
+                "--remove-departures needs all samples, and the file does not fit into memory: "
+                "take a part with --start and --stop, or leave it out"
+            )
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
         if datasheet is not None:  # what is wrong with it is known before the work
@@ -149,8 +158,8 @@ def calibrate(
                 calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
                 if in_blocks
                 else run(
-                    recordings, model, screening=chosen, still=not everything, jobs=jobs,
-                    progress=bar,
+                    recordings, model, screening=chosen, still=not everything,
+                    remove_departures=remove_departures, jobs=jobs, progress=bar,
                 )
             )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
@@ -232,7 +241,7 @@ def show(result: Calibration) -> None:
         for notice in fit.notices:
             if notice.code in _OF_RECORDING:
                 continue
-            console.print(f"- {name}: {notice}", highlight=False)
+            console.print(f"- {name}: {with_option(notice)}", highlight=False)
 
 
 def _is_shown(notice: Notice) -> bool:
