@@ -249,6 +249,17 @@ def test_columns_by_number_and_time_by_name(run, tmp_path):
     assert "at 100 Hz" in printed
 
 
+def test_timings_are_printed_stage_by_stage(run, good_file):
+    arguments = ("calibrate", good_file, *RATE, *SI, "--channels", "gyro_x", "--model", "N")
+    code, printed, told = run(*arguments, "--json", "--timings")
+    assert code == 0
+    json.loads(printed)
+    stages = [line.split()[0] for line in told.splitlines()[2:]]
+    assert stages[:4] == ["read", "health", "variance", "model"]
+    assert {"departures", "report", "exports", "all"} <= set(stages)
+    assert all(len(line) <= 80 for line in told.splitlines())
+
+
 def test_the_shortest_recordings_are_calibrated(run, tmp_path):
     # With these seeds the one coefficient of the coarsest level happens to be small.
     for seed in (1, 6, 20):

@@ -1,9 +1,10 @@
 """The main job: every channel of a recording, screening, a summary."""
 
 from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
-from gmwm.calibration.departure_notices import without_departures
 from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.removal import without_departures
 from gmwm.calibration.screening import SCREENING
+from gmwm.calibration.stages import Stopwatch, stage
 from gmwm.calibration.streamed import calibrate_stream
 from gmwm.calibration.summary import (
     Level,
@@ -20,6 +21,7 @@ __all__ = [
     "Calibration",
     "Departure",
     "Level",
+    "Stopwatch",
     "calibrate",
     "calibrate_stream",
     "departures",
@@ -28,6 +30,7 @@ __all__ = [
     "noise_density",
     "random_walk",
     "sentence",
+    "stage",
     "white_density",
     "without_departures",
 ]

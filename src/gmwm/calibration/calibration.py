@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -22,8 +23,11 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.departure_notices import with_departures
+from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.rest import stretches_at_rest
 from gmwm.calibration.screening import SCREENING, Screened, screened, with_outcomes
+from gmwm.calibration.stages import current, stage
 from gmwm.calibration.summary import sentence
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError, MissingNameError
@@ -31,7 +35,7 @@ from gmwm.estimate import Estimate, Fit, estimate as estimated
 from gmwm.process import Model, Process, model_from_list
 from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.selection import Selection, select, wider_ranges
-from gmwm.variance import MIN_SAMPLES, wavelet_variance
+from gmwm.variance import MIN_SAMPLES
 
 if TYPE_CHECKING:
     import pandas
@@ -239,6 +243,7 @@ def calibrate(
     *,
     screening: Collection[str] = SCREENING,
     still: bool = True,
+    remove_departures: bool = False,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -270,6 +275,10 @@ def calibrate(
     still : bool, optional
         Whether only the stretches at rest of a log that is not static are used, as several
         recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
+    remove_departures : bool, optional
+        Whether evident steps, transients at the start and slow periods are subtracted, the samples
+        at which a step may be left out, and what is left is fitted again, three times at most; what
+        their estimated sizes take of the noise is given back to the wavelet variances.
     jobs : int, optional
         Threads. One is fastest for recordings of usual length, whose fits are small steps that
         threads of one interpreter do in turns; -1 is one per core.
@@ -288,9 +297,10 @@ def calibrate(
     """
     given = _recordings(recording)
     _check_together(given)
-    if still and screening:
-        given = [part for each in given for part in stretches_at_rest(each)]
-    treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    with stage("health"):
+        if still and screening:
+            given = [part for each in given for part in stretches_at_rest(each)]
+        treated = [screened(part, screening) for each in given for part in each.by_rate()]
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     if isinstance(model, Mapping):
@@ -313,16 +323,39 @@ def calibrate(
         if progress is not None:
             progress(len(finished), len(alive), name)
 
+    watch = current()
+
     def one(name: str) -> tuple[Fit, Selection | None] | InputError:
         report(name)
+        with watch.running() if watch is not None else nullcontext():
+            return estimate(name)
+
+    def estimate(name: str) -> tuple[Fit, Selection | None] | InputError:
         try:
-            parts = [wavelet_variance(part, robust=name in robust) for part in alive[name]]
-            data = parts[0] if len(parts) == 1 else parts
-            given_model = model_of(name, model)
-            if given_model is not None:
-                return with_departures(estimated(given_model, data), sources[name]), None
-            selection = select(data, extra=offered[name])
-            return with_departures(selection.fit, sources[name]), selection
+            channels, given_model = alive[name], model_of(name, model)
+            removed: list[tuple[Departure, ...]] = [()] * len(channels)
+            for rounds in range(tuning.REMOVALS + 1):
+                with stage("variance"):
+                    parts = [
+                        variance_without(channel, gone, robust=name in robust)
+                        for channel, gone in zip(channels, removed, strict=True)
+                    ]
+                data = parts[0] if len(parts) == 1 else parts
+                selection: Selection | None = None
+                with stage("model"):
+                    if given_model is not None:
+                        fit = estimated(given_model, data)
+                    else:
+                        selection = select(data, extra=offered[name])
+                        fit = selection.fit
+                        _ = selection.rivals  # found here, where channels are done side by side
+                with stage("departures"):
+                    there = [departures(fit, part) for part in parts]
+                evident = [tuple(each for each in some if each.is_evident) for some in there]
+                if not (remove_departures and any(evident)) or rounds == tuning.REMOVALS:
+                    break
+                removed = [gone + more for gone, more in zip(removed, evident, strict=True)]
+            return with_departures(fit, sources[name], there, removed), selection
         except InputError as error:
             return error  # of this channel; the others go on
         finally:

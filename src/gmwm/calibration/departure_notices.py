@@ -1,26 +1,23 @@
-"""What a calibration reports of departures from stationary noise, and how they are taken off."""
+"""What a calibration reports of departures from stationary noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
-from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import Departure, departures
-from gmwm.errors import InputError
+from gmwm.calibration.departures import Departure
 from gmwm.estimate import Fit
-from gmwm.readers import Channel, Recording
-from gmwm.variance import PooledVariance
-
-_KINDS = ("step", "transient", "drift-at-start", "slow-period")
 
 
-def with_departures(fitted: Fit, sources: Sequence[str]) -> Fit:
+def with_departures(
+    fitted: Fit,
+    sources: Sequence[str],
+    found: Sequence[Sequence[Departure]],
+    removed: Sequence[Sequence[Departure]],
+) -> Fit:
     """A fit with a notice of each departure; not valid if one accounts for much of the noise.
 
     Parameters
@@ -28,15 +25,27 @@ def with_departures(fitted: Fit, sources: Sequence[str]) -> Fit:
     fitted : Fit
     sources : sequence of str
         Of its recordings; named where there are several.
+    found, removed : sequence of sequence of Departure
+        What each recording has, and what was taken off before the fit.
     """
-    wv = fitted.wv
-    parts = wv.parts if isinstance(wv, PooledVariance) else (wv,)
+    unit = fitted.wv.unit
     notices = [
-        replace(departure_notice(found, wv.unit), source=source if len(parts) > 1 else "")
-        for part, source in zip(parts, sources, strict=True)
-        for found in departures(fitted, part)
+        replace(notice, source=source if len(sources) > 1 else "")
+        for source, there, gone in zip(sources, found, removed, strict=True)
+        for notice in (
+            *(departure_notice(each, unit) for each in there),
+            *(_removed_notice(each, unit) for each in gone),
+        )
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+
+
+def _removed_notice(found: Departure, unit: str) -> Notice:
+    """Of what a fit is without."""
+    notice = departure_notice(found, unit)
+    text = notice.text.partition(";")[0]
+    values = {**notice.values, "removed": True}
+    return replace(notice, severity="note", text=text, values=values, action="taken off")
 
 
 def departure_notice(found: Departure, unit: str) -> Notice:
@@ -80,7 +89,7 @@ def departure_notice(found: Departure, unit: str) -> Notice:
             f"{what}; it accounts for up to {part} of the model's wavelet variance, so that slow "
             "terms of the model are too large"
         )
-        action = f"{remedy}, or take it off (gmwm.without_departures)"
+        action = f"{remedy}, or take it off (remove_departures=True)"
     else:
         severity = "warning" if harmful else "note"
         text = f"{what}, or slow noise: this record does not distinguish them"
@@ -89,76 +98,3 @@ def departure_notice(found: Departure, unit: str) -> Notice:
     values = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
     return Notice(found.kind, severity, "", text, values, action)
-
-
-def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recording:
-    """A recording without what its calibration reports as evident departures.
-
-    Steps, transients, drifts at the start and slow periods are subtracted; samples at which a step
-    may be are missing (NaN). What is left has one parameter less for each size, which a calibration
-    of it does not know.
-
-    Parameters
-    ----------
-    recording : Recording
-        That which was calibrated, alone.
-    fits : Calibration or mapping of str to Fit
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    InputError
-        If a fit is of a recording of another length.
-
-    Examples
-    --------
-    >>> import gmwm, numpy as np
-    >>> x = gmwm.simulate(gmwm.WhiteNoise(0.01), n=36_000, dt=0.1, seed=1)
-    >>> x[20_000:] += 0.05
-    >>> rec = gmwm.Recording.from_arrays({"gyro_x": x}, 10.0, {"gyro": "rad/s"})
-    >>> found = gmwm.calibrate(rec)
-    >>> found["gyro_x"].reasons["stationary"]
-    False
-    >>> again = gmwm.calibrate(gmwm.without_departures(rec, found))
-    >>> again["gyro_x"].valid, list(again["gyro_x"].params)
-    (True, ['N'])
-    """
-    for name, fit in fits.items():
-        if name in recording and fit.wv.n * fit.wv.dt > recording.duration + recording.dt:
-            raise InputError(
-                f"{recording.source or 'the recording'} is not the one that was calibrated: "
-                f"{recording.duration:g} s, and the fit of {name} has {fit.wv.n * fit.wv.dt:g} s"
-            )
-    channels = tuple(
-        _without(channel, fits[channel.name].notices) if channel.name in fits else channel
-        for channel in recording.channels
-    )
-    return replace(recording, channels=channels)
-
-
-def _without(channel: Channel, notices: Sequence[Notice]) -> Channel:
-    values = np.array(channel.values, dtype=float)
-    time = channel.dt * np.arange(values.size, dtype=float)
-    for notice in notices:
-        if notice.code not in _KINDS or notice.values["evidence"] < tuning.EVIDENT:
-            continue
-        values -= notice.values["size"] * _curve(notice, time)
-        if notice.code == "step":
-            near = (time > notice.values["time_lower"]) & (time < notice.values["time_upper"])
-            values[near] = np.nan
-    return replace(channel, values=values)
-
-
-def _curve(notice: Notice, time: FloatArray) -> FloatArray:
-    """At unit size."""
-    length = notice.values["time"]
-    if notice.code == "step":
-        return np.asarray(time > length, dtype=float)
-    if notice.code == "transient":
-        return np.exp(-time / length)
-    if notice.code == "drift-at-start":
-        return np.maximum(1.0 - time / length, 0.0)
-    return np.cos(2.0 * np.pi * time / length - notice.values["phase"])

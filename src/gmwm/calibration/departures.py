@@ -33,7 +33,8 @@ from gmwm.estimate.problem import Scales, difference_covariance
 from gmwm.process import PSD, Model, RandomWalk
 from gmwm.variance import WaveletVariance
 
-_WIDE = float(norm.isf(0.025))
+WIDE = float(norm.isf(0.025))
+"""Standard errors of half a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -302,10 +303,10 @@ class _Test:
         variance = self.weight @ (self.variances + (self.sizes - each) ** 2)
         if each.size == 1:
             value, error = float(each[0]), float(np.sqrt(variance[0]))
-            return value, value - _WIDE * error, value + _WIDE * error
+            return value, value - WIDE * error, value + WIDE * error
         value = float(np.hypot(*each))
         error = float(np.sqrt(each**2 @ variance)) / value
-        return value, max(value - _WIDE * error, 0.0), value + _WIDE * error
+        return value, max(value - WIDE * error, 0.0), value + WIDE * error
 
     @property
     def phase(self) -> float:

@@ -9,6 +9,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration.calibration import Calibration, ambiguity, model_of
 from gmwm.calibration.departure_notices import with_departures
+from gmwm.calibration.departures import departures
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.process import Model, Process
@@ -70,7 +71,7 @@ def calibrate_stream(
                 fit = chosen.fit
                 if chosen.rivals:
                     tied[name] = chosen
-            fits[name] = with_departures(fit, [found.source])
+            fits[name] = with_departures(fit, [found.source], [departures(fit)], [()])
         except InputError as error:  # of this channel; the others go on
             skipped[name] = Notice(error.code or "not-estimable", "bad", name, str(error))
     if progress is not None:

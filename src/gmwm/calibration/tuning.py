@@ -45,6 +45,9 @@ lower, as much as a valid fit may miss."""
 MOST_DEPARTURES = 5
 """Of one channel."""
 
+REMOVALS = 3
+"""Rounds of taking off what is found: beside the noise that is left without it more may show."""
+
 MOST_MEANS = 256
 """Block means; dense matrices of them are made."""
 

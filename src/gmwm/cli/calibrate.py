@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from gmwm._core.notices import Notice
-    from gmwm.calibration import Calibration
+    from gmwm.calibration import Calibration, Stopwatch
     from gmwm.readers import Recording
 
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("start", "stop", "layout", "topics")
+_WHOLE = ("form", "start", "stop", "layout", "topics")
 """Options of reading for which the whole file is read."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
@@ -73,6 +73,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @reading_options
 @part_options
 @estimating_options
+@click.option("--remove-departures", is_flag=True,
+              help="Subtract steps, transients at the start and slow periods that are found, and "
+                   "calibrate what is left.")  # fmt: skip
 @click.option(
     "--export",
     "target",
@@ -83,6 +86,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
 @click.option("--memory", type=float, metavar="GB",
               help="For the samples; a longer text, NPY, Parquet or Feather file is read a block "
                    "at a time, and shocks, lines and motion are not looked for then. By default a "
@@ -94,9 +98,11 @@ def calibrate(
     models: tuple[str, ...],
     left: tuple[str, ...],
     everything: bool,
+    remove_departures: bool,
     target: str | None,
     datasheet: Path | None,
     jobs: int,
+    timings: bool,
     memory: float | None,
     as_json: bool,
     quiet: bool,
@@ -122,7 +128,7 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     from gmwm._core.files import folder_to_fill
-    from gmwm.calibration import SCREENING, calibrate as run, calibrate_stream
+    from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
     from gmwm.report import read_datasheet
 
     given = written_models(models)
@@ -131,8 +137,14 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
-    with folder_to_fill(output) as folder:
-        recordings, in_blocks = _recordings(files, memory, reading)
+    with folder_to_fill(output) as folder, Stopwatch().running() as watch:
+        with stage("read"):
+            recordings, in_blocks = _recordings(files, memory, reading)
+        if in_blocks and remove_departures:
+            raise InputError(
+                "--remove-departures needs all samples, and the file does not fit into memory: "
+                "take a part with --start and --stop, or leave it out"
+            )
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
         if datasheet is not None:  # what is wrong with it is known before the work
@@ -146,24 +158,40 @@ def calibrate(
                 calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
                 if in_blocks
                 else run(
-                    recordings, model, screening=chosen, still=not everything, jobs=jobs,
-                    progress=bar,
+                    recordings, model, screening=chosen, still=not everything,
+                    remove_departures=remove_departures, jobs=jobs, progress=bar,
                 )
             )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 and not in_blocks else None
         written = write_files(result, folder, own, datasheet, origin)
-    if target is not None:
-        written = f"{written}\n{export_into(folder, result, target)}"
+        if target is not None:
+            with stage("exports"):
+                written = f"{written}\n{export_into(folder, result, target)}"
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
         show(result)
         click.echo(written)
+    if timings:
+        _show_timings(watch, jobs)
     if not any(fit.valid for fit in result.values()):
         click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
         click.get_current_context().exit(NONE_VALID)
+
+
+def _show_timings(watch: Stopwatch, jobs: int) -> None:
+    """On the stream of errors: the output of --json stays JSON."""
+    table = new_table("stage", ">seconds", ">of the processor")
+    rows = [*watch.elapsed.items(), ("all stages", sum(watch.elapsed.values()))]
+    worked = {**watch.worked, "all stages": sum(watch.worked.values())}
+    for name, elapsed in rows:
+        table.add_row(name, f"{elapsed:.2f}", f"{worked[name]:.2f}")
+    console = new_console(to_errors=True)
+    console.print(table)
+    if jobs > 1:
+        console.print("stages of channels run side by side: their seconds are added up")
 
 
 def _recordings(
@@ -213,7 +241,7 @@ def show(result: Calibration) -> None:
         for notice in fit.notices:
             if notice.code in _OF_RECORDING:
                 continue
-            console.print(f"- {name}: {notice}", highlight=False)
+            console.print(f"- {name}: {with_option(notice)}", highlight=False)
 
 
 def _is_shown(notice: Notice) -> bool:
@@ -269,6 +297,7 @@ def write_files(
 ) -> str:
     """Write the files, all or none; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
+    from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
 
     names = ["calibration.json", "report.html"]
@@ -277,11 +306,14 @@ def write_files(
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
     with moved_together(folder) as new:
-        result.save(new / names[0])
-        result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+        with stage("report"):
+            result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+        with stage("exports"):
+            result.save(new / names[0])
         if {"gyro", "accel"} <= quantities:
             try:
-                export(result, "kalibr", path=new / "imu.yaml")
+                with stage("exports"):
+                    export(result, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
                 horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
                 lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from gmwm._core.typing import Progress
 
 
-def new_console(width: int | None = None) -> Console:
+def new_console(width: int | None = None, *, to_errors: bool = False) -> Console:
     from rich.console import Console
 
     # Piped output is as wide as a terminal that people use, not as rich guesses. Names come from
     # files: brackets and colons in them are no markup.
-    return Console(width=width or (None if sys.stdout.isatty() else 80), markup=False, emoji=False)
+    stream = sys.stderr if to_errors else sys.stdout
+    width = width or (None if stream.isatty() else 80)
+    return Console(width=width, markup=False, emoji=False, stderr=to_errors)
 
 
 def print_whole(console: Console, table: Table) -> None:

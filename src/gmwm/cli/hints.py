@@ -33,6 +33,8 @@ HINTS = {
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
 }
 
+_DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
+
 
 def with_hint(error: InputError) -> str:
     """The message of an error, its mend in the words of the command line."""
@@ -45,8 +47,19 @@ def with_hint(error: InputError) -> str:
 
 
 def with_option(notice: Notice) -> Notice:
-    """A notice with the options that choose its static stretch."""
-    if notice.code not in ("not-static", "tilt") or "start" not in notice.values:
+    """A notice with the options that do what it advises."""
+    values = notice.values
+    if notice.code in ("not-static", "tilt") and "start" in values:
+        start, stop = values["start"], values["stop"]
+        return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
+    if notice.code not in _DEPARTURES or notice.severity == "note" or "evidence" not in values:
         return notice
-    start, stop = notice.values["start"], notice.values["stop"]
-    return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
+    first, last = values["time_lower"], values["time_upper"]
+    cut = {
+        "step": f"--stop {first:.6g} or --start {last:.6g}",
+        "transient": f"--start {3.0 * last:.6g}",
+        "drift-at-start": f"--start {last:.6g}",
+        "slow-period": "",
+    }[notice.code]
+    options = f"{cut}, or --remove-departures" if cut else "--remove-departures"
+    return replace(notice, action=f"{notice.action.partition(',')[0]}: {options}")

@@ -22,7 +22,7 @@ _NEEDED = (
 )
 
 _READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
-            "start": "--imu-start"}  # fmt: skip
+            "start": "--imu-start", "format": "--format", "layout": "--layout"}  # fmt: skip
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 
 
@@ -117,6 +117,8 @@ def navigate(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    form: str | None,
+    layout: str | None,
 ) -> None:
     """Prove sensor models by navigating; or filter your own IMU and GNSS.
 
@@ -154,7 +156,7 @@ def navigate(
     folder = Path() if file is None else file.parent
     # Where options were given too, what is wrong may be theirs.
     place = None if options or data else file
-    reading = _reading(rate, gyro_unit, accel_unit, channels, time_column)
+    reading = _reading(rate, gyro_unit, accel_unit, channels, time_column, form, layout)
     if imu_start is not None:
         reading["start"] = imu_start
     if _OF_DATA.isdisjoint(content):
@@ -321,6 +323,8 @@ def _reading(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    form: str | None,
+    layout: str | None,
 ) -> dict[str, Any]:
     """How the IMU's record is to be read, as the file would have it."""
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
@@ -329,6 +333,8 @@ def _reading(
         "units": units or None,
         "channels": roles(channels),
         "time": time_reference(time_column),
+        "format": form,
+        "layout": layout,
     }
     return {name: each for name, each in found.items() if each is not None}
 

@@ -21,6 +21,11 @@ _EXAMPLE = "write terms such as N, K, B, Q, R and GM with +, e.g. --model 'N + K
 CLOCKS = ("header", "log")
 """As in `gmwm.read`, which would take long to import for a line of help."""
 
+FORMATS = (
+    "text", "numpy", "hdf5", "mat", "parquet", "feather", "rosbag", "rosbag2", "ulog", "ardupilot",
+)  # fmt: skip
+"""The same."""
+
 _OPTIONS = (
     click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
     click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
@@ -30,14 +35,17 @@ _OPTIONS = (
                       "accel_z=5; repeat. By default roles are guessed from the column names."),
     click.option("--time", "time_column", metavar="COLUMN",
                  help="Time column by name or number; 'none' to ignore it."),
-)  # fmt: skip
-
-
-_PART = (
+    click.option("--format", "form", type=click.Choice(FORMATS), metavar="NAME",
+                 help="What the file is, where its content and its name do not show it: "
+                      f"{', '.join(FORMATS)}."),
     click.option("--layout", metavar="LAYOUT",
                  help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
                       "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
                       "[,rates][,little|big]."),
+)  # fmt: skip
+
+
+_PART = (
     click.option("--topic", "topics", multiple=True, metavar="NAME",
                  help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
                       "for gyros and accelerometers in topics of their own."),
@@ -119,6 +127,7 @@ def arguments_of_read(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    form: str | None = None,
     layout: str | None = None,
     topics: tuple[str, ...] = (),
     clock: str = CLOCKS[0],
@@ -140,6 +149,7 @@ def arguments_of_read(
         "layout": layout,
         "topic": topics,
         "clock": clock,
+        "format": form,
     }
 
 

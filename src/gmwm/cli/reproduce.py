@@ -66,6 +66,8 @@ def reproduce(
     accel_unit: str | None,
     channels: tuple[str, ...],
     time_column: str | None,
+    form: str | None,
+    layout: str | None,
 ) -> None:
     """Repeat an experiment of Stebler et al. (2012), or our own harder one.
 
@@ -100,6 +102,8 @@ def reproduce(
                 accel_unit=accel_unit,
                 channels=channels,
                 time_column=time_column,
+                form=form,
+                layout=layout,
             )
             for file in recordings
         ]

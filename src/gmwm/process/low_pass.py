@@ -20,7 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, Panels, quadrature
+from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, panel_weights, quadrature
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
@@ -228,10 +228,7 @@ def _nodes(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
 @lru_cache(maxsize=8)
 def _on_panels(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     """The same at Chebyshev points of panels, which are a tenth as many."""
-    found = quadrature(_rounded(averaging))
-    panels = Panels.of(found.frequency)
-    weight = panels.gathered(2.0 * found.gain * found.weight)
-    return panels.log_tangent.ravel(), weight.reshape(len(averaging), -1)
+    return panel_weights(_rounded(averaging))
 
 
 def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:

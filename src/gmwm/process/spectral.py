@@ -130,14 +130,12 @@ def _nodes(m_max: float) -> tuple[FloatArray, FloatArray]:
     return (middle + half * x).ravel(), (half * w).ravel()
 
 
-@lru_cache(maxsize=32)
-def quadrature(averaging: tuple[float, ...]) -> Quadrature:
-    """The quadrature for averaging times of ``averaging`` samples each."""
-    frequency, weight = _nodes(max(averaging))
+def _gains(averaging: Sequence[float], frequency: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`Quadrature.gain` and `Quadrature.resolved`."""
     gain = np.empty((len(averaging), frequency.size))
     resolved = np.empty_like(gain)
+    octave_low = 2.0 ** np.floor(np.log2(frequency))
     for row, m in enumerate(averaging):
-        octave_low = 2.0 ** np.floor(np.log2(frequency))
         lobes = m * octave_low
         share = np.where(lobes <= _RESOLVED_LOBES, 1.0, 0.0)
         # The last resolved octave fades out, unless it is the top one: there nothing follows.
@@ -148,6 +146,14 @@ def quadrature(averaging: tuple[float, ...]) -> Quadrature:
         gain[row] = (1.0 - share) * mean
         gain[row, exact] += share[exact] * haar_gain(m, frequency[exact])
         resolved[row] = share
+    return gain, resolved
+
+
+@lru_cache(maxsize=32)
+def quadrature(averaging: tuple[float, ...]) -> Quadrature:
+    """The quadrature for averaging times of ``averaging`` samples each."""
+    frequency, weight = _nodes(max(averaging))
+    gain, resolved = _gains(averaging, frequency)
     for array in (frequency, weight, gain, resolved):
         array.flags.writeable = False
     return Quadrature(frequency, weight, gain, resolved)
@@ -213,6 +219,23 @@ class Panels:
         return np.asarray(tail <= _SMOOTH * np.max(np.abs(values), axis=1))
 
 
+def panel_weights(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Log tan(pi f) at the points of panels, and the weights of each averaging time.
+
+    What `Quadrature.haar_variance` is for a spectrum that is smooth on panels, with a tenth of the
+    points. The gains at all nodes are in memory for some averaging times at a time.
+    """
+    frequency, weight = _nodes(max(averaging))
+    panels = Panels.of(frequency)
+    parts = [
+        panels.gathered(2.0 * weight * _gains(averaging[i : i + _TOGETHER], frequency)[0])
+        for i in range(0, len(averaging), _TOGETHER)
+    ]
+    gathered = np.concatenate(parts).reshape(len(averaging), -1)
+    return panels.log_tangent.ravel(), gathered
+
+
+_TOGETHER = 16
 _SMOOTH = 1e-10
 _TAIL = (
     2.0

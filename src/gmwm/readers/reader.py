@@ -46,6 +46,7 @@ def read(
     *,
     topic: str | Sequence[str] = (),
     clock: str = "header",
+    format: str | None = None,
 ) -> Recording:
     """Read a static recording of an inertial sensor.
 
@@ -83,6 +84,10 @@ def read(
         needed where there are several.
     clock : {"header", "log"}, optional
         Stamps of messages: those of their headers, or the times at which they were recorded.
+    format : str, optional
+        What the file is, where its first bytes and its name do not show it: ``"text"``,
+        ``"numpy"``, ``"hdf5"``, ``"mat"``, ``"parquet"``, ``"feather"``, ``"rosbag"``,
+        ``"rosbag2"``, ``"ulog"`` or ``"ardupilot"``.
 
     Returns
     -------
@@ -104,8 +109,10 @@ def read(
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
     topics = (topic,) if isinstance(topic, str) else tuple(topic)
+    if layout is not None and format is not None:
+        raise InputError("layout is of a binary file without a header: leave out format")
     tables = (
-        open_tables(path, topics, clock)
+        open_tables(path, topics, clock, format)
         if layout is None
         else [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
     )

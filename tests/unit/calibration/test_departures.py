@@ -8,7 +8,9 @@ import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Departure, departures
 from gmwm.calibration.departure_notices import departure_notice
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
+from gmwm.cli.hints import with_option
 
 DT = 1.0
 N = 7200
@@ -152,7 +154,9 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     assert notice.values["lower"] < SAMPLE < notice.values["upper"]
     assert notice.values["time"] == pytest.approx(4300.0, abs=30.0)
     assert notice.values["evidence"] > EVIDENT
-    assert "without_departures" in notice.action
+    assert "remove_departures" in notice.action
+    assert "or --start" in with_option(notice).action
+    assert "--remove-departures" in with_option(notice).action
     again = gmwm.load(found.save(tmp_path / "cal.json"))
     assert again["gyro_x"].notices == fit.notices
     clean = gmwm.without_departures(rec, again)
@@ -162,6 +166,37 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     assert better.reasons["stationary"]
     low, high = better.interval(0.99)["K"]
     assert low < 2e-6 < high
+
+
+def test_a_calibration_takes_it_off_on_request_and_reports_that():
+    rec = recording(noise(10) + SAMPLE * STEP)
+    model = WhiteNoise() + RandomWalk()
+    assert not gmwm.calibrate(rec, model)["gyro_x"].valid
+    fit = gmwm.calibrate(rec, model, remove_departures=True)["gyro_x"]
+    (notice,) = [one for one in fit.notices if one.code == "step"]
+    assert (notice.severity, notice.action, notice.values["removed"]) == ("note", "taken off", True)
+    assert fit.valid, fit.message
+    low, high = fit.interval(0.99)["K"]
+    assert low < 2e-6 < high
+
+
+def test_the_noise_that_an_estimated_step_takes_is_given_back():
+    # Generalized least squares under white noise is the difference of the means of both parts.
+    n, runs = 256, 400
+    unit = np.arange(n) > 100
+    rng = np.random.default_rng(3)
+    error = np.sqrt(1.0 / 101 + 1.0 / 155)
+    ratios = []
+    for _ in range(runs):
+        x = rng.standard_normal(n)
+        size = x[unit].mean() - x[~unit].mean()
+        step = Departure("step", (100.5, 100.5, 100.5),
+                         (size, size - 1.96 * error, size + 1.96 * error), 1e3, 0.5)  # fmt: skip
+        channel = gmwm.Channel("gyro_x", x, 1.0, "gyro", "rad/s")
+        ratios.append(variance_without(channel, [step]).variance)
+    expected = WhiteNoise(1.0).haar_variance(2.0 ** np.arange(8), 1.0)
+    spread = np.std(ratios, axis=0) / np.sqrt(runs)
+    assert np.all(np.abs(np.mean(ratios, axis=0) - expected) < 4.0 * spread)
 
 
 @pytest.mark.parametrize(

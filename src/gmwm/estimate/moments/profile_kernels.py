@@ -6,7 +6,7 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.estimate.problem import nonnegative, without
+from gmwm.estimate.problem import orthogonal_to, solve_columns
 
 
 @compiled()
@@ -36,7 +36,7 @@ def profiled(
             y[i] += weight * rest[j]
             for k in range(linear.size):
                 columns[i, k] += weight * curves[j, linear[k]]
-    x, residual = nonnegative(columns, y)
+    x, residual = solve_columns(columns, y)
     return columns, x, residual
 
 
@@ -70,4 +70,4 @@ def projected(
         if x[k] > 0.0:
             present[:, at] = columns[:, k]
             at += 1
-    return without(weighted, present)
+    return orthogonal_to(weighted, present)

@@ -8,10 +8,10 @@ from gmwm.estimate.problem.information import (
     spectral_information,
 )
 from gmwm.estimate.problem.nonnegative import (
-    nonnegative,
     objectives_with,
+    orthogonal_to,
+    solve_columns,
     solve_nonnegative,
-    without,
 )
 from gmwm.estimate.problem.parameters import (
     Coordinates,
@@ -55,14 +55,14 @@ __all__ = [
     "in_model_order",
     "is_plain",
     "keys_by_term",
-    "nonnegative",
     "objectives_with",
     "ols_slope",
+    "orthogonal_to",
     "shape_of",
     "slope_dof",
     "slope_p_value",
+    "solve_columns",
     "solve_nonnegative",
     "spectral_information",
     "weight_root",
-    "without",
 ]

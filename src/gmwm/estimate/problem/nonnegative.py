@@ -28,7 +28,7 @@ def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, F
     """
     if columns.shape[1] == 0:
         return np.zeros(0), y
-    amplitudes, residuals = nonnegative(np.ascontiguousarray(columns), np.ascontiguousarray(y))
+    amplitudes, residuals = solve_columns(np.ascontiguousarray(columns), np.ascontiguousarray(y))
     return amplitudes, residuals
 
 
@@ -196,7 +196,7 @@ def _unit(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @compiled()
-def nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def solve_columns(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """`solve_nonnegative`, for compiled code; the arrays are contiguous."""
     unit, length = _unit(columns)
     x = _solve(unit, y)
@@ -229,7 +229,7 @@ def _each(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatAr
 
 
 @compiled()
-def without(columns: FloatArray, others: FloatArray) -> FloatArray:
+def orthogonal_to(columns: FloatArray, others: FloatArray) -> FloatArray:
     """What of some columns is orthogonal to others, (J, k) and (J, l).
 
     At most so many of the others as there are rows.

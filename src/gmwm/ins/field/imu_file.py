@@ -50,6 +50,9 @@ def read_imu(
     channels: Mapping[str, str | int] | None = None,
     time: str | int | Literal[False] | None = None,
     start: float | None = None,
+    *,
+    format: str | None = None,
+    layout: str | None = None,
 ) -> Imu:
     """Read an IMU record as increments.
 
@@ -66,6 +69,8 @@ def read_imu(
         ``{"accel_z": "-az"}``, has the opposite sign.
     start : float, optional
         Time of the first sample, s, of a record without time stamps.
+    format, layout : str, optional
+        See `gmwm.read`.
 
     Returns
     -------
@@ -77,7 +82,8 @@ def read_imu(
         If the file cannot be used, an axis or more than `gmwm.ins.tuning.LONGEST_FILLED` of samples
         is missing, or the specific force is far from gravity: most often a wrong unit.
     """
-    return read_imu_log(path, rate, units, channels, time, start).imu
+    log = read_imu_log(path, rate, units, channels, time, start, format=format, layout=layout)
+    return log.imu
 
 
 def read_imu_log(
@@ -87,10 +93,14 @@ def read_imu_log(
     channels: Mapping[str, str | int] | None = None,
     time: str | int | Literal[False] | None = None,
     start: float | None = None,
+    *,
+    format: str | None = None,
+    layout: str | None = None,
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
     columns, turned = _signs(channels)
-    recording = read(path, rate, units, columns, time).of_one_rate("navigation")
+    recording = read(path, rate, units, columns, time, layout, format=format)
+    recording = recording.of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
@@ -107,7 +117,8 @@ def read_imu_log(
             "check the unit of the accelerometers, and that gravity is not subtracted"
         )
     imu = Imu(recording.dt, samples[:, :3] * recording.dt, samples[:, 3:] * recording.dt)
-    first, notices = _clock(Path(path), recording, time, start)
+    is_log = layout is None and (is_text(Path(path)) if format is None else format == "text")
+    first, notices = _clock(Path(path), recording, time if is_log else False, start)
     notices = (*notices, *filled)
     if np.mean(samples[:, 5]) > 0.0:
         text = "its mean is positive: the axis points up, and roll is near 180 deg"
@@ -174,7 +185,7 @@ def _clock(
     none: tuple[float, tuple[Notice, ...]] = 0.0, (Notice("no-time-stamps", "note", "", text),)
     if start is not None:
         none = start - recording.dt, ()
-    if time is False or not is_text(path):
+    if time is False:
         return none
     table = open_log(path)
     found = [i for i, name in enumerate(table.names) if is_time(name)]

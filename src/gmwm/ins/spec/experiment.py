@@ -60,6 +60,8 @@ class ReadingSpec(Spec):
     units: Annotated[dict[str, str] | None, written("{gyro: deg/s, accel: g}")] = None
     channels: Annotated[dict[str, str | StrictInt] | None, written("{gyro_x: column}")] = None
     time: Annotated[str | StrictInt | Literal[False] | None, written("a column, or none")] = None
+    format: str | None = None
+    layout: str | None = None
 
     def options(self) -> dict[str, Any]:
         """Arguments of `gmwm.read`."""

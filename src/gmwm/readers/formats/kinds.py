@@ -76,7 +76,13 @@ KINDS = (
 """All but text, which begins with anything."""
 
 
-def open_tables(data: Any, topics: Sequence[str] = (), clock: str = "header") -> tuple[Table, ...]:
+NAMES = (*(kind.name for kind in KINDS), _TEXT.name)
+"""Of kinds of files, as ``format`` of `gmwm.read` has them."""
+
+
+def open_tables(
+    data: Any, topics: Sequence[str] = (), clock: str = "header", form: str | None = None
+) -> tuple[Table, ...]:
     """Open a file or a table in memory, whatever it is.
 
     Parameters
@@ -86,6 +92,8 @@ def open_tables(data: Any, topics: Sequence[str] = (), clock: str = "header") ->
         Those to read, of a log that has several.
     clock : {"header", "log"}, optional
         Which stamps of messages count.
+    form : str, optional
+        One of `NAMES`, in place of what its first bytes and its name show.
 
     Returns
     -------
@@ -99,8 +107,12 @@ def open_tables(data: Any, topics: Sequence[str] = (), clock: str = "header") ->
     """
     if clock not in CLOCKS:
         raise InputError(f"clock = {clock!r}: give one of {', '.join(CLOCKS)}")
+    if form is not None and form not in NAMES:
+        raise InputError(f"format = {form!r}: give one of {', '.join(NAMES)}")
     path = None if is_frame(data) else Path(data)
-    kind = _TEXT if path is None else _kind(path)
+    if path is None and form is not None:
+        raise InputError("a table in memory has no format: format is for files, leave it out")
+    kind = _TEXT if path is None else _kind(path, form)
     source = path.name if path else "a table"
     if topics and not kind.has_topics:
         raise InputError(f"{source} has no topics: topic is for bags and flight logs, leave it out")
@@ -116,7 +128,11 @@ def is_text(path: Path) -> bool:
     return _kind(path) is _TEXT
 
 
-def _kind(path: Path) -> Kind:
+def _kind(path: Path, form: str | None = None) -> Kind:
+    if form is not None:
+        # A bag of ROS 2 may be a folder, which its reader checks.
+        path = path if form == "rosbag2" else existing_file(path)
+        return next((kind for kind in KINDS if kind.name == form), _TEXT)
     if _is_bag_folder(path):
         return next(kind for kind in KINDS if kind.name == "rosbag2")
     suffix, head = existing_file(path).suffix.lower(), b""

@@ -222,6 +222,13 @@ def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, 
     if len(found) > 1 or len(sensors) < len(SI_UNIT):
         text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
         notices.append(Notice("topic", "note", "", text, {"topic": topic.name}))
+    known = frozenset[str]().union(*(each.sensors for each in found.values()))
+    if topic.sensors and (absent := set(SI_UNIT) - known):
+        words = {"gyro": "angular rates", "accel": "accelerations"}
+        what = words[absent.pop()]
+        text = f"the bag has no {what}: those of {topic.name} are zeros, and only the rest is read"
+        action = "record the other sensor too, if you want a model of it"
+        notices.append(Notice("sensor-absent", "warning", "", text, {"topic": topic.name}, action))
     return BagTable(bag, topic, IMU, (_STAMPS, *names), is_log, origin, tuple(notices))
 
 

@@ -160,6 +160,25 @@ def test_topics_of_two_rates(d435):
     assert set(only) == {"gyro_x", "gyro_y", "gyro_z", "temperature"}
 
 
+@pytest.mark.parametrize(
+    ("absent", "word"), [("gyro", "angular rates"), ("accel", "accelerations")]
+)
+def test_a_bag_of_one_sensor_says_which_is_absent(tmp_path, absent, word):
+    samples = at_rest(400, 3)
+    samples[:, slice(0, 3) if absent == "gyro" else slice(3, 6)] = 0.0
+    path = write2(tmp_path / "one", {"/imu": imu_topic(ROS2, samples, 100.0)}, "MCAP")
+    found = gmwm.read(path)
+    assert not any(name.startswith(absent) for name in found)
+    (notice,) = [each for each in found.notices if each.code == "sensor-absent"]
+    assert f"the bag has no {word}" in notice.text
+
+
+def test_sensors_of_two_topics_are_there(d435):
+    for options in ({}, {"topic": "/gyro/sample"}, {"channels": "accel"}):
+        found = gmwm.read(d435[0], **options)
+        assert "sensor-absent" not in {each.code for each in found.notices}
+
+
 def test_one_calibration_of_two_rates(d435):
     path, gyro, accel = d435
     found = gmwm.calibrate(gmwm.read(path), gmwm.WhiteNoise(), screening=())

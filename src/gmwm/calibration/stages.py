@@ -1,4 +1,11 @@
-"""Where the time of a run goes, stage by stage."""
+"""Where the time of a run goes, stage by stage.
+
+A watch that runs counts whatever is within a `stage`; without one, a stage costs nothing::
+
+    with Stopwatch().running() as watch:
+        gmwm.calibrate(recording)
+    print(watch.worked)
+"""
 
 from __future__ import annotations
 
@@ -28,7 +35,7 @@ class Stopwatch:
 
     @contextmanager
     def running(self) -> Iterator[Stopwatch]:
-        """Let `stage` of this thread count here; ``None`` stops no watch."""
+        """Let `stage` of this thread count here."""
         before = _watch.set(self)
         try:
             yield self

@@ -1,0 +1,138 @@
+"""How departures from stationary noise are taken off, and what that takes of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.calibration.departures import WIDE, Departure
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.readers import Channel, Recording
+from gmwm.variance import WaveletVariance, wavelet_variance
+
+_KINDS = ("step", "transient", "drift-at-start", "slow-period")
+
+
+def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recording:
+    """A recording without what its calibration reports as evident departures.
+
+    Steps, transients, drifts at the start and slow periods are subtracted; samples at which a step
+    may be are missing (NaN). What is left has one parameter less for each size, which a calibration
+    of it does not know; ``gmwm.calibrate(..., remove_departures=True)`` does.
+
+    Parameters
+    ----------
+    recording : Recording
+        That which was calibrated, alone.
+    fits : Calibration or mapping of str to Fit
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        If a fit is of a recording of another length.
+
+    Examples
+    --------
+    >>> import gmwm, numpy as np
+    >>> x = gmwm.simulate(gmwm.WhiteNoise(0.01), n=36_000, dt=0.1, seed=1)
+    >>> x[20_000:] += 0.05
+    >>> rec = gmwm.Recording.from_arrays({"gyro_x": x}, 10.0, {"gyro": "rad/s"})
+    >>> found = gmwm.calibrate(rec)
+    >>> found["gyro_x"].reasons["stationary"]
+    False
+    >>> again = gmwm.calibrate(gmwm.without_departures(rec, found))
+    >>> again["gyro_x"].valid, list(again["gyro_x"].params)
+    (True, ['N'])
+    """
+    for name, fit in fits.items():
+        if name in recording and fit.wv.n * fit.wv.dt > recording.duration + recording.dt:
+            raise InputError(
+                f"{recording.source or 'the recording'} is not the one that was calibrated: "
+                f"{recording.duration:g} s, and the fit of {name} has {fit.wv.n * fit.wv.dt:g} s"
+            )
+    channels = tuple(
+        _without(channel, [_departure(n) for n in fits[channel.name].notices if _is_evident(n)])
+        if channel.name in fits
+        else channel
+        for channel in recording.channels
+    )
+    return replace(recording, channels=channels)
+
+
+def variance_without(
+    channel: Channel, found: Sequence[Departure], *, robust: bool = False
+) -> WaveletVariance:
+    """Wavelet variances of a channel less departures whose sizes were estimated from it.
+
+    An estimated curve has followed the noise: what is subtracted with it has, on average, the
+    square of the standard error of its size times the wavelet variance of the curve at unit size,
+    where the size is estimated by generalized least squares. So much is added again.
+    """
+    left = _without(channel, found)
+    wv = wavelet_variance(left, robust=robust)
+    if not found:
+        return wv
+    missing = np.isnan(left.values)
+    taken = np.zeros_like(wv.variance)
+    for each in found:
+        error = (each.size[2] - each.size[1]) / (2.0 * WIDE)
+        phases = (0.0, 0.5 * np.pi) if each.kind == "slow-period" else (0.0,)
+        for phase in phases:
+            curve = _curve(replace(each, phase=each.phase + phase), _times(channel))
+            unit = wavelet_variance(np.where(missing, np.nan, curve), dt=channel.dt)
+            taken += error**2 * unit.variance[: taken.size]
+    return replace(wv, variance=wv.variance + taken)
+
+
+def _is_evident(notice: Notice) -> bool:
+    return notice.code in _KINDS and notice.values["evidence"] >= tuning.EVIDENT
+
+
+def _departure(notice: Notice) -> Departure:
+    """Of a notice."""
+    of = notice.values
+    return Departure(
+        notice.code,
+        (of["time"], of["time_lower"], of["time_upper"]),
+        (of["size"], of["lower"], of["upper"]),
+        of["evidence"],
+        of["share"],
+        of["phase"],
+    )
+
+
+def _times(channel: Channel) -> FloatArray:
+    return channel.dt * np.arange(len(channel.values), dtype=float)
+
+
+def _without(channel: Channel, found: Sequence[Departure]) -> Channel:
+    if not found:
+        return channel
+    values, time = np.array(channel.values, dtype=float), _times(channel)
+    for each in found:
+        values -= each.size[0] * _curve(each, time)
+        if each.kind == "step":
+            values[(time > each.time[1]) & (time < each.time[2])] = np.nan
+    return replace(channel, values=values)
+
+
+def _curve(found: Departure, time: FloatArray) -> FloatArray:
+    """At unit size."""
+    length = found.time[0]
+    if found.kind == "step":
+        return np.asarray(time > length, dtype=float)
+    if found.kind == "transient":
+        return np.exp(-time / length)
+    if found.kind == "drift-at-start":
+        return np.maximum(1.0 - time / length, 0.0)
+    return np.cos(2.0 * np.pi * time / length - found.phase)

@@ -1,0 +1,31 @@
+"""Where the time of a run goes."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm.calibration import Stopwatch, stage
+
+
+@pytest.fixture(scope="module")
+def recording():
+    rng = np.random.default_rng(1)
+    channels = {f"gyro_{axis}": rng.normal(size=3000) for axis in "xy"}
+    return gmwm.Recording.from_arrays(channels, 10.0, {"gyro": "deg/s"})
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_stages_of_all_threads_are_counted(recording, jobs):
+    with Stopwatch().running() as watch:
+        gmwm.calibrate(recording, gmwm.WhiteNoise(), jobs=jobs)
+    assert set(watch.elapsed) == set(watch.worked) == {"health", "variance", "model", "departures"}
+    assert all(each > 0.0 for each in watch.elapsed.values())
+
+
+def test_without_a_watch_nothing_is_counted():
+    watch = Stopwatch()
+    with watch.running(), stage("one"):
+        pass
+    with stage("two"):
+        pass
+    assert set(watch.elapsed) == {"one"}
