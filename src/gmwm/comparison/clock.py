@@ -168,8 +168,8 @@ def clock_ratio(
         if is_shown and (best is None or len(moved) > len(best.frequencies)):
             rest = {p for p in pairs if not any(_is_near(p[0], q[0]) for q in moved)}
             others = len(_distinct(rest))
-            change = float(np.exp(np.median(changes)))
-            best = ClockRatio(ratio, moved, others, change, changes.size)
+            middle = float(np.exp(np.median(changes)))
+            best = ClockRatio(ratio, moved, others, middle, changes.size)
     return best
 
 
