@@ -168,8 +168,8 @@ def clock_ratio(
         if is_shown and (best is None or len(moved) > len(best.frequencies)):
             rest = {p for p in pairs if not any(_is_near(p[0], q[0]) for q in moved)}
             others = len(_distinct(rest))
-            densities = float(np.exp(np.median(changes)))
-            best = ClockRatio(ratio, moved, others, densities, changes.size)
+            change = float(np.exp(np.median(changes)))
+            best = ClockRatio(ratio, moved, others, change, changes.size)
     return best
 
 

@@ -225,7 +225,10 @@ def _vibrates(
     if not runs:
         return []
     levels = np.array([np.nanmedian(scatter[a:b], axis=0) for a, b in runs])
-    excess = np.max(levels / np.min(levels, axis=0), axis=1) > tuning.LOUDER_THAN_REST
+    # A channel that is dead in the quietest one has no floor to be compared with.
+    floor = np.min(levels, axis=0)
+    alive = floor > 0.0
+    excess = np.max(levels[:, alive] / floor[alive], axis=1, initial=0.0) > tuning.LOUDER_THAN_REST
     return [
         bool(loud) or any(_has_band(c.values[a * size : b * size], dt) for c in channels)
         for (a, b), loud in zip(runs, excess, strict=True)
