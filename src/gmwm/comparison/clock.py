@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm.calibration import Calibration, white_density
 from gmwm.comparison import tuning
 
@@ -47,6 +47,8 @@ class ClockRatio:
         Frequencies of the second over those of the first.
     frequencies : tuple of (float, float)
         Of distinct lines and resonances in the first and the second recording, Hz.
+    others : int
+        Distinct lines and resonances that moved otherwise.
     densities : float
         Median over the channels of N in the second over N in the first; 1/sqrt(ratio) if the clock
         is all.
@@ -56,6 +58,7 @@ class ClockRatio:
 
     ratio: float
     frequencies: tuple[tuple[float, float], ...]
+    others: int
     densities: float
     channels: int
 
@@ -84,19 +87,24 @@ def suspected_clocks(calibrations: Mapping[str, Calibration]) -> list[Notice]:
 
 def _notice(a: str, b: str, found: ClockRatio) -> Notice:
     shown = ", ".join(f"{f:.4g} -> {g:.4g}" for f, g in found.frequencies)
+    rest = f", {found.others} other{'s' * (found.others > 1)} otherwise" if found.others else ""
+    expected = found.expected_densities
     text = (
         f"its clock may differ by a factor of {found.ratio:.4f} from that of {a}: lines and "
-        f"resonances {shown} Hz, N {found.densities:.4f} times ({found.expected_densities:.4f} "
-        f"expected; median of {found.channels} channels)"
+        f"resonances {shown} Hz{rest}, N {found.densities:.4f} times ({expected:.4f} expected; "
+        f"median of {found.channels} channels)"
     )
     values = {
         "ratio": found.ratio,
         "reference": a,
         "lines": len(found.frequencies),
+        "others": found.others,
         "densities": found.densities,
-        "expected": found.expected_densities,
+        "expected": expected,
     }
-    return Notice("clock-ratio", "warning", "", text, values, "check the rates of both", b)
+    # What moved otherwise is no clock, so the rest may be none either.
+    severity: Severity = "note" if found.others else "warning"
+    return Notice("clock-ratio", severity, "", text, values, "check the rates of both", b)
 
 
 def _densities(first: Calibration, second: Calibration) -> dict[str, float]:
@@ -158,11 +166,18 @@ def clock_ratio(
         alone = len(moved) == 1
         is_shown = follow.all() and follow.size >= tuning.FEWEST_DENSITIES if alone else nearer
         if is_shown and (best is None or len(moved) > len(best.frequencies)):
-            best = ClockRatio(ratio, moved, float(np.exp(np.median(changes))), changes.size)
+            rest = {p for p in pairs if not any(_is_near(p[0], q[0]) for q in moved)}
+            others = len(_distinct(rest))
+            densities = float(np.exp(np.median(changes)))
+            best = ClockRatio(ratio, moved, others, densities, changes.size)
     return best
 
 
 _LARGEST = float(np.log(tuning.LARGEST_CLOCK))
+
+
+def _is_near(a: float, b: float) -> bool:
+    return bool(abs(np.log(a / b)) < tuning.DISTINCT)
 
 
 def _log(a: Feature, b: Feature) -> float:

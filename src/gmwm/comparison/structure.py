@@ -119,23 +119,25 @@ def _extra(fits: Sequence[Fit]) -> tuple[Process, ...]:
 def spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
     """The parameters of a joint fit, one by one."""
     parts = [{each.key: each for each in part.estimates} for part in joint.parts]
-    return tuple(
-        _spread(own, [part.get(own.key) for part in parts], joint) for own in joint.estimates
-    )
+    return tuple(_spread(own, [part.get(own.key) for part in parts]) for own in joint.estimates)
 
 
-def _spread(own: Estimate, each: Sequence[Estimate | None], joint: JointFit) -> ParameterSpread:
+def _spread(own: Estimate, each: Sequence[Estimate | None]) -> ParameterSpread:
+    """Of the recordings that determine it; the moment estimate of DerSimonian & Laird (1986)."""
     known = [e for e in each if e is not None and e.kind == "estimated" and e.stderr]
-    nan = float("nan")
     if len(known) < 2:
-        return ParameterSpread(own, tuple(each), nan, nan)
-    values, errors = np.array([[e.value, e.stderr or nan] for e in known]).T
-    if np.all(values > 0.0):
+        return ParameterSpread(own, tuple(each), float("nan"), float("nan"))
+    values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
+    is_relative = bool(np.all(values > 0.0))
+    if is_relative:
         values, errors = np.log(values), errors / values
     weight = errors**-2.0
     square = float(np.sum(weight * (values - np.average(values, weights=weight)) ** 2))
-    p = float(chi2.sf(square, len(known) - 1))
-    return ParameterSpread(own, tuple(each), joint.spread.get(own.key, nan), p)
+    dof = len(known) - 1
+    scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
+    spread = float(np.sqrt(max((square - dof) / scale, 0.0)))
+    spread = spread if is_relative else spread / abs(float(np.mean(values)) or 1.0)
+    return ParameterSpread(own, tuple(each), spread, float(chi2.sf(square, dof)))
 
 
 def axis_numbers(

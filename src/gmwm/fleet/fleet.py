@@ -307,9 +307,10 @@ def _task(
     """How units are calibrated, checked before any work."""
     from gmwm import __version__
 
-    known = tuple(signature(read).parameters)[1:]
+    _, *known = signature(read).parameters.values()
+    usual = {each.name: each.default for each in known}
     for name in reading:
-        checks.choice("argument", name, known)
+        checks.choice("argument", name, tuple(usual))
     models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
     for name in screening:
         checks.choice("screening", name, SCREENING)
@@ -317,7 +318,8 @@ def _task(
         if not checks.is_number(given):
             raise InputError(f"{name} = {checks.shown(given)}: give seconds")
     return Task(
-        reading=dict(reading),
+        # What is as by default is the same fleet, whether it was written or not.
+        reading={k: v for k, v in reading.items() if v != usual[k] and v not in (None, (), {})},
         start=float(start),
         stop=None if stop is None else float(stop),
         models={str(name): as_model(each) for name, each in models.items()},

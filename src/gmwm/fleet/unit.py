@@ -121,7 +121,7 @@ class Task:
     def options(self) -> dict[str, Any]:
         """All that numbers depend on beside the recording, in JSON types."""
         content = {
-            "reading": {key: each for key, each in self.reading.items() if each not in (None, ())},
+            "reading": dict(self.reading),
             "start": self.start,
             "stop": self.stop,
             "models": {

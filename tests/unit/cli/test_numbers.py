@@ -66,6 +66,16 @@ def test_options_reach_the_bound(run, calibration):
     assert not any(n.code == "uncertainty-not-covered" for n in found.notices)
 
 
+def test_the_bias_at_switch_on_is_asked_for(run, calibration):
+    _, printed, _ = run("bound", calibration)
+    assert "--gyro-bias and --accel-bias" in printed
+    _, printed, _ = run("bound", calibration, "--gyro-bias", 0.01)
+    assert "--accel-bias" in printed
+    assert "--gyro-bias" not in printed
+    _, printed, _ = run("bound", calibration, "--gyro-bias", 0.01, "--accel-bias", 0.1)
+    assert "-bias" not in printed
+
+
 def test_reduce(run, calibration):
     code, printed, _ = run("reduce", calibration, "--outages", "5,20", "--json")
     assert code == 0

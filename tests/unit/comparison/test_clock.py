@@ -25,6 +25,11 @@ def test_two_lines_and_the_densities_show_a_clock():
     assert found.densities == pytest.approx(found.expected_densities)
 
 
+def test_a_line_that_moved_otherwise_is_counted():
+    first, second = features(0.5, 7.0, 31.0), features(0.45, 7.14, 31.62)
+    assert clock_ratio(first, second, densities(1.02**-0.5)).others == 1
+
+
 def test_the_order_inverts_the_ratio():
     there = clock_ratio(features(7.0, 31.0), features(7.14, 31.62), densities(1.02**-0.5))
     back = clock_ratio(features(7.14, 31.62), features(7.0, 31.0), densities(1.02**0.5))

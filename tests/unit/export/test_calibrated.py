@@ -393,3 +393,12 @@ def test_the_room_is_its_function():
     import gmwm.export as room
 
     assert room(numbers("N+K"), "glim") == gmwm.export(numbers("N+K"), "glim")
+
+
+def test_a_walk_that_is_not_there_has_its_bound_at_every_horizon(calibration):
+    text = kalibr_text(calibration)
+    comments = " ".join(line.strip("# ") for line in text.splitlines() if line.startswith("#"))
+    assert ", 0.000e+00" not in comments
+    walk = float(yaml.safe_load(text)["accelerometer_random_walk"])
+    outlook = comments.partition("accel N, K for all axes by horizon:")[2].partition("gyro_x")[0]
+    assert outlook.count(f"< {walk:.3e}") == 3

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, ins
 from gmwm.study.demo import RATE, compare, simulated_imu
+from gmwm.study.demo_files import DRIVE, write_demo_files
+from gmwm.study.emulated_logs import emulated_log
 from gmwm.study.sensor_tables import TABLE_6
 
 DEG_PER_HOUR = pi / 180.0 / 3600.0
@@ -161,3 +163,21 @@ def test_a_bound_is_an_interval_from_zero(fit):
     assert walk.upper == pytest.approx(2e-4 * 180.0 / pi * 3600.0 * 60.0)
     assert walk.determined
     assert walk.covered
+
+
+def test_files_to_try_are_read_as_they_were_made(tmp_path):
+    arm = write_demo_files(tmp_path, 60.0, seed=2)
+    still, moving = (gmwm.read(tmp_path / name) for name in ("static.csv", "imu.csv"))
+    assert [each.unit for each in still.values()] == 3 * ["rad/s"] + 3 * ["m/s^2"]
+    assert (still.n, still.rate) == (1500, pytest.approx(25.0))
+    # Forward, right, down; the bias of switching on has 0.1 m/s^2.
+    assert still["accel_z"].mean == pytest.approx(-9.80665, abs=0.5)
+    fixes = ins.read_fixes(tmp_path / "fixes.csv", lever_arm=arm)
+    assert {each.kind for each in fixes.fixes} == {"position", "velocity"}
+    position = fixes.fixes[0]
+    assert position.time[-1] <= moving.n * moving.dt
+    np.testing.assert_allclose(position.sd, np.tile([1.0, 1.0, 1.5], (position.time.size, 1)))
+    log, _ = emulated_log(2, duration=DRIVE, rate=25.0)
+    np.testing.assert_allclose(position.value, log.aiding.fixes[0].value, atol=1e-6)
+    rate = log.imu.rotation * 25.0
+    np.testing.assert_allclose(moving["gyro_z"].values, rate[:, 2], atol=1e-8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
@@ -150,7 +151,7 @@ class Target:
             density = term.psd(f, self.dt)
             rises = density[0] > (1.0 + tuning.RISING) * term.psd(2.0 * f[:1], self.dt)[0]
             total += np.where(f >= self.floor, density, 0.0) if rises else density
-        return float(2.0 * np.trapezoid(np.maximum(total, 0.0) * f, np.log(f)))
+        return float(2.0 * trapezoid(np.maximum(total, 0.0) * f, np.log(f)))
 
 
 def _grid(low: float, high: float, points: int) -> FloatArray:
@@ -203,7 +204,7 @@ def _line(label: str, frequency: float, amplitude: float, fast: float) -> Notice
 def _peak(label: str, term: Process, f: FloatArray, density: FloatArray, fast: float) -> Notice:
     place = float(f[int(np.argmax(density))])
     high = f >= fast
-    variance = 2.0 * float(np.trapezoid((density * f)[high], np.log(f[high])))
+    variance = 2.0 * float(trapezoid((density * f)[high], np.log(f[high])))
     text = (
         f"the {label} is left out but for its density at low frequencies: it lies above "
         f"{fast:.3g} Hz and averages out"

@@ -25,6 +25,12 @@ from gmwm.report.text import duration_text, number, short
 _SIDE_BY_SIDE = 6
 """Recordings whose values stand in columns of their own; of more the range is shown."""
 
+_NARROW, _WIDE = 1.02, 1.5
+"""Ratios of the ends of an interval: four digits below the one, two above the other."""
+
+_ASIDE = ("not-noise", "channel-missing", "channel-skipped")
+"""Codes of notices that the verdicts have in a word."""
+
 _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 
@@ -76,6 +82,11 @@ def write_sensor_comparison_report(
         notices=_notices(comparison),
         columns=comparison.labels if len(comparison.labels) <= _SIDE_BY_SIDE else ("range",),
         sheet=sheet,
+        stated={
+            letter: sheet is not None
+            and any(letter in sheet.of(name, a.quantity) for name, a in comparison.items())
+            for letter in _LETTERS
+        },
         provenance=_provenance(comparison, provenance or {}, sheet),
     )
     with written(path) as stream:
@@ -89,11 +100,14 @@ def _overall(comparison: SensorComparison) -> str:
     return "care" if clock or states & {"differ", "untested"} else "good"
 
 
-def _notices(comparison: SensorComparison) -> list[dict[str, str]]:
+def _notices(comparison: SensorComparison) -> list[dict[str, Any]]:
     """Without those that the verdicts repeat."""
     return [
-        {"severity": notice.severity, "text": notice.sentence}
-        for notice in worst_first(list(comparison.notices))
+        {
+            "is_remark": notice.severity in ("warning", "bad") and notice.code not in _ASIDE,
+            "text": notice.sentence,
+        }
+        for notice in sorted(worst_first(list(comparison.notices)), key=lambda n: n.code in _ASIDE)
         if notice.code not in ("curves-differ", "curves-close")
     ]
 
@@ -151,15 +165,21 @@ def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...])
 
 
 def _cell(estimate: Estimate | None) -> dict[str, str]:
+    """A value and its interval, with the digits that this leaves."""
     if estimate is None:
         return {"value": "–", "interval": ""}
     usual = estimate.usual
     if estimate.kind == "bound":
-        return {"value": f"< {number(usual.upper)}", "interval": "95 % bound"}
-    if estimate.kind == "estimated":
-        interval = f"{number(usual.lower)} to {number(usual.upper)}"
-        return {"value": number(usual.value), "interval": interval}
-    return {"value": number(usual.value), "interval": estimate.kind}
+        return {"value": f"< {short(usual.upper)}", "interval": ""}
+    if estimate.kind != "estimated":
+        return {"value": short(usual.value), "interval": estimate.kind}
+    if not (np.isfinite(usual.upper) and usual.lower > 0.0):
+        return {"value": short(usual.value), "interval": "not determined"}
+    ratio = usual.upper / usual.lower
+    text = number if ratio < _NARROW else short
+    ends = [text(end) if ratio < _WIDE else short(float(f"{end:.2g}"))
+            for end in (usual.lower, usual.upper)]  # fmt: skip
+    return {"value": text(usual.value), "interval": "–".join(ends)}
 
 
 def _share(value: float) -> str:

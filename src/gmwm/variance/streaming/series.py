@@ -102,7 +102,15 @@ class Series:
 
     def finished(self) -> Self:
         """A copy of which all that was taken in is worked off."""
-        made = self.of_arrays(self.arrays())
+        made = type(self)()
+        for name in ("state", "sums", "totals", "tallies", "gaps"):
+            getattr(made, name)[...] = getattr(self, name)
+        made.blocks[:, : self.tallies[BLOCKS]] = self.blocks[:, : self.tallies[BLOCKS]]
+        for row, (filled, headed, gappy) in enumerate(self.state[:, [FILLED, HEADED, GAPPY]]):
+            made.data[row, :filled] = self.data[row, :filled]
+            made.head[:, row, :headed] = self.head[:, row, :headed]
+            if gappy:
+                made.present[row, :filled] = self.present[row, :filled]
         kernels.work_off(
             1, made.data, made.present, made.state, made.sums, made.head, made.blocks, made.totals,
             made.tallies, made._scratch,

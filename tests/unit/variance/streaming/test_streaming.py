@@ -173,6 +173,57 @@ def test_a_fit_of_a_stream():
         assert abs(ours.params[key] - whole.params[key]) < 0.02 * error
 
 
+# -- gaps ------------------------------------------------------------------------------------------
+
+
+def missing_singly(n, rng):
+    return rng.random(n) < 0.1
+
+
+def missing_every_third(n, rng):
+    return np.arange(n) % 3 == 2
+
+
+def missing_in_gaps(n, rng):
+    gone = np.zeros(n, dtype=bool)
+    for begin in rng.integers(0, n, 12):
+        gone[begin : begin + 20] = True
+    return gone
+
+
+def missing_for_long(n, rng):
+    gone = np.zeros(n, dtype=bool)
+    gone[2 * n // 5 : n // 2] = True
+    return gone
+
+
+@pytest.mark.parametrize(
+    "missing", [missing_singly, missing_every_third, missing_in_gaps, missing_for_long]
+)
+@pytest.mark.parametrize("walk", [0.0, 0.05])
+def test_gaps_shorten_no_curve_and_change_no_variance(missing, walk):
+    found, whole = [], []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        x = noise(6000, 100 + seed, walk=walk)
+        whole.append(streamed(x).result())
+        x[missing(x.size, rng)] = np.nan
+        found.append(streamed(x).result())
+        assert found[-1].tau.tolist() == whole[-1].tau.tolist()
+        assert found[-1].gaps.missing == np.count_nonzero(np.isnan(x))
+    variances = np.array([wv.variance for wv in found])
+    difference = variances - [wv.variance for wv in whole]
+    mean = np.mean(difference, axis=0) / np.mean(variances, axis=0)
+    error = np.std(difference, axis=0) / np.mean(variances, axis=0) / np.sqrt(len(found))
+    # Within the chance of 96 comparisons, and 2 % that averages of gaps are taken for.
+    assert np.all(np.abs(mean) < 4.5 * error + 0.02), (mean, error)
+    # The errors that are stated are those that there are.
+    fine = slice(0, 7)
+    spread = np.std(variances, axis=0)[fine]
+    stated = np.mean([np.sqrt(np.diag(wv.covariance)) for wv in found], axis=0)[fine]
+    assert np.all((spread / stated > 0.5) & (spread / stated < 1.6)), spread / stated
+
+
 # -- numbers that are hard to add up ---------------------------------------------------------------
 
 
