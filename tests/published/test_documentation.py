@@ -34,7 +34,9 @@ def runner(tmp_path_factory):
     return pages.Runner(tmp_path_factory.mktemp("pages"))
 
 
-@pytest.mark.parametrize("name", RUN)
+@pytest.mark.parametrize(
+    "name", [n if n == "README.md" else pytest.param(n, marks=pytest.mark.slow) for n in RUN]
+)
 def test_what_a_page_shows_runs(runner, name):
     runner.run(PAGES[name])
 
