@@ -70,7 +70,8 @@ def fleet(
     \b
     Examples:
       gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out
-      gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out --resume
+      gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out \\
+        --resume
     """
     from gmwm.calibration import SCREENING
     from gmwm.errors import InputError

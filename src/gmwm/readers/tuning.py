@@ -47,6 +47,9 @@ USUAL_BIAS = 0.052
 """rad/s (3 deg/s): biases at rest of most MEMS gyros are smaller by their data sheets; those of the
 cheapest are not."""
 
+SURE_MEAN = 5.0
+"""Standard errors by which a mean rate exceeds it: one in three million by noise alone."""
+
 LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 """u: fourth powers of the data must not overflow."""
 

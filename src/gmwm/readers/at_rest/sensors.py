@@ -72,6 +72,8 @@ class _Sensor:
     density : float
         White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a second
         leave, so that neither a filter's band nor a drift counts.
+    size_error : float
+        Standard deviation of the length from the fast noise, SI.
     """
 
     def __init__(self, unit: str, values: FloatArray, dt: float) -> None:
@@ -82,6 +84,7 @@ class _Sensor:
         self.scatter = float(np.max(fast))
         densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
         self.density = float(np.max(densities))
+        self.size_error = self.scatter * math.sqrt(values.shape[1] / values.shape[0])
 
     @classmethod
     def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
@@ -199,7 +202,7 @@ def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]
 
 def _mean_rate(rate: _Sensor | None) -> tuple[Notice, ...]:
     """A mean that few gyros have at rest."""
-    if rate is None or rate.size < tuning.USUAL_BIAS:
+    if rate is None or rate.size - tuning.SURE_MEAN * rate.size_error < tuning.USUAL_BIAS:
         return ()
     text = (
         f"a mean rate of {rate.size / _DENSITY:.3g} deg/s is more than the bias of most gyros: "
