@@ -6,8 +6,8 @@ Statistics* 6, 65-70)."""
 
 LEAST_DOF = 8.0
 """Degrees of freedom of a wavelet variance in a recording from which its level is compared. With 2
-the test found 7 % of equal recordings different, with 8 no more than its 5 % (160 simulated
-recordings of three kinds); the deviation of such a level is known to 25 %."""
+the test found 7 % of equal recordings different, with 8 it is 4 to 5 % of 200 pairs of three kinds
+(benchmarks/comparison.py); the deviation of such a level is known to 25 %."""
 
 NOTABLE = 0.10
 """Difference of the Allan deviation that navigation would feel, as in the judgement of fits."""
