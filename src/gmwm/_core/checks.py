@@ -128,10 +128,17 @@ def generator(seed: Any) -> np.random.Generator:
         ) from None
 
 
+def unmasked(values: Any) -> Any:
+    """The values, NaN where a masked array has none."""
+    if isinstance(values, np.ma.MaskedArray):
+        return np.ma.filled(values.astype(float), np.nan)
+    return values
+
+
 def real_numbers(values: Any, where: str) -> FloatArray:
-    """An array of real numbers."""
+    """An array of real numbers, NaN where one is masked."""
     try:
-        array = np.asarray(values)
+        array = np.asarray(unmasked(values))
         if array.dtype.kind in "cmM":
             kind = "complex numbers" if array.dtype.kind == "c" else "dates or durations"
             raise InputError(f"{where} holds {kind}: give real numbers in the sensor's unit")

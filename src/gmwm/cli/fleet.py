@@ -93,7 +93,7 @@ def fleet(
         click.echo(json.dumps(found.to_dict(), allow_nan=False))
     elif not quiet:
         click.echo(found)
-        click.echo(f"wrote {output}/calibrations, fleet.parquet and fleet.html")
+        click.echo(f"wrote {output}/: calibrations, fleet.parquet, fleet.html")
     if found.failed:
         first = next(iter(found.failed.values()))
         reason = with_hint(InputError(first.text, first.code))

@@ -6,6 +6,7 @@ import glob
 import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -94,9 +95,12 @@ def _names(paths: Sequence[str]) -> list[str]:
             for name, parts, repeated in zip(names, whole, twice, strict=True)
         ]
     names = [_short(name) for name in names]
+    taken = {name.lower() for name in names}
     for i, repeated in enumerate(_repeated(names)):
         if repeated:
-            names[i] = f"{names[i]}-{i + 1}"
+            numbered = (f"{names[i]}-{k}" for k in count(i + 1))
+            names[i] = next(each for each in numbered if each.lower() not in taken)
+            taken.add(names[i].lower())
     return names
 
 

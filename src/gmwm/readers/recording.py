@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
@@ -85,7 +86,7 @@ class Channel:
     @property
     def spread(self) -> float:
         """Largest less smallest of the samples that are there, u; zero if none is."""
-        values = np.asarray(self.values, dtype=float)
+        values = np.asarray(checks.unmasked(self.values), dtype=float)
         # fmin and fmax pass over NaN.
         lowest = np.fmin.reduce(values, initial=np.inf)
         return max(float(np.fmax.reduce(values, initial=-np.inf) - lowest), 0.0)
@@ -339,7 +340,7 @@ def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryU
 
 def _series(name: str, values: FloatArray) -> FloatArray:
     try:
-        series = np.asarray(values, dtype=float)
+        series = np.asarray(checks.unmasked(values), dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"channel {name!r} holds something that is not a number") from None
     if series.ndim != 1:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import FloatArray
 from gmwm.readers import tuning
 
@@ -48,7 +48,11 @@ def without_sentinels(
     some = some[~np.isnan(some)]
     if not some.size:
         return values, []
-    low, middle, high = np.quantile(some, [0.05, 0.5, 0.95])
+    # The range is that of samples: codes among them would make it as wide as themselves.
+    usual = some[[_meaning(each, largest) == "" for each in some.tolist()]]
+    if not usual.size:
+        return values, []
+    low, middle, high = np.quantile(usual, [0.05, 0.5, 0.95])
     far = np.flatnonzero(np.abs(values - middle) > tuning.FAR_OUTSIDE * (high - low))
     if not far.size:
         return values, []
@@ -56,8 +60,9 @@ def without_sentinels(
     numbers, which = np.unique(found, return_inverse=True)
     chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])
     gone = far[chosen[which]]
-    if not gone.size or gone.size > tuning.MOST_SENTINELS * values.size:
+    if not gone.size:
         return values, []
+    severity: Severity = "bad" if gone.size > tuning.MOST_SENTINELS * values.size else "warning"
     clean = np.array(values)
     clean[gone] = np.nan
     notices = []
@@ -76,7 +81,7 @@ def without_sentinels(
             f"{where(int(rows[0]))}: taken as missing"
         )
         data = {"count": int(count), "value": number, "row": int(rows[0])}
-        notices.append(Notice("sentinel", "warning", name, text, data, "look at the recorder"))
+        notices.append(Notice("sentinel", severity, name, text, data, "look at the recorder"))
     return clean, notices
 
 

@@ -58,8 +58,8 @@ BEYOND_SENSORS = 1e6
 
 SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
 """Samples that give the range of most, and by how many times the width of 90 % of them a number is
-away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of the
-samples are no exception."""
+away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of all
+are bad."""
 
 BYTES_PER_SAMPLE = 20
 """Of memory while a file is read: a column as it is read, the same in SI units, and one of the

@@ -40,6 +40,14 @@ def test_names_differ_also_where_case_does_not_count(folder):
     assert len({name.lower() for name in names}) == 3
 
 
+def test_a_number_that_is_added_gives_no_name_of_another(folder):
+    given = ["t:1.npz", "t*1.npz", "t_1-2.npz"]
+    for name in given:
+        (folder / name).touch()
+    names = list(found(*given).values())
+    assert len(set(names)) == 3
+
+
 @pytest.mark.parametrize("name", ["x" * 250, "a\nb", "a:b", "..hidden", " ", "ünït"])
 def test_names_are_names_of_files(folder, name):
     (given,) = found(f"{name}.csv").values()

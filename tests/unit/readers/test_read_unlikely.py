@@ -103,6 +103,17 @@ def test_numbers_that_are_no_samples_are_missing(number, meaning, rows):
     assert meaning in notice.text
 
 
+@pytest.mark.parametrize("every", [2, 8, 14])
+def test_many_numbers_that_are_no_samples_are_bad_or_named(every):
+    table = frame(0.01 * np.arange(N))
+    table.loc[table.index % every == 0, "gyro_y [rad/s]"] = -999.0
+    found = gmwm.read(table)
+    (notice,) = [each for each in found.notices if each.code == "sentinel"]
+    assert notice.severity == ("warning" if every == 14 else "bad")
+    assert np.isnan(found["gyro_y"].values[::every]).all()
+    assert np.nanmax(np.abs(found["gyro_y"].values)) < 1.0
+
+
 def test_several_numbers_that_are_no_samples():
     table = frame(0.01 * np.arange(N))
     table.loc[[5, 6, 90], "accel_x [m/s^2]"] = [1e20, -1e30, -9999.0]

@@ -201,3 +201,10 @@ def test_a_part_of_a_record_whose_rate_changes_is_refused():
     assert rec.part() is rec
     with pytest.raises(InputError, match="cut the file where it changes"):
         rec.part(0.0, 50.0)
+
+
+def test_what_is_masked_is_missing():
+    values = np.ma.masked_greater(np.array([0.1, 0.2, 99.0, 0.3]), 10.0)
+    recording = Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "rad/s"})
+    np.testing.assert_array_equal(recording["gyro_x"].values, [0.1, 0.2, np.nan, 0.3])
+    np.testing.assert_array_equal(Channel("", values, 0.01).values, [0.1, 0.2, np.nan, 0.3])

@@ -172,9 +172,11 @@ def resolution_notice(faults: Faults) -> Notice:
         usual = tuning.UNSEEN["heading" if name == "heading" else unit]
         (unseen if least > usual else seen).append((what, least * factor, unit))
     text = "; ".join(f"{what} of {least:.2g} {unit}" for what, least, unit in seen)
-    text = f"this motion shows {text}" if seen else "this motion shows no constant error"
+    text = f"this motion would show, from here on: {text}" if seen else (
+        "this motion would show no constant error"
+    )  # fmt: skip
     if unseen:
-        text += "; it does not show " + ", ".join(what for what, *_ in unseen)
+        text += "; it would not show " + ", ".join(what for what, *_ in unseen)
     return Notice("resolution", "note", "", text, values)
 
 

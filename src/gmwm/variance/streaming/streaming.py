@@ -109,7 +109,7 @@ class StreamingVariance:
             of it is taken in then.
         """
         values = checks.real_numbers(block, "the block")
-        columns = [values] if values.ndim == 1 else list(values.T)
+        columns = [values] if values.ndim == 1 else list(np.atleast_2d(values).T)
         if values.ndim not in (1, 2) or len(columns) != len(self._series):
             wanted = "(n,)" if self._single else f"(n, {len(self._series)})"
             raise InputError(f"the block has shape {values.shape}: give one of shape {wanted}")
