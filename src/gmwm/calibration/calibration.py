@@ -49,6 +49,9 @@ _SPOILING = {
 }
 """Codes of issues of a whole recording that make the fits of some sensors invalid."""
 
+_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated"})
+"""Codes of issues of a channel that make its fit invalid where they are bad."""
+
 AMBIGUITY = "ambiguity"
 """Code of the notice that several models describe a channel equally well."""
 
@@ -375,7 +378,21 @@ def calibrate(
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
     if not still:
         spoiling.pop("not-static", None)  # as the caller says
-    fits = {name: _judged(fitted, spoiling.values()) for name, (fitted, _) in done.items()}
+    spoilt = {
+        (issue.where, issue.code): issue
+        for issue in issues
+        if issue.code in _SPOILING_CHANNEL and issue.severity == "bad"
+    }
+    fits = {
+        name: _judged(
+            fitted,
+            (
+                *_of_sensor(fitted.wv.quantity, spoiling.values()),
+                *(issue for (where, _), issue in spoilt.items() if where == name),
+            ),
+        )
+        for name, (fitted, _) in done.items()
+    }
     if not fits:
         raise InputError(f"{source or 'the recording'}: {next(iter(skipped.values())).text}")
     several = len(given) > 1
@@ -497,13 +514,14 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     return Notice(code, "bad", channel.name, text, {"missing": missing})
 
 
+def _of_sensor(quantity: str | None, spoiling: Iterable[Notice]) -> list[Notice]:
+    """Those issues of the whole recording that concern a sensor."""
+    return [issue for issue in spoiling if (quantity or "gyro") in _SPOILING[issue.code]]
+
+
 def _judged(fitted: Fit, spoiling: Collection[Notice]) -> Fit:
-    """A fit, not valid where the whole recording is no static one at one rate."""
-    found = [
-        Notice(issue.code, "bad", "", issue.text, issue.values)
-        for issue in spoiling
-        if (fitted.wv.quantity or "gyro") in _SPOILING[issue.code]
-    ]
+    """A fit, not valid where an issue of its data makes its numbers wrong."""
+    found = [Notice(each.code, "bad", "", each.text, each.values, each.action) for each in spoiling]
     return replace(fitted, notices=(*found, *fitted.notices)) if found else fitted
 
 

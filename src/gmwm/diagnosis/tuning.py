@@ -78,6 +78,11 @@ LONG_RUN = 32
 FEWEST_AT_END = 8
 """Samples at the end of the scale from which saturation is looked for."""
 
+BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
+"""Times as often as the values next to it comes one that is no sample: noise as small as its step
+has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
+too small."""
+
 # -- prediction errors ----------------------------------------------------------------------------
 
 FEWEST_KNOWN = 64
