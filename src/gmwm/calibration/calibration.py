@@ -49,7 +49,7 @@ _SPOILING = {
 }
 """Codes of issues of a whole recording that make the fits of some sensors invalid."""
 
-_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated"})
+_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
 """Codes of issues of a channel that make its fit invalid where they are bad."""
 
 AMBIGUITY = "ambiguity"

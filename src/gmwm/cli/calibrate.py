@@ -44,6 +44,7 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 
 _OF_RECORDING = (
     "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
+    "variance",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 

@@ -240,7 +240,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
         rounding_notice(name, unit, step, errors.level),
-        variance_notice(name, unit, dt, errors, usable, step),
+        variance_notice(name, unit, dt, errors, usable, step, is_heavy=tails is not None),
         drift_notice(name, unit, dt, quiet),
     ]
     notices = [one for one in found if one is not None]

@@ -140,6 +140,16 @@ TENTHS = 10
 CHANGE, LARGE_CHANGE = 0.05, 0.2
 """Relative change of the standard deviation between halves for a note and a warning."""
 
+STEADY_MEAN, STEADY_OF_TAILS, FEWEST_STEADY = 16, 4, 8
+"""Samples whose means give what stationary noise leaves, times as many of heavy tails (a large
+sample leaves its trace in the predictions of `ORDER` more), and parts of four times as many and
+more that are compared with it at least."""
+
+UNSTEADY = 0.2
+"""Standard deviation of the variance from part to part, over its mean, above which a model is that
+of no part: N is then 10 to 20 % above that of the quiet parts. Real recordings at rest have up to
+0.11 (docs/real-data.md)."""
+
 # -- two channels ---------------------------------------------------------------------------------
 
 CORRELATED, STRONGLY_CORRELATED = 0.05, 0.3

@@ -37,6 +37,7 @@ _WHY = {
     "saturation": "samples cut off at range",
     "stuck": "values that stick",
     "value-repeated": "one value stands for many",
+    "variance": "the noise comes and goes",
     "step": "the bias stepped",
     "transient": "a transient at the start",
     "drift-at-start": "drift after switching on",

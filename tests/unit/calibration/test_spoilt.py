@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import gmwm
 from gmwm import WhiteNoise
@@ -20,6 +21,10 @@ def zeros(share):
     return values
 
 
+def shaken(envelope):
+    return clean(1) * envelope(np.arange(N) / 100.0)
+
+
 SPOILT = {
     "cut off above": ("saturation", "within_range", np.minimum(clean(1), 0.5 * SD)),
     "cut off on both sides": ("saturation", "within_range", np.clip(clean(1), -SD, SD)),
@@ -29,13 +34,22 @@ SPOILT = {
     "every other one is zero": (
         "value-repeated", "samples_measured", np.where(np.arange(N) % 2, clean(1), 0.0)
     ),
-    "stuck": ("stuck", "samples_change", np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50)))
+    "stuck": ("stuck", "samples_change", np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50))),
+    "swells to 2 sd and dies": (
+        "variance", "noise_steady", shaken(lambda t: 1.0 + np.sin(np.pi * t / 60.0) ** 2)
+    ),
+    "times 4 for 1 s of every 2 s": (
+        "variance", "noise_steady", shaken(lambda t: np.where(t % 2.0 < 1.0, 4.0, 1.0))
+    ),
+    "25 s, times 5 for 12 s": (
+        "variance", "noise_steady", shaken(lambda t: np.where((t > 8) & (t < 20), 5.0, 1.0))[:2500]
+    ),
 }  # fmt: skip
 
 
 def calibrated(values):
     # In the other axis nothing is wrong.
-    channels = {"gyro_x": values, "gyro_y": clean(3)}
+    channels = {"gyro_x": values, "gyro_y": clean(3)[: values.size]}
     rec = gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "rad/s"})
     return gmwm.calibrate(rec, WhiteNoise())
 
@@ -69,6 +83,12 @@ SOUND = {
         -30 * SD, 30 * SD,
     ),
     "a few zeros": zeros(0.002),
+    "noise 15 % larger in the second half": shaken(lambda t: np.where(t > 30.0, 1.15, 1.0)),
+    "Student's t with 2.5 degrees of freedom": SD * RNG.standard_t(2.5, N),
+    "a Gauss-Markov process": gmwm.GaussMarkov(SD, 0.5).simulate(N, 0.01, 1),
+    "low-passed": lfilter(np.ones(8) / 8.0, [1.0], clean(5)),
+    "a resonance": (WhiteNoise(1e-5) + gmwm.Resonance(SD, 10.0, 0.01)).simulate(N, 0.01, 1),
+    "quantization noise": gmwm.QuantizationNoise(SD * 0.01).simulate(N, 0.01, 1),
 }  # fmt: skip
 
 

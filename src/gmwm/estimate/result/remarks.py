@@ -38,6 +38,7 @@ REASONS = {
     "saturation": "within_range",
     "stuck": "samples_change",
     "value-repeated": "samples_measured",
+    "variance": "noise_steady",
     "step": "stationary",
     "transient": "stationary",
     "drift-at-start": "stationary",
