@@ -196,6 +196,8 @@ def _unsteady_notice(
     squares /= np.mean(squares)
     excess = float(kurtosis(bounded))
     by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
+    if not min(by_chance) > 0.0:
+        return None
     worst, parts = 0.0, squares
     for length in lengths.tolist():
         variance = float(np.var(_means(bounded, length), ddof=1))
