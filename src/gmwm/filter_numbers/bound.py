@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -180,6 +181,22 @@ def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
     if len(stationary) < len(model.terms):
         variance += tuning.INITIAL_SHARE * target.slow_variance(Model(tuple(stationary)))
     return float(np.sqrt(variance))
+
+
+def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
+    """The same numbers with what is predicted where an error model is the truth.
+
+    Parameters
+    ----------
+    source : Process, Model, Fit or mapping
+        The error model of the axis; as a mapping, with its name.
+    numbers : FilterNumbers
+        Of any origin; the times of its predictions are kept.
+    """
+    axis = Axes.of(source, None, 0.0).axes[0]
+    times = [each.time for each in numbers.predicted]
+    found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
+    return replace(numbers, predicted=found)
 
 
 def predicted(
