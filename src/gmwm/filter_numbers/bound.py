@@ -227,6 +227,12 @@ def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
     if not axis.fit.valid:
         text = "the fit is not valid, nor are numbers from it"
         found.append(Notice("fit-not-valid", "warning", "", text, {}, "read its notices first"))
+    if axis.bias_sd == 0.0:
+        text = (
+            "the bias at the start leaves out that of switching on, which no recording at rest "
+            "shows: add the square of its standard deviation to that of initial_sd"
+        )
+        found.append(Notice("turn-on-left-out", "note", "", text))
     if level is None:
         text = "the uncertainty of the fitted parameters is not covered"
         found.append(Notice("uncertainty-not-covered", "note", "", text))

@@ -279,7 +279,7 @@ def test_the_notes_of_the_error_budget(parsed, calibration):
 def test_the_headline_of_a_minute(parsed, calibration):
     budgets = [gmwm.error_budget(calibration, [60.0], calibrated=c) for c in (True, False)]
     metres = [budget.total()["position"][0] for budget in budgets]
-    sentence = re.search(r"A minute without aiding costs .*? of them\.", parsed.text).group()
+    sentence = re.search(r"A minute without aiding from exact .*? of them\.", parsed.text).group()
     found = re.findall(r"([\d.,]+) m of horizontal position", sentence)
     assert [float(text.replace(",", "")) for text in found] == pytest.approx(metres, rel=6e-3)
 
