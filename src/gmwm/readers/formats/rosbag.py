@@ -233,14 +233,16 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
                 f"{path.name} has no messages of sensor_msgs/Imu: "
                 + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
             )
+        of_imu = counts["sensor_msgs/msg/Imu"]
+        heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
         found = {
-            topic: Topic(topic, count, _sensors(reader, topic, bag))
-            for topic, count in counts["sensor_msgs/msg/Imu"].items()
+            topic: Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
+            for topic, count in of_imu.items()
         }
         chosen = choose(path.name, list(found.values()), topics)
         warmth = counts["sensor_msgs/msg/Temperature"]
         is_log = clock == "log"
-        origin = _first_stamp(reader, chosen[0].name, bag, is_log)
+        origin = _first_stamp(heads[chosen[0].name], bag, is_log)
     tables = [_table(bag, topic, is_log, origin, found) for topic in chosen]
     tables += [
         BagTable(bag, Topic(name, count), _thermometer(name, len(warmth)),
@@ -315,13 +317,13 @@ def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Re
     return iter(reader.messages(connections, start=start))
 
 
-def _sensors(reader: Any, topic: str, bag: _Bag) -> frozenset[str]:
+def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> frozenset[str]:
     """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
     first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
     found: set[str] = set()
     middle = (reader.start_time + reader.end_time) // 2
-    for start in (None, middle):
-        raw = [message for _, _, message in islice(_messages(reader, topic, start), _SEEN)]
+    for records in (head, islice(_messages(reader, topic, middle), _SEEN)):
+        raw = [message for _, _, message in records]
         for sensor, index in first.items() if raw else ():
             wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
             where = partial(_somewhere, bag, topic)
@@ -337,8 +339,8 @@ def _somewhere(bag: _Bag, topic: str, row: int) -> str:
     return f"{bag.path.name}, a message of {topic}"
 
 
-def _first_stamp(reader: Any, topic: str, bag: _Bag, is_log: bool) -> int:
-    _, time, message = next(_messages(reader, topic))
+def _first_stamp(head: Sequence[_Record], bag: _Bag, is_log: bool) -> int:
+    _, time, message = next(iter(head))
     if is_log:
         return int(time)
     stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: bag.path.name)
