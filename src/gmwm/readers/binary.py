@@ -20,7 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.table import usable
+from gmwm.readers.table import LARGEST, usable
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class BinaryTable:
                 values[start : start + part.size] = part
         for values in found.values():
             if not usable(values):
-                row = int(np.flatnonzero(~(np.abs(values) < np.inf))[0])
+                row = int(np.flatnonzero(np.abs(values) >= LARGEST)[0])
                 raise InputError(
                     f"{self.source}, {self.where(row)}: {values[row]} is not a usable number: "
                     "check the layout"

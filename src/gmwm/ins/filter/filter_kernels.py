@@ -21,7 +21,8 @@ from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
 
-IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = 0, 1, 2, 3
+KINDS = (0, 1, 2, 3)
+IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = KINDS
 """Kinds of measurements."""
 
 _LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
@@ -280,7 +281,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
     estimated, held = np.zeros(n), np.zeros(m)
     P_held, estimated_held = np.zeros((n, n)), np.zeros(n)
-    rejected = np.zeros(4, dtype=np.int64)
+    rejected = np.zeros(len(KINDS), dtype=np.int64)
     C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)

@@ -141,6 +141,11 @@ class BagTable:
                 for column, values in zip(wanted, found, strict=True):
                     parts[column].append(values)
                 row += len(block)
+        if not row:
+            raise InputError(
+                f"{self.source}, topic {self.topic.name}: its messages are not there: "
+                "get a whole copy"
+            )
         # One column at a time lets the blocks go before the next one is joined.
         result = {column: np.concatenate(parts.pop(column)) for column in columns}
         for column, values in result.items():

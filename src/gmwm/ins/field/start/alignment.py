@@ -46,6 +46,8 @@ class Alignment:
         How well it is known, rad/s; ``None`` if the vehicle never stood still.
     notices : tuple of Notice
         How it came about.
+    stood : float
+        Time over which that was averaged, s.
     """
 
     epoch: int
@@ -54,6 +56,7 @@ class Alignment:
     gyro_bias: FloatArray
     gyro_bias_sd: float | None
     notices: tuple[Notice, ...]
+    stood: float = 0.0
 
 
 def align(
@@ -112,7 +115,7 @@ def align(
     levelled = epoch if still and first <= epoch <= last else (first + last) // 2
     level = np.array([np.arctan2(-mean[4], -mean[5]), np.arctan2(mean[3], np.hypot(*mean[4:])), 0])
     body = turned(imu, bias, matrix_from_rpy(level), levelled, epoch)
-    gyro_sd = _mean_sd(models, "gyro", length, imu.dt)
+    gyro_sd = mean_sd(models, "gyro", length, imu.dt)
     biased = float(np.hypot(gyro_sd, _bias(models, "gyro")))
     drift = gyro_sd if still else float(np.hypot(biased, RATE))
     tilt_sd = float(
@@ -148,7 +151,7 @@ def align(
     )  # fmt: skip
     return Alignment(
         epoch, *_at_fix(imu, aiding, epoch, fix, C, velocity, (velocity_sd, tilt_sd, yaw_sd)),
-        bias - earth if still else bias, known_sd, notices,
+        bias - earth if still else bias, known_sd, notices, length if still else 0.0,
     )  # fmt: skip
 
 
@@ -179,7 +182,7 @@ def _in_motion(imu: Imu, aiding: Aiding, models: SensorModels) -> Alignment:
     positions = positions_of(aiding)
     epoch, fix = _starting_fix(positions, imu.dt, 0)
     constant = [
-        float(np.hypot(_bias(models, kind), _mean_sd(models, kind, tuning.MOTION_LEAST, imu.dt)))
+        float(np.hypot(_bias(models, kind), mean_sd(models, kind, tuning.MOTION_LEAST, imu.dt)))
         for kind in ("gyro", "accel")
     ]
     C, sd = attitude_in_motion(
@@ -251,7 +254,7 @@ def _bias(models: SensorModels, kind: str) -> float:
     return max(models.bias_sd[axis] for axis in AXES if axis.startswith(kind))
 
 
-def _mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
+def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     """Standard deviation of an error later, less its mean over a time; the worst axis."""
     variances = [
         float(models.models[axis].haar_variance(np.array([length]), dt)[0])
@@ -266,7 +269,7 @@ def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> flo
     slow = [
         float(np.sqrt(_stationary(models, axis, dt))) for axis in AXES if axis.startswith("accel")
     ]
-    error = np.hypot(max(slow), _mean_sd(models, "accel", length, dt))
+    error = np.hypot(max(slow), mean_sd(models, "accel", length, dt))
     sd = np.hypot(np.hypot(error, _bias(models, "accel")) / STANDARD_GRAVITY, tuning.TILT_FLOOR)
     return float(sd if still else np.hypot(sd, tuning.TILT_MOVING))
 
