@@ -168,7 +168,7 @@ class Filter:
         used = np.ones(events.epoch.size, dtype=np.bool_)
         axis = table.axis[table.axis != NO_AXIS]
         first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
-        place, carry = np.zeros(8, dtype=np.int64), np.zeros(7)
+        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
         ready = partial(
             run, imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,

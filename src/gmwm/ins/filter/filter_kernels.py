@@ -275,7 +275,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         Set to False where a measurement was rejected.
     last : int
         Epoch from which on the filter pauses, to go on with the next call.
-    place : (8,) ndarray of int, carry : (7,) ndarray
+    place : (4 + kinds,) ndarray of int, carry : (7,) ndarray
         Where it is and what it needs of the samples before: zeros at first.
     """
     n, m = P.shape[0], x.size
@@ -288,11 +288,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
     estimated, held = np.zeros(n), np.zeros(m)
     P_held, estimated_held = np.zeros((n, n)), np.zeros(n)
-<<<<<<< HEAD
-    rejected = np.zeros(len(KINDS), dtype=np.int64)
-=======
     rejected = place[4:]
->>>>>>> nav
     C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)
