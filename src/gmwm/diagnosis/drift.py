@@ -212,8 +212,8 @@ def _unsteady_notice(
     low, high = (usual * float(np.sqrt(each)) for each in np.quantile(parts, [0.1, 0.9]))
     part = dt * (size.size // parts.size)
     text = (
-        f"the noise is not steady: its standard deviation is {readable(low, unit)} in the quiet and "
-        f"{readable(high, unit)} in the loud parts of {part:.3g} s (a tenth of them beyond)"
+        f"the noise is not steady: its standard deviation is {readable(low, unit)} in the "
+        f"quiet and {readable(high, unit)} in the loud parts of {part:.3g} s (a tenth of them beyond)"
     )
     values = {"changes": changes, "quiet": low, "loud": high, "part": part}
     action = "the model is that of no part: use a recording, or a part, without what vibrates"
