@@ -771,6 +771,28 @@ def test_health_refuses_what_it_cannot_use(run, tmp_path):
 # -- demo -----------------------------------------------------------------------------------------
 
 
+def test_demo_files_can_be_read_and_are_named_in_what_to_try(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(cli.cli, ["demo", "--files", "--hours", "0.01", "-o", "try"])
+    assert done.exit_code == 0, done.output
+    folder = Path("try")
+    assert sorted(path.name for path in folder.iterdir()) == ["fixes.csv", "imu.csv", "static.csv"]
+    recording = gmwm.read(folder / "static.csv")
+    assert (recording.rate, recording.n) == (25.0, 900)
+    assert gmwm.read(folder / "imu.csv").n == 15_000
+    tried = done.output.partition("Try:")[2].replace("\\\n", " ")
+    for line in filter(None, map(str.strip, tried.splitlines())):
+        command, *arguments = line.split()[1:]
+        assert command in cli.cli.commands
+        names = [each for each in arguments if each.endswith(".csv")]
+        assert names and all(Path(each).is_file() for each in names)
+        # Every option is one of the command.
+        known = {name for each in cli.cli.commands[command].params for name in each.opts}
+        assert {each for each in arguments if each.startswith("-")} <= known
+    again = CliRunner().invoke(cli.cli, ["demo", "--files", "--hours", "0.01", "-o", "try/imu.csv"])
+    assert again.exit_code != 0
+
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")

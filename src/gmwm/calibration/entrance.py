@@ -44,6 +44,9 @@ _SPOILING = {
 }
 """Codes of issues of a whole recording that make the fits of some sensors invalid."""
 
+_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
+"""Codes of issues of a channel that make its fit invalid where they are bad."""
+
 
 def calibrate(
     recording: Recording | Sequence[Recording] | Any,
@@ -160,7 +163,12 @@ def calibrate(
         spoiling.pop("not-static", None)  # as the caller says
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
     return calibration_of(
-        {name: _judged(each, spoiling.values()) for name, each in found.items()},
+        {
+            name: each
+            if isinstance(each, Notice)
+            else _judged(each, (*_of_sensor(each, spoiling.values()), *_of_channel(name, issues)))
+            for name, each in found.items()
+        },
         dead,
         with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
         source=source,
@@ -262,13 +270,19 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     return Notice(code, "bad", channel.name, text, {"missing": channel.missing})
 
 
-def _judged(found: ChannelModel | Notice, spoiling: Collection[Notice]) -> ChannelModel | Notice:
-    """A fit, not valid where the whole recording is no static one at one rate."""
-    if isinstance(found, Notice):
-        return found
-    notices = [
-        Notice(issue.code, "bad", "", issue.text, issue.values)
-        for issue in spoiling
-        if (found.fit.wv.quantity or "gyro") in _SPOILING[issue.code]
-    ]
+def _of_sensor(found: ChannelModel, spoiling: Iterable[Notice]) -> list[Notice]:
+    """Those issues of the whole recording that concern its sensor."""
+    sensor = found.fit.wv.quantity or "gyro"
+    return [issue for issue in spoiling if sensor in _SPOILING[issue.code]]
+
+
+def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:
+    """The issues of a channel that make its numbers wrong, once each."""
+    bad = (each for each in issues if each.where == name and each.severity == "bad")
+    return list({each.code: each for each in bad if each.code in _SPOILING_CHANNEL}.values())
+
+
+def _judged(found: ChannelModel, spoiling: Iterable[Notice]) -> ChannelModel:
+    """With a fit that is not valid where an issue of its data makes its numbers wrong."""
+    notices = [Notice(e.code, "bad", "", e.text, e.values, e.action) for e in spoiling]
     return replace(found, fit=replace(found.fit, notices=(*notices, *found.fit.notices)))

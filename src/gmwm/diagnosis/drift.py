@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import f as f_distribution, norm
+from scipy.stats import chi2, f as f_distribution, kurtosis, norm
 
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
@@ -94,8 +94,10 @@ def variance_notice(
     errors: Innovations,
     usable: BoolArray,
     step: float,
+    *,
+    is_heavy: bool = False,
 ) -> Notice | None:
-    """Say whether the noise is as large at the end as at the beginning.
+    """Say whether the noise is as large at the end as at the beginning, and all the time between.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
     variance gives the error of their means, so tails heavier than Gaussian do no harm.
@@ -111,10 +113,15 @@ def variance_notice(
         Prediction errors outside events.
     step : float
         To which samples are rounded, u.
+    is_heavy : bool, optional
+        Whether the noise has heavy tails: the predictions after a large sample are worse then.
     """
     level = errors.level
-    if step > 2.0 * level or np.count_nonzero(usable) < 1000:
+    if step > 2.0 * level:
         return None  # noise below the step is seen only when the level is between two steps
+    unsteady = _unsteady_notice(name, unit, dt, errors, usable, is_heavy)
+    if unsteady is not None or np.count_nonzero(usable) < 1000:
+        return unsteady
     squares = [part[keep] ** 2 for part, keep in _tenths(errors.values, usable)]
     if min(part.size for part in squares) < 50:
         return None
@@ -164,6 +171,65 @@ def variance_notice(
         action = "look for people or machines then, and leave it out if it is none of the sensor"
         return Notice("variance", "warning", name, text, numbers, action)
     return None
+
+
+def _unsteady_notice(
+    name: str, unit: str, dt: float, errors: Innovations, usable: BoolArray, is_heavy: bool
+) -> Notice | None:
+    """Say that the noise comes and goes, or swells and dies, so that its mean is that of no time.
+
+    Sizes of prediction errors, bounded so that tails do no harm, are averaged over parts of 64,
+    256, ... samples. Those of stationary noise vary from part to part by their long-run variance
+    over the length, chi-square distributed; that variance is estimated from neighbouring means of
+    16 samples, so that no memory of the sizes of a few samples counts. What the mean squares of
+    the parts vary beyond the same of their own is the variance of the noise that changes.
+    """
+    size = np.abs(errors.values[usable])
+    memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if is_heavy else 1)
+    lengths = 4 * memory * 4 ** np.arange(16)
+    lengths = lengths[lengths * tuning.FEWEST_STEADY <= size.size]
+    if not lengths.size or not np.any(size > 0.0):
+        return None
+    bounded = np.minimum(size, tuning.LARGE * errors.level)
+    # What is far beyond the noise around it is clipped: a shock is no change of the noise.
+    squares = np.minimum(size, tuning.CLIP * errors.scale[usable]) ** 2
+    squares /= np.mean(squares)
+    excess = float(kurtosis(bounded))
+    by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
+    if not min(by_chance) > 0.0:
+        return None
+    worst, parts = 0.0, squares
+    for length in lengths.tolist():
+        variance = float(np.var(_means(bounded, length), ddof=1))
+        freedom = 2.0 / (2.0 / (size.size // length - 1) + excess / size.size)
+        chance = chi2.sf(freedom * variance * length / by_chance[0], freedom)
+        means = _means(squares, length)
+        added = float(np.var(means, ddof=1)) - by_chance[1] / length
+        if chance * lengths.size < tuning.FALSE_ALARM and added > worst:
+            worst, parts = added, means
+    changes = float(np.sqrt(worst))
+    if changes < tuning.UNSTEADY:
+        return None
+    usual = float(np.sqrt(np.mean(size**2)))
+    low, high = (usual * float(np.sqrt(each)) for each in np.quantile(parts, [0.1, 0.9]))
+    part = dt * (size.size // parts.size)
+    text = (
+        f"the noise is not steady: its standard deviation is {readable(low, unit)} in the quiet and "
+        f"{readable(high, unit)} in the loud parts of {part:.3g} s (a tenth of them beyond)"
+    )
+    values = {"changes": changes, "quiet": low, "loud": high, "part": part}
+    action = "the model is that of no part: use a recording, or a part, without what vibrates"
+    return Notice("variance", "bad", name, text, values, action)
+
+
+def _long_run_variance(values: FloatArray, memory: int) -> float:
+    """Of means, times their length: from neighbouring means of what is remembered."""
+    return 0.5 * memory * float(np.mean(np.diff(_means(values, memory)) ** 2))
+
+
+def _means(values: FloatArray, length: int) -> FloatArray:
+    """Of parts of a length."""
+    return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
 
 
 def _mean_of(means: FloatArray, spread: FloatArray, which: BoolArray) -> tuple[float, float]:

@@ -98,6 +98,9 @@ EVENNESS = 20.0
 a NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.76 to 1.09 without, and errors that are 2 %
 larger on the mean: ``python benchmarks/filter_numbers.py balance``."""
 
+BELOW = 0.98
+"""N over that of the error model, below which reduced numbers say so."""
+
 STEPS = 60
 """Of the search, at most."""
 
