@@ -102,7 +102,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     kinds = families(means.blocks.size, means.step)
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
-        known = means.differences(means.step * np.arange(means.blocks.size)[None, :])
+        known = means.differences(means.step * np.arange(float(means.blocks.size))[None, :])
     found: list[Departure] = []
     for _ in range(tuning.MOST_DEPARTURES):
         beside = [noise.beside(known) for noise in noises]
