@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,32 +32,35 @@ class TurningGravity:
     change: float
 
 
-def triad(recording: Recording, sensor: str) -> FloatArray | None:
-    """Samples of three axes, (n, 3), if the recording has them all."""
+def triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
+    """Samples of three axes, (n,) each, if the recording has them all."""
     names = [f"{sensor}_{axis}" for axis in AXES]
     if not all(name in recording for name in names):
         return None
-    return np.column_stack([recording[name].values for name in names])
+    return [recording[name].values for name in names]
 
 
-def block_means(values: FloatArray, size: int) -> FloatArray:
-    """Means of blocks of ``size`` rows; NaN where three quarters of one are missing.
+def block_means(columns: Iterable[FloatArray], size: int) -> FloatArray:
+    """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
 
     Parameters
     ----------
-    values : (n, k) ndarray
+    columns : iterable of (n,) ndarray
+        k of them, of which one at a time is copied.
     size : int
 
     Returns
     -------
     (n // size, k) ndarray
     """
-    blocks = values.shape[0] // size
-    rows = values[: blocks * size].reshape(blocks, size, values.shape[1])
-    known = ~np.isnan(rows)
-    count = np.count_nonzero(known, axis=1)
-    total = np.sum(np.where(known, rows, 0.0), axis=1)
-    return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
+    found = []
+    for column in columns:
+        rows = column[: column.size // size * size].reshape(-1, size)
+        known = ~np.isnan(rows)
+        count = np.count_nonzero(known, axis=1)
+        total = np.sum(rows, axis=1, where=known)
+        found.append(np.where(4 * count > size, total / np.maximum(count, 1), np.nan))
+    return np.stack(found, axis=1)
 
 
 def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningGravity | None:
@@ -82,10 +86,10 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
     rate, force = triad(recording, "gyro"), triad(recording, "accel")
     if rate is None or force is None or recording.n < 4 * size:
         return None
-    change = np.cross(np.nan_to_num(rate - np.nanmedian(rate, axis=0)), np.nan_to_num(force))
     # The same means of the integral as of the force: both changes are filtered alike.
-    integral = np.cumsum(change, axis=0) * -recording.dt
-    predicted = np.diff(block_means(integral, size), axis=0)
+    centres = [float(np.nanmedian(column)) for column in rate]
+    integrals = (_integral(recording.dt, rate, force, centres, axis) for axis in range(3))
+    predicted = np.diff(block_means(integrals, size), axis=0)
     observed = np.diff(block_means(force, size), axis=0)
     found = []
     for x, y in zip(np.array_split(predicted, parts), np.array_split(observed, parts), strict=True):
@@ -99,6 +103,22 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
         return None
     factor, explained, change = np.median(found, axis=0)
     return TurningGravity(float(factor), float(explained), float(change))
+
+
+def _integral(
+    dt: float, rate: list[FloatArray], force: list[FloatArray], centres: list[float], axis: int
+) -> FloatArray:
+    """Integral of -w x a along an axis; missing samples change nothing."""
+    after, last = (axis + 1) % 3, (axis + 2) % 3
+    result = _known(rate[last] - centres[last]) * _known(force[after])
+    result -= _known(rate[after] - centres[after]) * _known(force[last])
+    result *= dt
+    return np.cumsum(result, out=result)
+
+
+def _known(values: FloatArray) -> FloatArray:
+    """With zero for what is missing."""
+    return np.nan_to_num(values) if np.any(np.isnan(values)) else values
 
 
 def steady_turn(recording: Recording, size: int) -> float:
