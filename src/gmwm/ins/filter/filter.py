@@ -17,7 +17,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
-from gmwm.ins.filter.filter_kernels import IS_POSITION, PAUSED, run
+from gmwm.ins.filter.filter_kernels import IS_POSITION, KINDS, PAUSED, run
 from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
@@ -168,7 +168,7 @@ class Filter:
         used = np.ones(events.epoch.size, dtype=np.bool_)
         axis = table.axis[table.axis != NO_AXIS]
         first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
-        place, carry = np.zeros(8, dtype=np.int64), np.zeros(7)
+        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
         ready = partial(
             run, imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,

@@ -21,7 +21,8 @@ from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
 
-IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = 0, 1, 2, 3
+KINDS = (0, 1, 2, 3)
+IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = KINDS
 """Kinds of measurements."""
 
 PAUSED = -2
@@ -274,7 +275,7 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         Set to False where a measurement was rejected.
     last : int
         Epoch from which on the filter pauses, to go on with the next call.
-    place : (8,) ndarray of int, carry : (7,) ndarray
+    place : (4 + kinds,) ndarray of int, carry : (7,) ndarray
         Where it is and what it needs of the samples before: zeros at first.
     """
     n, m = P.shape[0], x.size
