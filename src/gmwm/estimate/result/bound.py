@@ -74,7 +74,8 @@ def upper_amplitude(
         information = spectral_information(coordinates, raised, wv.n, wv.dt)[np.ix_(kept, kept)]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
-        return float(amplitude * scale[place] * np.sqrt(inverse[place, place]))
+        # Rounding may leave less than nothing of what the others explain.
+        return float(amplitude * scale[place] * np.sqrt(np.maximum(inverse[place, place], 0.0)))
 
     vanishing, there = (error(max(value, _NEGLIGIBLE * plain)) for value in (0.0, at))
     if not (np.isfinite(vanishing * there) and vanishing > 0.0 and there > 0.0):
