@@ -4,9 +4,9 @@ Run with ``python benchmarks/own_data.py`` (an hour; ``--runs 10`` for a first l
 are emulated. The true models are compared with some whose errors are 10 % larger, and two
 calibrations of one sensor with each other, which are equally good. For each pair are printed the
 mean ratio of the errors over all logs, how often the first model is named, how often the second,
-ties, the ratio that such a log resolves on average, and an interval of 95 % (Clopper & Pearson 1934)
-for how often the first is named, or a tie found of equal models. ``--store FILE`` keeps the logs
-that are done, and goes on with them.
+ties, the ratio that such a log resolves on average, and an interval of 95 % (Clopper & Pearson
+1934) for how often the first is named, or a tie found of equal models. ``--store FILE`` keeps the
+logs that are done, and goes on with them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,8 @@ from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
-from gmwm.readers.clock import Clock, Timing, agree
+from gmwm.readers.clock import Clock, Timing, agree, without_summer_time
+from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
     has_sensors,
@@ -108,15 +109,24 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    topics = (topic,) if isinstance(topic, str) else tuple(topic)
-    if layout is not None and format is not None:
-        raise InputError("layout is of a binary file without a header: leave out format")
-    tables = (
-        open_tables(path, topics, clock, format)
-        if layout is None
-        else [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
-    )
+    tables = tables_of(path, layout, topic, clock, format)
     return _read(tables, rate, units or {}, channels, time)
+
+
+def tables_of(
+    path: str | os.PathLike[str] | Any,
+    layout: str | None,
+    topic: str | Sequence[str],
+    clock: str,
+    format: str | None,
+) -> Sequence[Table]:
+    """What `read` opens; the arguments are its own."""
+    if layout is None:
+        topics = (topic,) if isinstance(topic, str) else tuple(topic)
+        return open_tables(path, topics, clock, format)
+    if format is not None:
+        raise InputError("layout is of a binary file without a header: leave out format")
+    return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
 
 
 def _read(
@@ -156,10 +166,11 @@ def _part(
 
     arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
-    start = 0.0
+    start, odd = 0.0, list[Notice]()
     if roles.time is not None:
+        if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
+            arrays[roles.time], odd = without_summer_time(arrays[roles.time], table.where)
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
-    odd: list[Notice] = []
     for name, index in roles.channels.items():
         unit = unit_of[name]
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
@@ -176,6 +187,7 @@ def _part(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
+    arrays = {column.index: arrays[column.index] for column in auxiliary}
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     recording = replace(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pymavlink.DFReader import DFReader_binary
 
 import gmwm
 from flight_logs import (
@@ -19,6 +20,8 @@ from flight_logs import (
     write_dataflash,
     write_ulog,
 )
+from gmwm.readers import read_blocks
+from gmwm.readers.formats import dataflash
 from gmwm.readers.names import CANONICAL
 
 
@@ -179,3 +182,29 @@ def test_fields_of_hundredths(tmp_path):
     ]
     found = gmwm.read(write_dataflash(tmp_path / "a.bin", [form], messages))
     assert found["accel_z"].values == pytest.approx(np.trunc(100.0 * X[:, 5].astype(float)) / 100.0)
+
+
+def test_messages_are_those_that_pymavlink_finds(tmp_path, monkeypatch):
+    both = [m for pair in zip(imu_messages(X), imu_messages(2 * X, 1), strict=True) for m in pair]
+    path = write_dataflash(tmp_path / "a.bin", [IMU, *BATCH], both)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:9000] + bytes(range(256)) * 3 + whole[9000:])  # damaged in its middle
+    log = DFReader_binary(str(path))
+    found = [
+        (m.TimeUS, m.I, m.GyrX, m.AccZ) for m in iter(log.recv_msg, None) if m.fmt.name == "IMU"
+    ]
+    log.filehandle.close()
+    monkeypatch.setattr(dataflash, "_BLOCK", 1000)
+    parts = list(dataflash.messages(path, ("IMU", "GYR")))
+    ours = [tuple(row) for part in parts for row in part.rows[["TimeUS", "I", "GyrX", "AccZ"]]]
+    assert len(parts) > 10 and len(ours) > 390 and ours == found
+
+
+def test_a_block_at_a_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(dataflash, "_BLOCK", 1 << 17)
+    path = write_dataflash(tmp_path / "a.bin", [IMU], imu_messages(np.tile(X, (50, 1))))
+    whole = gmwm.read(path)
+    blocks = list(read_blocks(path, rows=4096, topic="IMU[0]"))
+    assert len(blocks) > 1
+    for name in whole:
+        assert np.array_equal(whole[name].values, np.concatenate([b[name].values for b in blocks]))

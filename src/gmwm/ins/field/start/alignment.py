@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -289,10 +290,21 @@ def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding
     alignment : Alignment
     """
     first = alignment.epoch
-    rotation = imu.rotation[first:] - alignment.gyro_bias * imu.dt
+    rotation = _less(imu.rotation[first:], alignment.gyro_bias * imu.dt)
     fixes = []
     for each in aiding.fixes:
         shifted = replace(each, time=each.time - first * imu.dt)
         # Those of the first epoch made the initial state.
         fixes.append(shifted.part(shifted.time > 0.5 * imu.dt))
     return Imu(imu.dt, rotation, imu.velocity[first:]), replace(aiding, fixes=tuple(fixes))
+
+
+def _less(rotation: FloatArray, constant: FloatArray) -> FloatArray:
+    """Increments less a constant; on disk if they are there."""
+    if not is_spooled(rotation):
+        return np.asarray(rotation - constant)
+    spool = Spool(3)
+    for part in windows(len(rotation)):
+        spool.append(rotation[part] - constant)
+        release(rotation)
+    return spool.array()
