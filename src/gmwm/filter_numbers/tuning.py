@@ -171,9 +171,6 @@ OTHER_UNITS = 40.0
 57 times as large, in m/s/sqrt(h) 60, in deg/sqrt(h) 3,438; people enlarge theirs up to 20 times
 (https://github.com/ethz-asl/kalibr/issues/663)."""
 
-CONSISTENT = (0.5, 2.0)
-"""NEES per degree of freedom within which numbers are called consistent."""
-
 # -- files of programs ----------------------------------------------------------------------------
 
 EKF2_INTERVAL = 0.01
