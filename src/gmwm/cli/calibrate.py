@@ -42,8 +42,11 @@ _WHOLE = ("start", "stop")
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
-_OF_RECORDING = ("not-static", "tilt", "rate-changes")
-"""Codes of notices of a fit that are those of the whole recording."""
+_OF_RECORDING = (
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
+    "variance",
+)  # fmt: skip
+"""Codes of notices of a fit that are those of the recording."""
 
 
 _EXPORTED = {

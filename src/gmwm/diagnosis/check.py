@@ -27,7 +27,13 @@ from gmwm.diagnosis.repeated import interpolation_notice, repetition, repetition
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
-from gmwm.diagnosis.samples import dead_notice, gap_notices, saturation_notice, stuck_notice
+from gmwm.diagnosis.samples import (
+    dead_notice,
+    gap_notices,
+    repeated_value_notice,
+    saturation_notice,
+    stuck_notice,
+)
 from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.diagnosis.still import vibration_notice
 from gmwm.errors import InputError
@@ -228,12 +234,13 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         quiet[start:stop] = np.nan
     found = [
         stuck_notice(name, unit, dt, values, step, errors),
-        saturation_notice(name, unit, present, step),
+        saturation_notice(name, unit, present, quiet[~np.isnan(quiet)], step),
+        repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
         rounding_notice(name, unit, step, errors.level),
-        variance_notice(name, unit, dt, errors, usable, step),
+        variance_notice(name, unit, dt, errors, usable, step, is_heavy=tails is not None),
         drift_notice(name, unit, dt, quiet),
     ]
     notices = [one for one in found if one is not None]
@@ -276,5 +283,8 @@ def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump,
 def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:
     if not errors.level > 0.0:
         return None
-    safe = np.where(errors.scale > 0.0, errors.scale, errors.level)
-    return np.where(usable, errors.values / safe, np.nan)
+    result = np.where(errors.scale > 0.0, errors.scale, errors.level)
+    np.divide(errors.values, result, out=result)
+    np.clip(result, -tuning.CLIP, tuning.CLIP, out=result)
+    result[~usable] = 0.0
+    return result

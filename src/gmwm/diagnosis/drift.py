@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import f as f_distribution, norm
+from scipy.stats import chi2, f as f_distribution, kurtosis, norm
 
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
@@ -94,8 +94,10 @@ def variance_notice(
     errors: Innovations,
     usable: BoolArray,
     step: float,
+    *,
+    is_heavy: bool = False,
 ) -> Notice | None:
-    """Say whether the noise is as large at the end as at the beginning.
+    """Say whether the noise is as large at the end as at the beginning, and all the time between.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
     variance gives the error of their means, so tails heavier than Gaussian do no harm.
@@ -111,10 +113,31 @@ def variance_notice(
         Prediction errors outside events.
     step : float
         To which samples are rounded, u.
+    is_heavy : bool, optional
+        Whether the noise has heavy tails: the predictions after a large sample are worse then.
     """
-    level = errors.level
-    if step > 2.0 * level or np.count_nonzero(usable) < 1000:
+    if step > 2.0 * errors.level:
         return None  # noise below the step is seen only when the level is between two steps
+    found = _change_notice(name, dt, errors, usable)
+    values = _unsteadiness(dt, errors, usable, is_heavy)
+    if values is None:
+        return found
+    low, high = (readable(values[each], unit) for each in ("quiet", "loud"))
+    text = (
+        f"the noise is not steady: {low} in the quiet and {high} in the loud tenth of parts of "
+        f"{values['part']:.3g} s, so that its mean is {100.0 * values['excess']:.2g} % above that "
+        "of the quiet quarter"
+    )
+    action = "use a recording, or a part, without what vibrates"
+    if found is not None:
+        text, values = f"{found.text}; {text}", {**found.values, **values}
+    return Notice("variance", "bad", name, text, values, action)
+
+
+def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray) -> Notice | None:
+    """Of the second half against the first, or of one tenth."""
+    if np.count_nonzero(usable) < 1000:
+        return None
     squares = [part[keep] ** 2 for part, keep in _tenths(errors.values, usable)]
     if min(part.size for part in squares) < 50:
         return None
@@ -164,6 +187,61 @@ def variance_notice(
         action = "look for people or machines then, and leave it out if it is none of the sensor"
         return Notice("variance", "warning", name, text, numbers, action)
     return None
+
+
+def _unsteadiness(
+    dt: float, errors: Innovations, usable: BoolArray, is_heavy: bool
+) -> dict[str, float] | None:
+    """By how much noise that comes and goes, or swells and dies, is above that of its quiet parts.
+
+    Sizes of prediction errors, bounded so that tails do no harm, are averaged over parts of 64,
+    256, ... samples. Those of stationary noise vary from part to part by their long-run variance
+    over the length, chi-square distributed; that variance is estimated from neighbouring means of
+    16 samples, so that no memory of the sizes of a few samples counts. What the mean squares of
+    the parts vary beyond the same of their own is the variance of the noise that changes.
+    """
+    size = np.abs(errors.values[usable])
+    memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if is_heavy else 1)
+    lengths = 4 * memory * 4 ** np.arange(16)
+    lengths = lengths[lengths * tuning.FEWEST_STEADY <= size.size]
+    if not lengths.size or not errors.level > 0.0:
+        return None
+    bounded = np.minimum(size, tuning.LARGE * errors.level)
+    # What is far beyond the noise around it is clipped: a shock is no change of the noise.
+    squares = np.minimum(size, tuning.CLIP * errors.scale[usable]) ** 2
+    squares /= np.mean(squares)
+    kurt = float(kurtosis(bounded))
+    by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
+    if min(by_chance) <= 0.0:
+        return None
+    found = {"excess": tuning.UNSTEADY}
+    for length in lengths.tolist():
+        sizes, means = _means(bounded, length), _means(squares, length)
+        freedom = 2.0 / (2.0 / (means.size - 1) + kurt / size.size)
+        ratio = float(np.var(sizes, ddof=1)) * length / by_chance[0]
+        total = float(np.var(means, ddof=1))
+        added = total - by_chance[1] / length
+        if added <= 0.0 or chi2.sf(freedom * ratio, freedom) * lengths.size > tuning.FALSE_ALARM:
+            continue
+        # Without what chance spreads them.
+        real = np.maximum(1.0 + np.sqrt(added / total) * (means - 1.0), np.min(means))
+        quiet, quarter, loud = np.quantile(real, [0.1, 0.25, 0.9])
+        excess = float(1.0 / np.sqrt(quarter) - 1.0) if quarter > 0.0 else np.inf
+        if excess > found["excess"]:
+            usual = float(np.sqrt(np.mean(size**2)))
+            low, high = (usual * float(np.sqrt(each)) for each in (quiet, loud))
+            found = {"excess": excess, "quiet": low, "loud": high, "part": dt * length}
+    return found if "part" in found else None
+
+
+def _long_run_variance(values: FloatArray, memory: int) -> float:
+    """Of means, times their length: from neighbouring means of what is remembered."""
+    return 0.5 * memory * float(np.mean(np.diff(_means(values, memory)) ** 2))
+
+
+def _means(values: FloatArray, length: int) -> FloatArray:
+    """Of parts of a length."""
+    return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
 
 
 def _mean_of(means: FloatArray, spread: FloatArray, which: BoolArray) -> tuple[float, float]:

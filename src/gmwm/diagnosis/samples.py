@@ -168,7 +168,9 @@ def _longest_by_chance(n: int, step: float, scale: float) -> int:
     return max(int(np.ceil(np.log(tuning.FALSE_ALARM / n) / np.log(same))) + 1, fewest)
 
 
-def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> Notice | None:
+def saturation_notice(
+    name: str, unit: str, values: FloatArray, quiet: FloatArray, step: float
+) -> Notice | None:
     """Find more samples at the largest or smallest value than at the one before it.
 
     A tail falls outwards, and for noise faster and faster: from the last step but one to the last
@@ -181,6 +183,8 @@ def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> 
         Of the channel.
     values : (n,) ndarray
         Samples, none missing.
+    quiet : (m,) ndarray
+        Those outside shocks, whose peaks may be cut off without harm: they are left out.
     step : float
         u; 0 if samples are not rounded.
     """
@@ -209,13 +213,63 @@ def saturation_notice(name: str, unit: str, values: FloatArray, step: float) -> 
     count = sum(ends.values())
     share = count / values.size
     where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    of_noise = sum(np.count_nonzero(np.abs(quiet - end) <= half * step) for end in ends)
     return Notice(
         "saturation",
-        "bad" if share > tuning.FALSE_ALARM else "warning",
+        "bad" if of_noise > tuning.FALSE_ALARM * values.size else "warning",
         name,
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
         "use a wider range; make such samples missing (NaN) if they are few",
+    )
+
+
+def repeated_value_notice(
+    name: str, unit: str, values: FloatArray, step: float, scatter: float
+) -> Notice | None:
+    """Find a value that comes far more often than the ones next to it, in many places.
+
+    Noise above its step has no such value: the two values on either side come nearly as often. A
+    driver that puts zero where the sensor did not answer, or a dead band, makes one. Runs of equal
+    samples count once: what stays is stuck.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    values : (n,) ndarray
+        Samples in their order, none missing.
+    step : float
+        u; 0 if samples are not rounded.
+    scatter : float
+        Standard deviation of what cannot be predicted of a sample, u.
+    """
+    if step > scatter:
+        return None
+    begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
+    levels, counts = np.unique(begins, return_counts=True)
+    most = int(np.argmax(counts))
+    if most in (0, levels.size - 1):
+        return None  # the end of the scale: see saturation
+    near = np.delete(counts[max(most - 2, 0) : most + 3], min(most, 2))
+    count = int(np.count_nonzero(values == levels[most]))
+    share = count / values.size
+    usual = tuning.BESIDE_REPEATED * np.max(near)
+    if counts[most] - usual < max(tuning.FALSE_ALARM * values.size, tuning.LONG_RUN):
+        return None
+    is_much = share > tuning.MUCH_REPEATED
+    text = (
+        f"{count:,} samples ({share:.2g} of all) are "
+        f"{readable(float(levels[most]), unit, digits=5)}, which comes "
+        f"{counts[most] / np.max(near):.2g} times as often as the values next to it"
+    )
+    return Notice(
+        "value-repeated",
+        "bad" if is_much else "warning",
+        name,
+        text,
+        {"value": float(levels[most]), "samples": float(count), "share": share},
+        "if it stands for no answer or a dead band, make such samples missing (NaN)",
     )
 
 

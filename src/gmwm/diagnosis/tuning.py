@@ -78,6 +78,11 @@ LONG_RUN = 32
 FEWEST_AT_END = 8
 """Samples at the end of the scale from which saturation is looked for."""
 
+BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
+"""Times as often as the values next to it comes one that is no sample: noise as small as its step
+has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
+too small."""
+
 # -- prediction errors ----------------------------------------------------------------------------
 
 FEWEST_KNOWN = 64
@@ -134,6 +139,15 @@ TENTHS = 10
 
 CHANGE, LARGE_CHANGE = 0.05, 0.2
 """Relative change of the standard deviation between halves for a note and a warning."""
+
+STEADY_MEAN, STEADY_OF_TAILS, FEWEST_STEADY = 16, 4, 8
+"""Samples whose means give what stationary noise leaves, times as many of heavy tails (a large
+sample leaves its trace in the predictions of `ORDER` more), and parts of four times as many and
+more that are compared with it at least."""
+
+UNSTEADY = 0.1
+"""Of the deviation of all above that of the quiet quarter: as much as a valid fit may miss. Real
+recordings at rest have 0.04 (docs/health.md)."""
 
 # -- two channels ---------------------------------------------------------------------------------
 

@@ -20,7 +20,8 @@ from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
-from gmwm.readers.clock import Clock, Timing, agree
+from gmwm.readers.clock import Clock, Timing, agree, without_summer_time
+from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
     has_sensors,
@@ -165,10 +166,11 @@ def _part(
 
     arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
-    start = 0.0
+    start, odd = 0.0, list[Notice]()
     if roles.time is not None:
+        if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
+            arrays[roles.time], odd = without_summer_time(arrays[roles.time], table.where)
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
-    odd: list[Notice] = []
     for name, index in roles.channels.items():
         unit = unit_of[name]
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
@@ -178,8 +180,11 @@ def _part(
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
-    recording = Recording.from_arrays(
-        {name: arrays[index] for name, index in roles.channels.items()},
+    further = [_auxiliary(column, arrays[column.index], 1.0 / used_rate) for column in auxiliary]
+    series = {name: arrays[index] for name, index in roles.channels.items()}
+    arrays.clear()
+    recording = Recording.taking(
+        series,
         rate=used_rate,
         units=unit_of,
         source=table.source,
@@ -187,7 +192,6 @@ def _part(
     )
     arrays = {column.index: arrays[column.index] for column in auxiliary}
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
-    further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     recording = replace(
         recording,
         channels=(*recording.channels, *further),

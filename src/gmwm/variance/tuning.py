@@ -42,6 +42,12 @@ ISLAND = 32
 PASSED_OCTAVES = 3
 """By which a gap is shorter than another that looks across it."""
 
+APART = 1e-3
+"""Chance that noise has a gap in a series that is taken for a change of the level."""
+
+WIDER = 16
+"""Times the stretch beside a gap, over which a change of the level must show too."""
+
 NEIGHBOURHOOD = 128
 """Half samples: gaps so near have correlated errors."""
 

@@ -11,9 +11,9 @@ from scipy.stats import norm
 
 from gmwm._core.typing import FloatArray
 from gmwm.ins.field.measured import Measured
-from gmwm.ins.field.start import Alignment, started
+from gmwm.ins.field.start import Alignment, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
-from gmwm.ins.geometry import matrix_from_rpy, offset
+from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
 from gmwm.ins.trajectory import NavState
@@ -34,6 +34,9 @@ class Replay:
     models : SensorModels
     aiding : Aiding
         On the time of ``imu``.
+    stood : float
+        Time at rest of which the gyros' mean is subtracted, s; their ``bias_sd`` is how well it is
+        known then. 0 if there is none.
     """
 
     imu: Imu
@@ -41,6 +44,7 @@ class Replay:
     sd: InitialSd
     models: SensorModels
     aiding: Aiding
+    stood: float = 0.0
 
     @classmethod
     def of(cls, measured: Measured, alignment: Alignment) -> Replay:
@@ -56,7 +60,7 @@ class Replay:
         if alignment.gyro_bias_sd is not None:
             known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
             models = replace(models, bias_sd={**models.bias_sd, **known})
-        return cls(imu, alignment.state, alignment.sd, models, aiding)
+        return cls(imu, alignment.state, alignment.sd, models, aiding, alignment.stood)
 
     # -- what comes of it -------------------------------------------------------------------------
 
@@ -102,9 +106,23 @@ class Replay:
     # -- other assumptions ------------------------------------------------------------------------
 
     def later(self, seconds: float) -> Replay:
-        """Fixes with stamps as much later."""
+        """Fixes with stamps as much later, the one that made the initial state too."""
         fixes = tuple(replace(each, time=each.time + seconds) for each in self.aiding.fixes)
-        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+        return replace(
+            self, state=self._where_at(-seconds), aiding=replace(self.aiding, fixes=fixes)
+        )
+
+    def _where_at(self, seconds: float) -> NavState:
+        """The initial state some time later; earlier if negative."""
+        state = self.state
+        if self.stood > 0.0:  # it stands there
+            return state
+        samples = max(round(abs(seconds) / self.imu.dt), 1)
+        force = np.mean(self.imu.velocity[:samples], axis=0) / self.imu.dt
+        acceleration = matrix_from_rpy(state.rpy) @ force
+        acceleration[2] += gravity_at(np.sin(state.lla[0]), state.lla[2])
+        lla = offset(state.lla, (state.velocity + 0.5 * acceleration * seconds) * seconds)
+        return replace(state, lla=lla, velocity=state.velocity + acceleration * seconds)
 
     def with_arm_longer(self, by: FloatArray) -> Replay:
         """A lever arm longer by a vector, m."""
@@ -140,13 +158,22 @@ class Replay:
     def with_sensors_scaled(self, factor: float, kind: str, white: bool) -> Replay:
         """White noise, or else all slow terms and the constant, of a kind of sensors scaled."""
         models, bias = dict(self.models.models), dict(self.models.bias_sd)
+        averaged = kind == "gyro" and self.stood > 0.0
         for axis in AXES:
             if axis.startswith(kind):
                 terms = models[axis].terms
                 models[axis] = Model(tuple(
                     _scaled(term, factor) if term.is_white is white else term for term in terms
                 ))  # fmt: skip
-                bias[axis] *= 1.0 if white else factor
+                bias[axis] *= 1.0 if white or averaged else factor
+        scaled = SensorModels(models, bias)
+        if averaged:
+            # The mean at rest is as far off as the noise makes it, not as the constant was.
+            before, after = (
+                mean_sd(each, kind, self.stood, self.imu.dt) for each in (self.models, scaled)
+            )
+            for axis in AXES[:3]:
+                bias[axis] = float(np.sqrt(max(bias[axis] ** 2 - before**2, 0.0) + after**2))
         return replace(self, models=SensorModels(models, bias))
 
     def without(self, rejected: dict[str, npt.NDArray[np.bool_]]) -> Replay:

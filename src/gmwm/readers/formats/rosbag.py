@@ -255,10 +255,8 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
 def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]) -> BagTable:
     sensors = topic.sensors or frozenset(SI_UNIT)
     names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
-    notices = []
-    if len(found) > 1 or len(sensors) < len(SI_UNIT):
-        text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
-        notices.append(Notice("topic", "note", "", text, {"topic": topic.name}))
+    text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
+    notices = [Notice("topic", "note", "", text, {"topic": topic.name})]
     known = frozenset[str]().union(*(each.sensors for each in found.values()))
     if topic.sensors and (absent := set(SI_UNIT) - known):
         words = {"gyro": "angular rates", "accel": "accelerations"}

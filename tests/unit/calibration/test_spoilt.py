@@ -1,0 +1,121 @@
+"""What makes the samples of a channel wrong makes its fit not valid, and no other."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import gmwm
+from gmwm import WhiteNoise
+from gmwm.report.answer import trust
+
+N, SD = 6_000, 8.7e-4
+
+
+def clean(seed):
+    return SD * np.random.default_rng(seed).standard_normal(N)
+
+
+def zeros(share):
+    values = clean(1)
+    values[np.random.default_rng(2).random(N) < share] = 0.0
+    return values
+
+
+def shaken(envelope):
+    return clean(1) * envelope(np.arange(N) / 100.0)
+
+
+SPOILT = {
+    "cut off above": ("saturation", "within_range", np.minimum(clean(1), 0.5 * SD)),
+    "cut off on both sides": ("saturation", "within_range", np.clip(clean(1), -SD, SD)),
+    "rounded to 3 sd": ("rounding", "resolution_fine", 3 * SD * np.round(clean(1) / 3 / SD + 0.13)),
+    "rounded to 6 sd": ("rounding", "resolution_fine", 6 * SD * np.round(clean(1) / 6 / SD + 0.13)),
+    "30 % are zero": ("value-repeated", "samples_measured", zeros(0.3)),
+    "every other one is zero": (
+        "value-repeated", "samples_measured", np.where(np.arange(N) % 2, clean(1), 0.0)
+    ),
+    "stuck": (
+        "stuck", "samples_change",
+        np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50)),
+    ),
+    "swells to 2 sd and dies": (
+        "variance", "noise_steady", shaken(lambda t: 1.0 + np.sin(np.pi * t / 60.0) ** 2)
+    ),
+    "times 4 for 1 s of every 2 s": (
+        "variance", "noise_steady", shaken(lambda t: np.where(t % 2.0 < 1.0, 4.0, 1.0))
+    ),
+    "25 s, times 5 for 12 s": (
+        "variance", "noise_steady", shaken(lambda t: np.where((t > 8) & (t < 20), 5.0, 1.0))[:2500]
+    ),
+}  # fmt: skip
+
+
+def calibrated(values):
+    # In the other axis nothing is wrong.
+    channels = {"gyro_x": values, "gyro_y": clean(3)[: values.size]}
+    rec = gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "rad/s"})
+    return gmwm.calibrate(rec, WhiteNoise())
+
+
+@pytest.mark.parametrize("kind", SPOILT)
+def test_a_spoilt_channel_is_not_valid_and_the_others_are(kind):
+    code, reason, values = SPOILT[kind]
+    found = calibrated(values)
+    fit = found["gyro_x"]
+    assert not fit.valid
+    assert not fit.reasons[reason]
+    assert [n.code for n in found.notices if n.where == "gyro_x" and n.severity == "bad"] == [code]
+    assert trust("gyro_x", fit, found)[0] is False
+    assert found["gyro_y"].valid
+    assert all(found["gyro_y"].reasons.values())
+
+
+def rounded(noise, step):
+    return step * np.round(noise / step)
+
+
+RNG = np.random.default_rng(7)
+SOUND = {
+    "rounded to 1 sd": rounded(clean(5), SD),
+    "rounded to 2 sd": rounded(clean(5), 2 * SD),
+    "Laplace, rounded": rounded(SD * RNG.laplace(size=N), SD),
+    "Student's t, rounded": rounded(SD * RNG.standard_t(3, size=N), SD),
+    "a walk, rounded": rounded(clean(5) + 0.05 * SD * np.cumsum(RNG.standard_normal(N)), SD),
+    "shocks that are cut off": np.clip(
+        np.where(RNG.random(N) < 2e-3, 200 * SD * RNG.standard_normal(N), clean(5)),
+        -30 * SD, 30 * SD,
+    ),
+    "a few zeros": zeros(0.002),
+    "noise 15 % larger in the second half": shaken(lambda t: np.where(t > 30.0, 1.15, 1.0)),
+    "Student's t with 2.5 degrees of freedom": SD * RNG.standard_t(2.5, N),
+    "a Gauss-Markov process": gmwm.GaussMarkov(SD, 0.5).simulate(N, 0.01, 1),
+    "low-passed": lfilter(np.ones(8) / 8.0, [1.0], clean(5)),
+    "a resonance": (WhiteNoise(1e-5) + gmwm.Resonance(SD, 10.0, 0.01)).simulate(N, 0.01, 1),
+    "quantization noise": gmwm.QuantizationNoise(SD * 0.01).simulate(N, 0.01, 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SOUND)
+def test_sound_channels_are_not_called_spoilt(kind):
+    rec = gmwm.Recording.from_arrays({"gyro_x": SOUND[kind]}, 100.0, {"gyro": "rad/s"})
+    assert not [n for n in gmwm.health(rec).notices if n.severity == "bad"]
+
+
+def test_the_command_line_names_the_channel_once(tmp_path):
+    from click.testing import CliRunner
+
+    from gmwm.cli.main import cli
+
+    np.savetxt(
+        tmp_path / "s.csv", np.column_stack([zeros(0.3), clean(3)]), delimiter=",", comments="",
+        header="gyro_x [rad/s],gyro_y [rad/s]", fmt="%.9g",
+    )  # fmt: skip
+    done = CliRunner().invoke(
+        cli, ["calibrate", str(tmp_path / "s.csv"), "--rate", "100", "--model", "N",
+               "-o", str(tmp_path / "out")],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    text = " ".join(done.output.split())
+    assert text.count("which comes") == 1
+    assert "not valid" in text
+    assert "one value stands for many" in (tmp_path / "out" / "report.html").read_text()
