@@ -1,11 +1,11 @@
 """A factor graph of GTSAM with numbers by several rules: its NEES beside the certified one.
 
-Run with ``python benchmarks/smoother.py [--runs 40] [--free] [--gravity 9.81]``; the tables of
-docs/filter-numbers.md. An IMU at 100 Hz, moved as by hand, and a relative pose every second for a
-minute (``KEYFRAME_SD``). All are smoothed at once, with combined preintegration between keyframes.
-The trajectory is what the graph's own integration makes of error-free samples: no error is left
-but those of the sensors. ``--free`` is an IMU that floats, without gravity or motion, where each
-axis is alone, as in a certificate.
+Run with ``python benchmarks/smoother.py [--runs 40] [--free] [--gravity 9.81] [--seed 0] [--truth
+NAME] [--numbers RULE]``; the tables of docs/filter-numbers.md. An IMU at 100 Hz, moved as by hand,
+and a relative pose every second for a minute (``KEYFRAME_SD``). All are smoothed at once, with
+combined preintegration between keyframes. The trajectory is what the graph's own integration makes
+of error-free samples: no error is left but those of the sensors. ``--free`` is an IMU that floats,
+without gravity or motion, where each axis is alone, as in a certificate.
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ TRUTHS = {
         + GaussMarkov(5e-3, 200.0),
     },
 }  # fmt: skip
+RULES = ("Allan lines", "times ten", "bound", "reduce")
 LINE = 1000.0  # s, where the line of slope +1/2 touches an Allan deviation
 HEADS = ("attit.", "veloc.", "posit.", "gyro b", "acc. b",
          "turn", "cert.", "here", "step", "cert.", "here")  # fmt: skip
@@ -239,6 +240,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--free", action="store_true")
     parser.add_argument("--gravity", type=float, default=GRAVITY)
+    parser.add_argument("--seed", type=int, default=0, help="of the first run")
+    parser.add_argument("--truth", choices=list(TRUTHS), help="one of them alone")
+    parser.add_argument("--numbers", choices=RULES, help="by one rule alone")
     options = parser.parse_args()
     motion = Motion.of(SECONDS, options.free, options.gravity)
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
@@ -251,9 +255,12 @@ def main() -> None:
     print(fill(text, 96))
     print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))
     for name, models in TRUTHS.items():
-        by_rule = rules(models)
+        if options.truth not in (None, name):
+            continue
+        by_rule = {k: v for k, v in rules(models).items() if options.numbers in (None, k)}
         truth = SensorModels.of(models, TURN_ON)
-        runs = [nees(motion, truth, by_rule, seed) for seed in range(options.runs)]
+        seeds = range(options.seed, options.seed + options.runs)
+        runs = [nees(motion, truth, by_rule, seed) for seed in seeds]
         for rule, numbers in by_rule.items():
             *state, turn, step = np.mean([run[rule] for run in runs], axis=0)
             turns, steps = zip(certified(models, numbers), expected(models, numbers), strict=True)

@@ -1,20 +1,24 @@
 # ruff: noqa: E501 - tables of hostile values
 """Damaged inputs: every file that gmwm reads, mutated, is used or refused in one sentence.
 
-``python tests/fuzz.py --cases 70000`` draws as many over all kinds of files, prints how many were
-used and refused, and ends with status 1 if any was neither: a traceback, a warning, more than 20 s,
-of the processor, or more than 2 GB. ``--only KIND --first CASE --cases 1`` repeats one. The suite runs some of each.
+``python tests/fuzz.py --cases 70000 --store cases.jsonl`` draws as many over all kinds of files,
+prints how many were used and refused, and ends with status 1 if any was neither: a traceback, a
+warning, more than 20 s of the processor, or more than 2 GB. The store has a line for each case, with
+its time and memory; a run that ended goes on with what is not in it. ``--only KIND --first CASE
+--cases 1`` repeats one. The suite runs some of each.
 """
 
 from __future__ import annotations
 
 import argparse
+import atexit
 import gzip
 import io
 import json
+import logging
 import random
 import re
-import resource
+import shutil
 import signal
 import sys
 import tempfile
@@ -23,29 +27,33 @@ import traceback
 import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
+import fuzz_formats as formats
 import gmwm
+from fleets import QUICK
 from gmwm._core.runs import do_runs
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
-from gmwm.export import export
+from gmwm.export import TARGETS, export
+from gmwm.filter_numbers import read_numbers
 from gmwm.ins.field import Measured
 from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log
 from gmwm.ins.logs import read_log
 from gmwm.ins.spec import experiment_from, read_document
-from gmwm.report import write_report
+from gmwm.report import read_datasheet, write_report
 
 SECONDS, BYTES = 20, 2 << 30
 LONGEST = 2000  # characters of a message, with the path
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
+SI = formats.SI
 
 HOSTILE = (
     "", " ", "nan", "inf", "-1", "0", "1e999", "1e308", "1e-320", "9" * 400, "-0", "1_0", "٣", "0x1",
@@ -133,9 +141,15 @@ def _changed(rng: random.Random, content: Any) -> Any:
     return content
 
 
+def _is_number(value: Any) -> bool:
+    """One that can be multiplied by another."""
+    is_some = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_some and not (isinstance(value, int) and abs(value) > 10**300)
+
+
 def _replaced(rng: random.Random, value: Any) -> Any:
     kind = rng.random()
-    if isinstance(value, int | float) and not isinstance(value, bool) and kind < 0.4:
+    if _is_number(value) and kind < 0.4:
         return value * rng.choice((-1, 0, 2, 0.5, 1e-30, 1e30, 1e-300, 1.0000001))
     if kind < 0.45:
         for _ in range(rng.choice((2, 40, 200))):
@@ -210,9 +224,11 @@ def documents() -> tuple[str, ...]:
     data = {"gyro_x": 1e-3 * x, "gyro_y": 1e-3 * holes, "accel_x": x, "accel_y": np.ones(700)}
     given = gmwm.Recording.from_arrays(data, rate=100.0, units=SI, source="static.csv")
     calibrations = [gmwm.calibrate(given, model), gmwm.calibrate([given, given], model)]
+    numbers = gmwm.bound(calibrations[0], "N+K", horizon=60.0)
     fit = gmwm.fit(gmwm.WhiteNoise() + gmwm.GaussMarkov(tau=30.0), x, 1.0)
     selection = gmwm.select(x[:300], 1.0)
-    others = [fit, selection, health(given), bootstrap(fit, 5), cramer_rao(fit.model, 99, 1.0)]
+    others = [fit, selection, health(given), bootstrap(fit, 5), cramer_rao(fit.model, 99, 1.0),
+              numbers, numbers["gyro_x"], gmwm.certify(calibrations[0], numbers)]  # fmt: skip
     return tuple(json.dumps(each.to_dict()) for each in (*calibrations, *others))
 
 
@@ -242,6 +258,34 @@ heading: 30 deg
 position_sd: 2 m
 bias: {gyro: 10 deg/h, accel: 2 mg}
 """
+DATASHEET = """\
+gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h, K: 1e-6 rad/s^2/sqrt(Hz)}
+accel_x: {N: 60 ug/sqrt(Hz), B: 0.03 mg}
+"""
+
+
+@cache
+def programs() -> tuple[tuple[str, bytes], ...]:
+    """Numbers as the files of programs hold them: suffix and content."""
+    rng = np.random.default_rng(3)
+    data = {f"{sensor}_{axis}": 1e-3 * rng.normal(size=300) for sensor in SI for axis in "xyz"}
+    given = gmwm.Recording.from_arrays(data, rate=100.0, units=SI)
+    found = gmwm.bound(gmwm.calibrate(given, gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-5)))
+    texts = []
+    for name, target in TARGETS.items():
+        with suppress(gmwm.InputError):  # without a place for a random walk
+            texts.append((Path(target.file).suffix, export(found, name).encode()))
+    return tuple(texts)
+
+
+def make_numbers(rng: random.Random, folder: Path) -> Path:
+    suffix, text = rng.choice(programs())
+    path = folder / f"imu{suffix}"
+    odd = mutated_json(rng, text.decode()) if suffix == ".json" else mutated_text(rng, text)
+    path.write_bytes(odd)
+    return path
+
+
 YAML = ("!!float x", "!!bool 2", "!!timestamp x", "!!binary =", "!!int 1e9", "!!null 3", "!!set {a}",
         "!!map [1]", "!!omap 3", "!!python/object:os.system x", "1.0e+999", "-.inf", ".nan", "2001-13-45",
         "1:99:99", "[[[[[[1]]]]]]", "[" * 500, "&a [*a, *a]", "{? [1]: 2}", "<<: 1", "1e150 deg/s",
@@ -393,6 +437,55 @@ def make_field(rng: random.Random, folder: Path) -> Path:
     return file_of("field.yaml", lambda rng: yaml_text(rng, FIELD))(rng, folder)
 
 
+@cache
+def fleet_outputs() -> tuple[Path, Path]:
+    """Recordings of three units, and the folder of their fleet."""
+    folder = Path(tempfile.mkdtemp(prefix="fuzz-fleet-"))
+    atexit.register(shutil.rmtree, folder, True)
+    for i in range(3):
+        np.savez(folder / f"unit{i}.npz", gyro_x=1e-3 * np.random.default_rng(i).normal(size=200))
+    gmwm.fleet(str(folder / "*.npz"), folder=folder / "out", **QUICK)
+    return folder, folder / "out"
+
+
+def make_fleet(rng: random.Random, folder: Path) -> Path:
+    """A fleet's folder with something damaged in it."""
+    _, whole = fleet_outputs()
+    own = folder / "out"
+    shutil.rmtree(own, ignore_errors=True)
+    shutil.copytree(whole, own)
+    path = rng.choice(sorted(each for each in own.rglob("*") if each.is_file()))
+    if path.suffix == ".json":
+        path.write_bytes(mutated_json(rng, path.read_text()))
+    else:
+        path.write_bytes(formats.damaged(rng, path.read_bytes()))
+    return own
+
+
+def fleet_resumed(_: random.Random, path: Path) -> Any:
+    lot, _ = fleet_outputs()
+    return gmwm.fleet(str(lot / "*.npz"), folder=path, resume=True, **QUICK)
+
+
+def make_checkpoint(rng: random.Random, folder: Path) -> Path:
+    stream = gmwm.StreamingVariance(0.01, SI_AXES if rng.random() < 0.5 else None)
+    values = noise(rng.choice((1, 64, 700)))[:, : 2 if stream.channels else 1]
+    stream.update(values if stream.channels else values[:, 0])
+    path = stream.save(folder / "checkpoint.npz")
+    path.write_bytes(formats.damaged(rng, path.read_bytes()))
+    return path
+
+
+def gone_on(_: random.Random, path: Path) -> Any:
+    stream = gmwm.StreamingVariance.load(path)
+    width = max(len(stream.channels), 1)
+    stream.update(noise()[:, :width] if stream.channels else noise()[:, 0])
+    stream.results()
+    str(stream)
+    return stream
+
+
+SI_AXES = {"gyro_x": "rad/s", "accel_x": "m/s^2"}
 ODD = ("square", "decades", "tiny", "constant", "alternating", "spike", "steps", "sine", "huge",
        "integers", "ramp", "missing", "half", "denormal", "impulses", "stairs", "cauchy")  # fmt: skip
 
@@ -472,6 +565,26 @@ KINDS = {
     "field": Kind(5, make_field, lambda rng, path: Measured.of(read_document(path), path.parent)),
     "store": Kind(4, make_store, resumed),
     "odd": Kind(0.3, make_odd, examine_and_calibrate),
+    "ulog": Kind(7, partial(formats.make, formats.ulog), formats.read),
+    "ardupilot": Kind(7, partial(formats.make, formats.ardupilot), formats.read),
+    "mat": Kind(7, partial(formats.make, formats.mat), formats.read),
+    "mat73": Kind(4, partial(formats.make, partial(formats.hdf5, is_mat=True)), formats.read),
+    "hdf5": Kind(5, partial(formats.make, formats.hdf5), formats.read),
+    "parquet": Kind(6, partial(formats.make, partial(formats.arrow, "parquet")), formats.read),
+    "feather": Kind(4, partial(formats.make, partial(formats.arrow, "feather")), formats.read),
+    "bag1": Kind(6, partial(formats.make, partial(formats.bag, "1")), formats.read),
+    "sqlite3": Kind(5, partial(formats.make_bag2, "SQLITE3"), formats.read),
+    "mcap": Kind(6, partial(formats.make_bag2, "MCAP"), formats.read),
+    "records": Kind(5, formats.make_records, formats.read),
+    "numbers": Kind(
+        8, make_numbers, lambda rng, path: read_numbers(path, rng.choice((None, 100.0)))
+    ),
+    "datasheet": Kind(
+        4, file_of("sheet.yaml", lambda rng: yaml_text(rng, DATASHEET)),
+        lambda rng, path: read_datasheet(path, dict(gyro_x="gyro", accel_x="accel")),
+    ),
+    "checkpoint": Kind(4, make_checkpoint, gone_on),
+    "fleet": Kind(1, make_fleet, fleet_resumed),
 }  # fmt: skip
 
 
@@ -482,10 +595,57 @@ KINDS = {
 class Tally:
     """What became of the inputs of a kind."""
 
-    used: int = 0
-    refused: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
     slowest: float = 0.0
-    failures: int = 0
+    total: float = 0.0
+    largest: int = 0
+
+    def add(self, outcome: str, seconds: float, size: int) -> None:
+        self.outcomes[outcome] += 1
+        self.slowest, self.total = max(self.slowest, seconds), self.total + seconds
+        self.largest = max(self.largest, size)
+
+    @property
+    def failures(self) -> int:
+        return self.outcomes["failed"] + self.outcomes["ended the process"]
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count:,} {outcome}" for outcome, count in self.outcomes.items())
+        return (
+            f"{counts}; {self.total:.0f} s, one at most {self.slowest:.2f} s and "
+            f"{self.largest / (1 << 30):.2f} GB"
+        )
+
+
+class Cases:
+    """What became of each case, a line of JSON each: a run that ended goes on."""
+
+    def __init__(self, path: Path | None):
+        self._stream: TextIO | None = None
+        self._done: dict[tuple[str, int, int], tuple[str, float, int]] = {}
+        begun: Counter[tuple[str, int, int]] = Counter()
+        if path is None:
+            return
+        if path.exists():
+            for line in path.read_text().splitlines():
+                with suppress(ValueError, KeyError):  # the last line may be cut off
+                    each = json.loads(line)
+                    key = each["kind"], each["seed"], each["case"]
+                    if "outcome" in each:
+                        self._done[key] = each["outcome"], each["seconds"], each["bytes"]
+                    else:
+                        begun[key] += 1
+        # One that ended the process twice is not tried again.
+        lost = (key for key, count in begun.items() if count > 1 and key not in self._done)
+        self._done |= {key: ("ended the process", 0.0, 0) for key in lost}
+        self._stream = path.open("a", buffering=1)
+
+    def known(self, kind: str, seed: int, case: int) -> tuple[str, float, int] | None:
+        return self._done.get((kind, seed, case))
+
+    def write(self, **content: Any) -> None:
+        if self._stream is not None:
+            self._stream.write(json.dumps(content) + "\n")
 
 
 class TooSlowError(Exception):
@@ -494,6 +654,16 @@ class TooSlowError(Exception):
 
 def _too_slow(*_: Any) -> None:
     raise TooSlowError(f"more than {SECONDS} s")
+
+
+def _peak(*, begin: bool = False) -> int:
+    """Bytes that the process held at most since the last beginning, where Linux counts them."""
+    with suppress(OSError, StopIteration):
+        if begin:
+            Path("/proc/self/clear_refs").write_text("5")
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return int(next(line.split()[1] for line in lines if line.startswith("VmHWM"))) << 10
+    return 0
 
 
 def attempt(name: str, seed: int, case: int, folder: Path) -> str | None:
@@ -524,32 +694,52 @@ def attempt(name: str, seed: int, case: int, folder: Path) -> str | None:
     return None
 
 
-def run(names: list[str], cases: int, seed: int, first: int = 0) -> tuple[dict[str, Tally], int]:
-    """Many inputs of all kinds, in proportion to their shares; prints each failure."""
+def cases_of(names: list[str], cases: int, first: int) -> Iterator[tuple[str, int]]:
+    """Kinds, and cases of each in proportion to its share."""
     total = sum(KINDS[name].share for name in names)
+    for name in names:
+        for case in range(first, first + max(round(cases * KINDS[name].share / total), 1)):
+            yield name, case
+
+
+def run(
+    names: list[str], cases: int, seed: int, first: int = 0, store: Path | None = None
+) -> dict[str, Tally]:
+    """Many inputs of all kinds, in proportion to their shares; prints each failure."""
     tallies = {name: Tally() for name in names}
-    kinds: Counter[str] = Counter()
+    failures: Counter[str] = Counter()
+    stored = Cases(store)
     with tempfile.TemporaryDirectory() as folder:
-        for name, tally in tallies.items():
-            for case in range(first, first + max(round(cases * KINDS[name].share / total), 1)):
-                start = time.process_time()
-                try:
-                    refusal = attempt(name, seed, case, Path(folder))
-                except Exception as error:
-                    tally.failures += 1
-                    where = traceback.extract_tb(error.__traceback__)[-1]
-                    which = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"
-                    kinds[which] += 1
-                    if kinds[which] == 1:
-                        print(f"--only {name} --seed {seed} --first {case}: {which}: {error}"[:500])
-                else:
-                    tally.used += refusal is None
-                    tally.refused += refusal is not None
-                tally.slowest = max(tally.slowest, time.process_time() - start)
-            print(name, asdict(tally), flush=True)
-    for which, count in kinds.most_common():
+        for name, case in cases_of(names, cases, first):
+            known = stored.known(name, seed, case)
+            if known is not None:
+                tallies[name].add(*known)
+                continue
+            stored.write(kind=name, seed=seed, case=case)
+            start, outcome, held = time.process_time(), "refused", _peak(begin=True)
+            try:
+                outcome = "used" if attempt(name, seed, case, Path(folder)) is None else "refused"
+            except Exception as error:
+                outcome = "failed"
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                which = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"
+                failures[which] += 1
+                if failures[which] == 1:
+                    text = f"--only {name} --seed {seed} --first {case}: {which}: {error}"[:500]
+                    print(text, flush=True)
+            seconds, size = time.process_time() - start, max(_peak() - held, 0)
+            if size > BYTES:
+                print(f"--only {name} --seed {seed} --first {case}: {size:,} bytes", flush=True)
+            tallies[name].add(outcome, seconds, size)
+            stored.write(
+                kind=name, seed=seed, case=case, outcome=outcome, seconds=round(seconds, 4),
+                bytes=size,
+            )  # fmt: skip
+    for name, tally in tallies.items():
+        print(f"{name}: {tally}")
+    for which, count in failures.most_common():
         print(f"{count:6} x {which}")
-    return tallies, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+    return tallies
 
 
 def main() -> None:
@@ -558,12 +748,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", choices=sorted(KINDS), action="append")
+    parser.add_argument("--store", type=Path, help="of the cases that are done; gone on with")
     given = parser.parse_args()
-    tallies, memory = run(given.only or list(KINDS), given.cases, given.seed, given.first)
-    total = sum(each.used + each.refused + each.failures for each in tallies.values())
-    failures = sum(each.failures for each in tallies.values())
-    print(f"{total:,} inputs, {failures} failures, {memory / (1 << 30):.2f} GB at most")
-    sys.exit(1 if failures or memory > BYTES else 0)
+    logging.disable()
+    names = given.only or list(KINDS)
+    tallies = run(names, given.cases, given.seed, given.first, given.store).values()
+    total = sum(sum(each.outcomes.values()) for each in tallies)
+    failures = sum(each.failures for each in tallies)
+    seconds, largest = sum(each.total for each in tallies), max(each.largest for each in tallies)
+    print(
+        f"{total:,} inputs, {failures} failures, {total / max(seconds, 1e-9):.0f} cases a second, "
+        f"{largest / (1 << 30):.2f} GB at most"
+    )
+    sys.exit(1 if failures or largest > BYTES else 0)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,15 @@
 """The command line: what it prints and writes, and how it refuses what it cannot use."""
 
+import io
 import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -31,24 +35,30 @@ SI = ("--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
 RATE = ("--rate", "100")
 
 
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was told."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
-        code = 0
+def invoked(folder, *arguments):
+    """Run ``gmwm ARGUMENTS`` in a folder: exit code, what was printed, what was told."""
+    code, ends = 0, [io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2)]
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(ends[0]),
+        redirect_stderr(ends[1]),
+    ):
+        for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+            patch.delenv(name, raising=False)
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
         try:
             cli.main()
         except SystemExit as stop:
             code = stop.code
-        printed, told = capsys.readouterr()
-        return code, printed, told
+    return code, *(end.buffer.getvalue().decode() for end in ends)
 
-    return _run
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """`invoked` in an empty folder, in which the test is too."""
+    monkeypatch.chdir(tmp_path)
+    return partial(invoked, tmp_path)
 
 
 def run_process(*arguments, cwd):
@@ -167,11 +177,13 @@ def good_file(tmp_path_factory):
 FIELD = ("--gyro-unit", "deg/s", "--accel-unit", "g")
 
 
-@pytest.fixture
-def calibrated(run, good_file, tmp_path):
-    code, printed, told = run("calibrate", good_file, *RATE, *FIELD, "-o", "out")
+@pytest.fixture(scope="module")
+def calibrated(good_file, tmp_path_factory):
+    """What was printed and told, and the folder, which stays as it is."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    code, printed, told = invoked(folder, "calibrate", good_file, *RATE, *FIELD, "-o", "out")
     assert code == 0, told
-    return printed, told, tmp_path / "out"
+    return printed, told, folder / "out"
 
 
 def test_calibrate(calibrated):
@@ -210,7 +222,7 @@ def test_nothing_but_results_where_there_is_no_terminal(calibrated):
 
 
 def test_a_second_run_replaces_the_files(run, good_file, calibrated, tmp_path):
-    folder = calibrated[2]
+    folder = shutil.copytree(calibrated[2], tmp_path / "out")
     before = (folder / "calibration.json").read_bytes()
     (folder / "calibration.json").write_text("old")
     code, _, _ = run("calibrate", good_file, *RATE, *FIELD, "-o", folder, "--jobs", "1")
@@ -502,7 +514,8 @@ def test_exit_code_of_the_process(tmp_path):
 def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     # As in "gmwm calibrate ... | head -1".
     (tmp_path / "f.csv").write_text("\n".join(good_lines()))
-    command = [sys.executable, "-m", "gmwm", "calibrate", "f.csv", *ALL, "-o", "out"]
+    command = [sys.executable, "-m", "gmwm", "calibrate", "f.csv", *ALL, "--model", "N"]
+    command += ["-o", "out"]
     read_end, write_end = os.pipe()
     os.close(read_end)
     try:
@@ -758,16 +771,38 @@ def test_health_refuses_what_it_cannot_use(run, tmp_path):
 # -- demo -----------------------------------------------------------------------------------------
 
 
+def test_demo_files_can_be_read_and_are_named_in_what_to_try(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(cli.cli, ["demo", "--files", "--hours", "0.01", "-o", "try"])
+    assert done.exit_code == 0, done.output
+    folder = Path("try")
+    assert sorted(path.name for path in folder.iterdir()) == ["fixes.csv", "imu.csv", "static.csv"]
+    recording = gmwm.read(folder / "static.csv")
+    assert (recording.rate, recording.n) == (25.0, 900)
+    assert gmwm.read(folder / "imu.csv").n == 15_000
+    tried = done.output.partition("Try:")[2].replace("\\\n", " ")
+    for line in filter(None, map(str.strip, tried.splitlines())):
+        command, *arguments = line.split()[1:]
+        assert command in cli.cli.commands
+        names = [each for each in arguments if each.endswith(".csv")]
+        assert names and all(Path(each).is_file() for each in names)
+        # Every option is one of the command.
+        known = {name for each in cli.cli.commands[command].params for name in each.opts}
+        assert {each for each in arguments if each.startswith("-")} <= known
+    again = CliRunner().invoke(cli.cli, ["demo", "--files", "--hours", "0.01", "-o", "try/imu.csv"])
+    assert again.exit_code != 0
+
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    return run_process("demo", "--hours", "0.05", "-o", "out", cwd=folder), folder / "out"
+    return invoked(folder, "demo", "--hours", "0.05", "-o", "out"), folder / "out"
 
 
 def test_demo_runs(demo):
-    done, folder = demo
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
+    (code, _, told), folder = demo
+    assert code == 0, told
+    assert "Traceback" not in told
     files = ["calibration.json", "imu.yaml", "report.html"]
     assert sorted(path.name for path in folder.iterdir()) == files
     axes = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
@@ -775,7 +810,7 @@ def test_demo_runs(demo):
 
 
 def test_demo_shows_truth_beside_estimate(demo):
-    printed = demo[0].stdout
+    printed = demo[0][1]
     assert printed.startswith("simulated IMU, seed 1: 3 min at 100 Hz\n")
     assert re.search(r"^channel .*truth +estimate +95 % interval +unit", printed, re.MULTILINE)
     assert max(map(len, printed.splitlines())) <= WIDTH
@@ -791,7 +826,7 @@ def test_demo_shows_truth_beside_estimate(demo):
 def test_demo_finds_the_white_noise_of_every_axis(demo):
     # Three minutes tell it to a per cent, 12 deg/h/sqrt(Hz) = 0.2 deg/sqrt(h), unless a fast
     # Gauss-Markov took its place, which leaves an upper bound.
-    lines = demo[0].stdout.splitlines()
+    lines = demo[0][1].splitlines()
     for sensor, truth, unit in (("gyro", 0.2, "deg/sqrt(h)"), ("accel", 80.0, "ug/sqrt(Hz)")):
         for axis in "xyz":
             row = next(line for line in lines if line.startswith(f"{sensor}_{axis} "))
@@ -809,7 +844,7 @@ def test_demo_finds_the_white_noise_of_every_axis(demo):
 
 
 def test_demo_lists_what_would_be_selected(demo):
-    part = demo[0].stdout.partition("Selected where the form is not known")[2]
+    part = demo[0][1].partition("Selected where the form is not known")[2]
     assert len(re.findall(r"^  (?:gyro|accel)_[xyz] +\S.*(?:noise|Markov)", part, re.M)) == 6
 
 

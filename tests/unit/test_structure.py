@@ -1,7 +1,9 @@
 """The house: rooms with faces, no circles, nothing lost in a crowd."""
 
 import ast
+import sys
 from collections import defaultdict
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -119,3 +121,12 @@ def test_tests_mirror_the_rooms():
     folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}
     rooms = {Path(name.replace(".", "/")) for name in PACKAGES}
     assert folders <= rooms
+
+
+@pytest.mark.parametrize("folder", ["benchmarks", "examples"])
+def test_no_script_stands_in_front_of_a_package(folder):
+    # Python looks beside a script first: numba imports `coverage`, and would find ours.
+    scripts = {path.stem for path in (REPOSITORY / folder).glob("*.py")}
+    taken = set(sys.stdlib_module_names) | set(packages_distributions()) | {"coverage"}
+
+    assert scripts.isdisjoint(taken)

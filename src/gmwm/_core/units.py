@@ -113,6 +113,7 @@ def seconds_in(unit: str) -> float | None:
         return None
 
 
+@lru_cache(maxsize=512)
 def quantity_of(unit: str) -> str:
     """``"gyro"`` for an angular rate, ``"accel"`` for a specific force.
 
@@ -121,12 +122,10 @@ def quantity_of(unit: str) -> str:
     InputError
         If the unit is unknown or neither of the two.
     """
+    # Without exceptions of pint, which keep the arrays of their callers until they are collected.
+    dimension = _quantity(unit).dimensionality
     for quantity, si_unit in SI_UNIT.items():
-        try:
-            factor(unit, si_unit)
-        except InputError:
-            _quantity(unit)
-        else:
+        if dimension == _quantity(si_unit).dimensionality:
             return quantity
     raise InputError(
         f"unit {unit!r} is neither an angular rate nor a specific force: use one such as deg/s or g"

@@ -31,7 +31,8 @@ STARTS = {
     True: "initial values of the slow errors known",
     False: "initial values of the errors unknown",
 }
-"""What is known of the errors at the start, by `ErrorBudget.calibrated`."""
+"""What is known of the sensors' errors at the start, by `ErrorBudget.calibrated`; attitude,
+velocity and position are exact there."""
 
 
 @dataclass(frozen=True)
@@ -148,8 +149,8 @@ class ErrorBudget:
 
     def __str__(self) -> str:
         lines = [
-            "Error (1 sigma) after free inertial coasting, level and not manoeuvring;",
-            f"{STARTS[self.calibrated]}.",
+            "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
+            f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
         names = max(len(row.channel) for row in self.rows)
         labels = max(len(row.component) for row in self.rows)

@@ -1,7 +1,9 @@
 """The main job: every channel of a recording, screening, a summary."""
 
-from gmwm.calibration.calibration import AMBIGUITY, Calibration, calibrate, load
+from gmwm.calibration.calibration import Calibration, load
+from gmwm.calibration.channel import AMBIGUITY
 from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.entrance import calibrate
 from gmwm.calibration.removal import without_departures
 from gmwm.calibration.screening import SCREENING
 from gmwm.calibration.stages import Stopwatch, stage

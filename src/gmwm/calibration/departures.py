@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, toeplitz
+from scipy.linalg import cholesky, toeplitz
+from scipy.linalg.lapack import dpotri
 from scipy.sparse import csr_array
 from scipy.special import logsumexp
 from scipy.stats import norm
@@ -101,7 +102,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     kinds = families(means.blocks.size, means.step)
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
-        known = means.differences(means.step * np.arange(means.blocks.size, dtype=float)[None, :])
+        known = means.differences(means.step * np.arange(float(means.blocks.size))[None, :])
     basic, found = known, list[tuple[float, _Test]]()
     for _ in range(tuning.MOST_DEPARTURES):
         beside = [noise.beside(known) for noise in noises]
@@ -228,14 +229,18 @@ def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
     flat = floor * means.covariance(lambda f, _: np.ones_like(f))
     slow = means.covariance(psd) - flat
     unit = walk * means.covariance(RandomWalk(1.0).psd)
+    parts, weights = np.array(tuning.SLOW_PARTS), np.gradient(np.log(tuning.SLOW_PARTS))
+    if np.max(np.abs(slow)) < tuning.NO_SLOW_PART * np.max(np.abs(flat)):
+        parts, weights = parts[:1], np.sum(weights, keepdims=True)  # all the same noise
     found = []
-    for part, weight in zip(tuning.SLOW_PARTS, np.gradient(np.log(tuning.SLOW_PARTS)), strict=True):
+    for part, weight in zip(parts, weights, strict=True):
         for more in tuning.WALKS:
             total = flat + part * slow + more * unit
             total += tuning.NO_INFORMATION * np.mean(np.diag(total)) * np.eye(len(total))
-            factor = cho_factor(total, lower=True)
-            inverse = cho_solve(factor, np.eye(means.first.size))
-            half_log_determinant = float(np.sum(np.log(np.diag(factor[0]))))
+            factor = cholesky(total, lower=True)
+            inverse = dpotri(factor, lower=True)[0]  # its lower triangle, above it zeros
+            inverse = inverse + np.tril(inverse, -1).T
+            half_log_determinant = float(np.sum(np.log(np.diag(factor))))
             found.append(_Noise(float(np.log(weight)) - half_log_determinant, inverse))
     return found
 

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
-from gmwm.calibration.calibration import Calibration, ambiguity, model_of
-from gmwm.calibration.departure_notices import with_departures
-from gmwm.calibration.departures import departures
-from gmwm.errors import InputError
-from gmwm.estimate import Fit, estimate
-from gmwm.process import Model, Process
-from gmwm.selection import Selection, select
-from gmwm.variance import stream
+from gmwm.calibration.calibration import Calibration
+from gmwm.calibration.channel import (
+    ChannelModel,
+    GivenModels,
+    calibration_of,
+    channel_model,
+    model_of,
+    mostly_missing,
+)
+from gmwm.variance import WaveletVariance, stream
 
 
 def calibrate_stream(
     path: Any,
-    model: Process | Model | Mapping[str, Process | Model] | None = None,
+    model: GivenModels = None,
     *,
     progress: Progress | None = None,
     **reading: Any,
@@ -39,7 +40,7 @@ def calibrate_stream(
     progress : callable, optional
         As in `gmwm.calibrate`, when the file is read.
     **reading
-        ``rate``, ``units``, ``channels``, ``time`` as in `gmwm.read`; ``rows`` of a block.
+        The arguments of `gmwm.read`; ``rows`` of a block.
 
     Returns
     -------
@@ -51,41 +52,24 @@ def calibrate_stream(
         If the file cannot be used, or no channel of it can be calibrated.
     """
     found = stream(path, **reading)
-    fits: dict[str, Fit] = {}
-    tied: dict[str, Selection] = {}
-    skipped = dict(found.skipped)
+
+    def one(name: str, data: WaveletVariance) -> ChannelModel | Notice:
+        given = model_of(name, model)
+        missing = data.gaps.missing if data.gaps is not None else 0
+        dead = mostly_missing(name, missing, data.n)
+        return dead or channel_model(name, lambda _: [data], given, [found.source])
+
+    models: dict[str, ChannelModel | Notice] = {}
     for done, (name, data) in enumerate(found.variances.items()):
         if progress is not None:
             progress(done, len(found.variances), name)
-        given = model_of(name, model)
-        try:
-            if data.gaps is not None and data.gaps.missing > data.n / 2:
-                raise InputError(
-                    f"{data.gaps.missing:,} of {data.n:,} samples missing, more than half",
-                    "mostly-missing",
-                )
-            if given is not None:
-                fit = estimate(given, data)
-            else:
-                chosen = select(data)
-                fit = chosen.fit
-                if chosen.rivals:
-                    tied[name] = chosen
-            fits[name] = with_departures(fit, [found.source], [departures(fit)], [()])
-        except InputError as error:  # of this channel; the others go on
-            skipped[name] = Notice(error.code or "not-estimable", "bad", name, str(error))
+        models[name] = one(name, data)
     if progress is not None:
         progress(len(found.variances), len(found.variances), "")
-    if not fits:
-        why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
-        raise InputError(f"{found.source}: {why}")
-    return Calibration(
-        fits=fits,
-        skipped=skipped,
-        source=found.source,
-        rate=1.0 / found.dt,
-        n=found.n,
-        notices=(
+    return calibration_of(
+        models,
+        found.skipped,
+        (
             *found.notices,
             Notice(
                 "streamed",
@@ -96,7 +80,8 @@ def calibrate_stream(
                 {"samples": found.n},
                 action="gmwm health of a part of it looks for them",
             ),
-            *(ambiguity(name, each) for name, each in tied.items()),
         ),
-        rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
+        source=found.source,
+        rate=1.0 / found.dt,
+        n=found.n,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from gmwm.errors import InputError
 from gmwm.estimate import estimate
 from gmwm.estimate.result import Fit
 from gmwm.process import Process, RandomWalk, WhiteNoise
+
+_BOUNDS: WeakKeyDictionary[Fit, dict[str, float]] = WeakKeyDictionary()
+"""Upper bounds of terms by fit, which does not change: each takes a fit of its own."""
 
 _PLATEAU = np.sqrt(2.0 * np.log(2.0) / np.pi)
 
@@ -122,6 +126,9 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
         If the data do not bound it.
     """
     # Given shapes, such as that of a line or of a low-pass, stay as they are.
+    known = _BOUNDS.setdefault(fitted, {})
+    if key in known:
+        return known[key]
     opened = fitted.model.with_params(dict.fromkeys([*fitted.keys, *fitted.upper_bounds]))
     again = estimate(opened if key in fitted.params else opened + process, fitted.wv)
     bound = float(again.interval()[key][1])
@@ -129,6 +136,7 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
         raise InputError(
             f"channel {fitted.wv.name!r}: {key} cannot be bounded by this record: record longer"
         )
+    known[key] = bound
     return bound
 
 

@@ -57,6 +57,9 @@ FEWEST_DIFFERENCES = 16
 SLOW_PARTS = (1e-3, 0.03, 0.1, 0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
 """Factors of the spectrum above its floor; finer about one, where the data decide."""
 
+NO_SLOW_PART = 1e-12
+"""Of the floor: a part above it that is only rounding errors, as of white noise alone."""
+
 WALKS = (0.0, 1.0, 30.0)
 """Factors of the variance of a random walk beside it."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm.cli.numbers import show
+from gmwm.cli.numbers import show, units_option
 from gmwm.cli.options import seconds
 from gmwm.errors import InputError
 
@@ -48,12 +48,13 @@ _GRAVITY = 9.80665
 @click.option("--vibration", type=float, default=0.0, metavar="G", help="root mean square.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
               help="File to save the certificate in.")  # fmt: skip
+@units_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def certify(
     file: Path, imu: Path | None, white: str | None, walk: str | None, outages: str,
     keyframe: float, motion: str | None, scale_error: float, misalignment: float,
     g_sensitivity: float, time_offset: float, vibration_rectification: float, vibration: float,
-    output: Path | None, as_json: bool,
+    output: Path | None, units: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Tell how consistent a filter will be with the numbers in use, and why.
 
@@ -86,7 +87,7 @@ def certify(
         outages=seconds("--outages", outages), keyframe=keyframe, imperfections=known,
         motion=_motion(motion),
     )  # fmt: skip
-    show(found, output, as_json)
+    show(found, output, as_json, units)
 
 
 def _numbers(

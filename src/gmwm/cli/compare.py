@@ -51,7 +51,7 @@ def compare(
       gmwm compare monday/calibration.json friday/calibration.json -o compare.html
       gmwm compare unit-*/calibration.json --datasheet imu.yaml -o compare.html
     """
-    from gmwm.comparison import compare as run
+    from gmwm.comparison import compare as run, labelled
     from gmwm.report import read_datasheet
 
     calibrations = [_calibration(file, reading, quiet) for file in files]
@@ -61,7 +61,7 @@ def compare(
             {name: fit.wv.quantity or "" for each in calibrations for name, fit in each.items()},
         )
     with nullcontext() if quiet else progress_bar("comparing", "axes") as bar:
-        found = run(calibrations, horizon=horizon, progress=bar)
+        found = run(labelled(calibrations, files), horizon=horizon, progress=bar)
     if output is not None:
         origin = {"command": shlex.join(["gmwm", *sys.argv[1:]])}
         found.report(output, datasheet=datasheet, provenance=origin)

@@ -14,8 +14,12 @@ from gmwm.cli.console import progress_bar
 from gmwm.cli.options import seconds
 
 if TYPE_CHECKING:
-    from gmwm._core.documents import Document
-    from gmwm.filter_numbers import SensorNumbers
+    from gmwm.filter_numbers import Certificate, SensorNumbers
+
+units_option = click.option(
+    "--units", type=click.Choice(["field", "si"]), default="field", show_default=True,
+    help="Units of what is printed; files and JSON are in SI.",
+)  # fmt: skip
 
 _OPTIONS = (
     click.argument("file", type=click.Path(path_type=Path)),
@@ -28,6 +32,7 @@ _OPTIONS = (
                  help="The same of an accelerometer."),
     click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
                  help="File to save them in."),
+    units_option,
     click.option("--json", "as_json", is_flag=True, help="Print JSON."),
 )  # fmt: skip
 
@@ -48,7 +53,7 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
                    "alone.")  # fmt: skip
 def bound(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    as_json: bool, horizon: float, level: float | None,
+    units: str, as_json: bool, horizon: float, level: float | None,
 ) -> None:  # fmt: skip
     """Give the smallest numbers with which a filter is never too optimistic.
 
@@ -65,7 +70,7 @@ def bound(
         Calibration.load(file), form, horizon, level=level, shared=shared,
         bias_sd={"gyro": gyro_bias, "accel": accel_bias},
     )  # fmt: skip
-    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
+    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
 
 
 @click.command()
@@ -77,7 +82,7 @@ def bound(
                    "poses.")  # fmt: skip
 def reduce(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    as_json: bool, outages: str, keyframe: float | None,
+    units: str, as_json: bool, outages: str, keyframe: float | None,
 ) -> None:  # fmt: skip
     """Give the numbers with which a small filter is consistent in given outages.
 
@@ -96,7 +101,7 @@ def reduce(
             calibration, form, times, keyframe=keyframe, shared=shared, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
-    show(found, output, as_json, _left_out(found, gyro_bias, accel_bias))
+    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
 
 
 @click.command()
@@ -110,8 +115,9 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     """Predict the error growth of unaided navigation.
 
     FILE is a calibration.json. For each term of each channel's model: attitude (deg), velocity
-    (m/s) and position (m) errors, 1 sigma, after coasting level and without manoeuvres. Valid up
-    to 600 seconds or so.
+    (m/s) and position (m) errors, 1 sigma, after coasting level and without manoeuvres from exact
+    attitude, velocity and position. Valid up to 600 seconds or so. After fixes, which leave errors
+    of tilt and velocity too: gmwm certify.
 
     \b
     Example:
@@ -130,18 +136,18 @@ def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> st
     flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
     if not flags:
         return ""
-    text = (
-        "initial_sd leaves out the bias at switch-on, which no recording at rest shows: add "
-        f"{' and '.join(flags)} (its standard deviation), or add its square to that of initial_sd"
-    )
+    text = f"standard deviation of the bias at switch-on: {' and '.join(flags)}"
     return "\n".join(wrapped(text, first="- ", indent=2))
 
 
-def show(result: Document, output: Path | None, as_json: bool, remark: str = "") -> None:
+def show(
+    result: SensorNumbers | Certificate, output: Path | None, as_json: bool, units: str,
+    remark: str = "",
+) -> None:  # fmt: skip
     """Save and print a result."""
     if output is not None:
         result.save(output)
-    click.echo(json.dumps(result.to_dict(), indent=1) if as_json else str(result))
+    click.echo(json.dumps(result.to_dict(), indent=1) if as_json else result.text(units))
     if remark and not as_json:
         click.echo(remark)
     if output is not None and not as_json:

@@ -1,7 +1,7 @@
 """Several recordings or units of a sensor beside each other."""
 
 from gmwm.comparison.clock import ClockRatio
-from gmwm.comparison.compare import compare
+from gmwm.comparison.compare import compare, labelled
 from gmwm.comparison.curves import Difference, Equality
 from gmwm.comparison.result import STATES, AxisComparison, SensorComparison
 from gmwm.comparison.structure import AxisNumbers, ParameterSpread
@@ -16,4 +16,5 @@ __all__ = [
     "ParameterSpread",
     "SensorComparison",
     "compare",
+    "labelled",
 ]

@@ -118,15 +118,43 @@ def _labelled(sources: Any) -> dict[str, Calibration]:
         )
     if isinstance(sources, Mapping):
         return {printable(str(label)): _calibration(each) for label, each in sources.items()}
+    given = list(sources)
+    paths = [each if isinstance(each, str | os.PathLike) else "" for each in given]
+    return labelled([_calibration(each) for each in given], paths)
+
+
+def labelled(
+    calibrations: Sequence[Calibration], paths: Sequence[str | os.PathLike[str]]
+) -> dict[str, Calibration]:
+    """Calibrations by what distinguishes them.
+
+    It is the name of the recording; of recordings of one name, what differs between the paths of
+    the files that were given (empty if there is none), or else a number.
+    """
+    names = [_label(each, place + 1) for place, each in enumerate(calibrations)]
+    wanted = list(names)
+    for name in set(names):
+        same = [place for place, each in enumerate(names) if each == name]
+        if len(same) > 1:
+            for place, part in zip(same, _different_parts([paths[k] for k in same]), strict=True):
+                wanted[place] = printable(part[-_LONGEST:]) or name
     found: dict[str, Calibration] = {}
-    for each in sources:
-        calibration = _calibration(each)
-        label = wanted = _label(calibration, len(found) + 1)
-        copy = 2
+    for name, calibration in zip(wanted, calibrations, strict=True):
+        label, copy = name, 2
         while label in found:
-            label, copy = f"{wanted} ({copy})", copy + 1
+            label, copy = f"{name} ({copy})", copy + 1
         found[label] = calibration
     return found
+
+
+def _different_parts(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Of each path what is between the folders and the end that all have."""
+    parts = [list(PurePath(path).with_suffix("").parts) if str(path) else [] for path in paths]
+    for end in (0, -1):
+        while all(parts) and len({each[end] for each in parts}) == 1:
+            for each in parts:
+                each.pop(end)
+    return ["/".join(each) for each in parts]
 
 
 def _label(calibration: Calibration, place: int) -> str:

@@ -6,9 +6,21 @@ from types import ModuleType
 from typing import Any
 
 from gmwm.export.export import TARGETS, export
-from gmwm.export.target import Target
+from gmwm.export.imu import SENSORS, Axis, Imu, Triad, axis_of, imu_of
+from gmwm.export.target import ImuFile, Target
 
-__all__ = ["TARGETS", "Target", "export"]
+__all__ = [
+    "SENSORS",
+    "TARGETS",
+    "Axis",
+    "Imu",
+    "ImuFile",
+    "Target",
+    "Triad",
+    "axis_of",
+    "export",
+    "imu_of",
+]
 
 
 class _Room(ModuleType):

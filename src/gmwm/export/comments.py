@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 
 from gmwm._core.units import si_parameter_unit
 from gmwm.export.imu import Axis, Imu, Triad
 
-WIDTH = 92
+WIDTH = 72
+"""Columns of a line of comment, 80 with the marks of the languages around it."""
 
 _LONGEST = 500  # characters of one remark or name
 
@@ -44,18 +45,28 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
 
 def about(imu: Imu, title: str, convention: str) -> list[str]:
     """What stands above the numbers: source, convention, values by axis, consistency."""
-    lines = [plain(source) for source in imu.sources]
-    lines += _wrapped(f"{title}: {convention}")
-    lines += _wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, {_HOW[imu.method]}")
+    lines = [line for source in imu.sources for line in wrapped(plain(source))]
+    lines += wrapped(f"{title}: {convention}")
+    lines += wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, {_HOW[imu.method]}")
     if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
-        lines += _wrapped(
+        lines += wrapped(
             f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "
             "below is the higher, of a message that holds both"
         )
     for triad in imu.triads:
         lines += _table(imu, triad)
+    if any(triad.shared_nees is not None for triad in imu.triads):
+        lines += wrapped(
+            "shared: for all axes of a sensor, which this file holds; the others: of each axis by "
+            "itself, which it does not hold"
+        )
+        if any(_is_traded(triad) for triad in imu.triads):
+            lines += wrapped(
+                "where an axis has more of N or K than all share it has less of the other: a "
+                "larger K pays for a smaller N, and neither pair is too optimistic"
+            )
     if any(axis.nees for triad in imu.triads for axis in triad.axes):
-        lines += _wrapped(
+        lines += wrapped(
             "NEES: predicted error squared over what a filter with these numbers believes, after "
             "that time without aiding; 1 is consistent, below 1 cautious, above 1 too optimistic"
         )
@@ -64,43 +75,73 @@ def about(imu: Imu, title: str, convention: str) -> list[str]:
         values = [f"{t:g} s: {n:.3e}, {_walk(k, triad)}" for t, (n, k) in by_horizon.items()]
         if values:
             title = f"{triad.quantity} N, K for all axes by horizon"
-            lines += _wrapped(f"{title}: {'; '.join(values)}")
+            lines += wrapped(f"{title}: {'; '.join(values)}")
     for remark in imu.remarks:
-        lines += _wrapped(plain(remark))
+        lines += wrapped(plain(remark))
     return lines
 
 
-def by_axis(triad: Triad, values: Iterable[float], letter: str) -> str:
-    """The values of the axes on one line; upper bounds have a sign before them."""
-    shown = (
-        f"{plain(axis.name)} {'< ' if letter in axis.upper else ''}{value:.3e}"
-        for axis, value in zip(triad.axes, values, strict=True)
-    )
-    return f"  by axis: {', '.join(shown)}"
-
-
 def _table(imu: Imu, triad: Triad) -> list[str]:
-    columns = _COLUMNS[imu.form]
-    times = sorted({time for axis in triad.axes for time in axis.nees})
+    """The numbers of each axis under those that a file holds for all, with their consistency."""
+    columns = [*_COLUMNS[imu.form], ("start", "u")]
     units = [f"{key} [{_unit(unit, triad.quantity)}]" for key, unit in columns]
-    units.append(f"sd at the start [{_unit('u', triad.quantity)}]")
-    heads = [*units, *(f"NEES {time:g} s" for time in times)]
-    names = [plain(axis.name) for axis in triad.axes]
-    width = max(map(len, names))
-    rows = [_row(axis, [key for key, _ in columns], times) for axis in triad.axes]
-    widths = [max(len(head), 11) for head in heads]
+    times = sorted({time for axis in triad.axes for time in axis.nees})
+    shared = triad.shared_nees
+    kinds = ["own"] if shared is None else ["shared", "own"]
+    names = [f"{plain(axis.name)}" for axis in triad.axes]
+    rows = [_values(axis, axis.upper, columns) for axis in triad.axes]
+    for row, axis in zip(rows, triad.axes, strict=True):
+        for time in times:
+            row += [] if shared is None else [_nees(shared.get(axis.name, {}), time)]
+            row.append(_nees(axis.nees, time))
+    if shared is not None:
+        names.insert(0, "shared")
+        upper = frozenset(key for key, _ in columns if triad.is_upper(key))
+        rows.insert(0, [*_values(triad, upper, columns), *[""] * len(kinds) * len(times)])
+    widths = [11] * len(columns) + [6] * len(kinds) * len(times)
+    first = max(map(len, names))
 
-    def line(first: str, cells: Sequence[str]) -> str:
-        return f"{first:<{width}}" + "".join(
-            f"  {cell:>{w}}" for cell, w in zip(cells, widths, strict=True)
+    def line(name: str, cells: Sequence[str]) -> str:
+        return f"{name:<{first}}" + "".join(
+            f" {cell:>{width}}" for cell, width in zip(cells, widths, strict=True)
         )
 
-    return [line("", heads), *(line(name, row) for name, row in zip(names, rows, strict=True))]
+    lines = [f"{triad.quantity}: {', '.join(units)}"]
+    heads = [key for key, _ in columns]
+    if shared is None:
+        heads += [f"NEES {time:g} s" for time in times]
+        widths[len(columns) :] = [max(6, len(head)) for head in heads[len(columns) :]]
+    else:
+        over = f" {'':<{first + sum(widths[: len(columns)]) + len(columns) - 1}}"
+        span = 7 * len(kinds)
+        lines.append((over + "".join(f"{f'NEES {time:g} s':>{span}}" for time in times)).rstrip())
+        heads += kinds * len(times)
+    return [
+        *lines,
+        *(line(name, row).rstrip() for name, row in zip(["", *names], [heads, *rows], strict=True)),
+    ]
 
 
-def _row(axis: Axis, keys: Sequence[str], times: Sequence[float]) -> list[str]:
-    cells = [f"{'< ' if key in axis.upper else ''}{getattr(axis, key):.3e}" for key in (*keys,)]
-    return [*cells, f"{axis.initial_sd:.3e}", *(f"{axis.nees[t]:.3g}" for t in times)]
+def _values(
+    of: Axis | Triad, upper: frozenset[str], columns: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Numbers as they are shown; upper bounds have a sign before them."""
+    values = {key: of.initial_sd if key == "start" else getattr(of, key) for key, _ in columns}
+    return [f"{'< ' if key in upper else ''}{value:.3e}" for key, value in values.items()]
+
+
+def _nees(found: Mapping[float, float], time: float) -> str:
+    return f"{found[time]:.3g}" if time in found else "-"
+
+
+def _is_traded(triad: Triad) -> bool:
+    """Whether an axis has more of one number than all share, and less of the other."""
+    return triad.shared_nees is not None and any(
+        getattr(axis, letter) > 1.0005 * getattr(triad, letter)
+        for axis in triad.axes
+        for letter in "NK"
+        if letter not in axis.upper
+    )
 
 
 def _walk(K: float, triad: Triad) -> str:
@@ -116,6 +157,7 @@ def _unit(unit: str, quantity: str) -> str:
     )
 
 
-def _wrapped(text: str) -> list[str]:
+def wrapped(text: str) -> list[str]:
+    """A text in lines that are at most 80 columns wide in every file."""
     return textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_long_words=False,
                          break_on_hyphens=False)  # fmt: skip

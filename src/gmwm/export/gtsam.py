@@ -66,7 +66,8 @@ def _cpp(imu: Imu) -> Sequence[str]:
         lines.append(f"  params->{member} = gtsam::Vector3({values}).asDiagonal();  // {unit}")
     return [
         *lines,
-        "  // Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz), swamps the rest:",
+        "  // Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz),",
+        "  // swamps the rest:",
         "  // params->biasAccOmegaInt.setZero();",
         "  return params;",
         "}",

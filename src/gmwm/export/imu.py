@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,12 +15,17 @@ from gmwm.calibration import Calibration, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export import tuning
-from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound, reduce
+from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound, judged, reduce
+from gmwm.process import RandomWalk, WhiteNoise
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
 
+Outlook = Mapping[str, Mapping[float, tuple[float, float]]]
+"""Quantity -> horizon in s -> N and K for it."""
+
 _LETTERS = "xyz"
+_TOPIC = re.compile(r"/[A-Za-z0-9_/]+")  # a name of ROS, which no file can misread
 
 
 @dataclass(frozen=True)
@@ -74,12 +80,16 @@ class Triad:
     axes : tuple of Axis
         Each with its own numbers.
     common : FilterNumbers or None
-        The numbers that all share, where a file has one value for them.
+        The bound of all, where a file has one value for them and one calibration has them all.
+    shared_nees : dict or None
+        Where a file has one value for all: predicted normalised error squared of each axis with
+        that value, by time without aiding; empty for an axis whose model is not known.
     """
 
     quantity: str
     axes: tuple[Axis, ...]
     common: FilterNumbers | None = None
+    shared_nees: Mapping[str, Mapping[float, float]] | None = None
 
     @property
     def N(self) -> float:
@@ -93,6 +103,9 @@ class Triad:
 
     @property
     def initial_sd(self) -> float:
+        """For all axes, u."""
+        if self.common is not None:
+            return self.common.initial_sd
         return max(axis.initial_sd for axis in self.axes)
 
     def is_upper(self, letter: str) -> bool:
@@ -143,6 +156,8 @@ class Imu:
         Quantity -> horizon in s -> N and K for it.
     remarks : tuple of str
         What the numbers leave out.
+    topic : str
+        On which the samples were sent, where a bag was calibrated; else empty.
     """
 
     gyro: Triad
@@ -151,8 +166,14 @@ class Imu:
     horizon: float
     method: str
     sources: tuple[str, ...] = ()
-    outlook: Mapping[str, Mapping[float, tuple[float, float]]] = field(default_factory=dict)
+    outlook: Outlook = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    topic: str = ""
+
+    def by_axis(self) -> Imu:
+        """The same for a file that has the numbers of each axis."""
+        gyro, accel = (replace(each, common=None, shared_nees=None) for each in self.triads)
+        return replace(self, gyro=gyro, accel=accel)
 
     @property
     def triads(self) -> tuple[Triad, Triad]:
@@ -182,7 +203,12 @@ def common_tau(axes: Sequence[Axis]) -> float:
 
 
 def imu_of(
-    given: Sequence[Any], form: str, horizon: float | None, usual: float, shared: bool
+    given: Sequence[Any],
+    form: str,
+    horizon: float | None,
+    usual: float,
+    shared: bool,
+    outlook: Outlook | None = None,
 ) -> Imu:
     """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
 
@@ -196,6 +222,8 @@ def imu_of(
     usual : float
     shared : bool
         Whether the axes of a sensor have one value in the file.
+    outlook : dict, optional
+        That of `Imu`, where it is known.
 
     Raises
     ------
@@ -223,36 +251,39 @@ def imu_of(
         for each in given
     ]
     triads = {
-        quantity: _triad(quantity, list(zip(given, numbers, together, strict=True)), form)
+        quantity: _triad(quantity, list(zip(given, numbers, together, strict=True)), form, shared)
         for quantity in SENSORS
     }
     return Imu(
         triads["gyro"], triads["accel"], form, horizons[0],
         next(one.method for each in numbers for one in each.values()),
         sources=tuple(map(_source, numbers)),
-        outlook=_outlook(given),
+        outlook=_outlook(given) if outlook is None else outlook,
         remarks=_remarks(given, numbers),
+        topic=_topic(given),
     )  # fmt: skip
 
 
 def _triad(
-    quantity: str, sources: Sequence[tuple[Any, SensorNumbers, SensorNumbers | None]], form: str
+    quantity: str,
+    sources: Sequence[tuple[Any, SensorNumbers, SensorNumbers | None]],
+    form: str,
+    shared: bool,
 ) -> Triad:
     """The axes of a quantity, of what was given, its numbers and those that its axes share."""
     axes: list[Axis] = []
     common = None
+    fits: dict[str, Fit] = {}
     holding = [each for each in sources if each[1].of(quantity)]
     for source, numbers, together in holding:
-        fits = source.fits if isinstance(source, Calibration) else {}
+        fits |= source.fits if isinstance(source, Calibration) else {}
         for name, one in numbers.of(quantity).items():
             rate = numbers.rate
             if isinstance(source, Calibration) and not source.has_one_rate:
                 rate = 1.0 / source[name].wv.dt
-            axis = _axis(name, one, rate, fits.get(name))
+            axes.append(axis_of(name, one, rate, fits.get(name)))
             if together is not None and len(holding) == 1:
                 common = together[name]
-                axis = replace(axis, nees=dict(common.nees))
-            axes.append(axis)
     sensor = SENSORS[quantity]
     if not axes:
         raise InputError(
@@ -271,7 +302,28 @@ def _triad(
                     f"{key} of {axis.name} is zero, by which filters divide: give numbers with "
                     "one, or export the calibration, which knows an upper bound"
                 )
-    return Triad(quantity, tuple(axes), common)
+    triad = Triad(quantity, tuple(axes), common)
+    if not shared:
+        return triad
+    alike = next(iter(holding[0][1].of(quantity).values()))
+    return replace(triad, shared_nees=_shared_nees(triad, alike, fits))
+
+
+def _shared_nees(
+    triad: Triad, alike: FilterNumbers, fits: Mapping[str, Fit]
+) -> dict[str, Mapping[float, float]]:
+    """Consistency of each axis with the numbers that all share; see `Triad`."""
+    model = WhiteNoise(triad.N) + RandomWalk(triad.K)
+    shared = replace(alike, model=model, initial_sd=triad.initial_sd)
+    values = (triad.N, triad.K, triad.initial_sd)
+    found: dict[str, Mapping[float, float]] = {}
+    for axis in triad.axes:
+        if axis.name in fits:
+            found[axis.name] = judged({axis.name: fits[axis.name]}, shared).nees
+        else:
+            is_own = (axis.N, axis.K, axis.initial_sd) == values
+            found[axis.name] = axis.nees if is_own else {}
+    return found
 
 
 def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:
@@ -306,7 +358,8 @@ def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> Se
     return given
 
 
-def _axis(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) -> Axis:
+def axis_of(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) -> Axis:
+    """An axis by its numbers, with upper bounds of its fit in place of zeros."""
     sigma, tau = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
     axis = Axis(
         name, numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate
@@ -317,7 +370,10 @@ def _axis(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) ->
     if axis.N <= 0.0:
         axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
     if "K" in numbers.form and axis.K <= 0.0:
-        return replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
+        axis = replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
+    if axis.upper and numbers.form == "N+K":
+        filled = replace(numbers, model=WhiteNoise(axis.N) + RandomWalk(axis.K))
+        return replace(axis, nees=dict(judged({name: fitted}, filled).nees))
     if "GM" in numbers.form and not axis.sigma > 0.0:
         tau = numbers.horizon
         # The random walk of this K rises at high frequencies as this process does.
@@ -330,7 +386,7 @@ def _walks(fit: Fit) -> bool:
     return any(term.is_walk for term in fit.model.terms)
 
 
-def _outlook(given: Sequence[Any]) -> dict[str, dict[float, tuple[float, float]]]:
+def _outlook(given: Sequence[Any]) -> Outlook:
     """N and K for all axes at other horizons, where the models are known."""
     if not all(isinstance(each, Calibration) for each in given):
         return {}
@@ -354,6 +410,19 @@ def _remarks(given: Sequence[Any], numbers: Sequence[SensorNumbers]) -> tuple[st
         for notice in each.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
     return tuple(f"{', '.join(where)}: {text}" for text, where in places.items())
+
+
+def _topic(given: Sequence[Any]) -> str:
+    """The one topic of ROS that calibrations are of; empty where there is none, or several."""
+    names = {
+        str(notice.values.get("topic"))
+        for each in given
+        if isinstance(each, Calibration)
+        for notice in each.notices
+        if notice.code == "topic"
+    }
+    name = names.pop() if len(names) == 1 else ""
+    return name if _TOPIC.fullmatch(name) else ""
 
 
 def _source(numbers: SensorNumbers) -> str:

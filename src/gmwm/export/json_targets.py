@@ -72,9 +72,9 @@ JSON_TARGETS = (
         "src/glim/common/imu_integration.cpp: IMUIntegration",
         _glim, horizon=tuning.KEYFRAME, shared=True,
         warnings=(
-            "imu_bias_noise is one step for gyros (rad/s) and accelerometers (m/s^2) alike, which",
-            "  no K can be: with K sqrt(time between scans) of the accelerometers those are right",
-            "  and the gyros' biases looser than need be.",
+            "imu_bias_noise is one step for gyros (rad/s) and accelerometers (m/s^2) alike, which "
+            "no K can be: with K sqrt(time between scans) of the accelerometers those are right "
+            "and the gyros' biases looser than need be.",
         ),
     ),
 )  # fmt: skip

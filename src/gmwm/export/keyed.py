@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import sqrt
 
 from gmwm.export import tuning
-from gmwm.export.comments import by_axis
 from gmwm.export.imu import Axis, Imu, Triad
 from gmwm.export.target import ImuFile
 from gmwm.filter_numbers import EKF2_INTERVAL
@@ -55,7 +54,7 @@ class Keys:
     units : dict
         (quantity, letter) -> unit of the value.
     before, after : tuple of str
-        Lines around the values; ``{rate}`` stands for the rate.
+        Lines around the values; ``{rate}`` and ``{topic}`` stand for the rate and the topic.
     indent, prefix : str
         Before the key.
     separator : str
@@ -84,7 +83,8 @@ class Keys:
     def __call__(self, imu: Imu) -> list[str]:
         units = self.units or _UNITS
         rate = imu.rate if self.needs_rate else float("nan")
-        lines = [line.format(rate=_decimal(rate)) for line in self.before]
+        topic = imu.topic or "/imu0  # set to the topic of your bag"
+        lines = [line.format(rate=_decimal(rate), topic=topic) for line in self.before]
         for key, quantity, letter in self.names:
             triad = imu.gyro if quantity == "gyro" else imu.accel
 
@@ -99,8 +99,7 @@ class Keys:
                 what = "white noise" if letter == "N" else "random walk"
                 lines.append(f"{self.indent}#   no {what} was found: this is the largest 95 % "
                              "upper bound")  # fmt: skip
-            lines.append(f"{self.indent}# {by_axis(triad, map(value, triad.axes), letter)}")
-        return [*lines, *(line.format(rate=_decimal(rate)) for line in self.after)]
+        return [*lines, *(line.format(rate=_decimal(rate), topic=topic) for line in self.after)]
 
 
 def _decimal(rate: float) -> str:
@@ -156,7 +155,7 @@ KALIBR = ImuFile(
     f"{_CONTINUOUS}; zeros are refused",
     "kalibr_common/ConfigReader.py: ImuParameters.getAccelerometerStatistics, getGyroStatistics; "
     "IccSensors.py: addBiasMotionTerms",
-    Keys(_KALIBR, after=("rostopic: /imu0  # set to the topic of your bag",
+    Keys(_KALIBR, after=("rostopic: {topic}",
                          "update_rate: {rate}  # Hz")),
     horizon=tuning.KEYFRAME, shared=True,
 )  # fmt: skip
@@ -168,7 +167,7 @@ OPENVINS = ImuFile(
     Keys(
         _KALIBR, indent="  ", before=("imu0:", "  T_i_b:", *_POSE),
         after=(
-            "  rostopic: /imu0  # set to the topic of your bag",
+            "  rostopic: {topic}",
             "  time_offset: 0.0",
             "  update_rate: {rate}  # Hz",
             '  model: "kalibr"',
@@ -255,11 +254,11 @@ PX4 = ImuFile(
     ),
     shared=True,
     warnings=(
-        "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench",
-        "  does not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer",
-        "  0.35 m/s^2) stand for it. Record in flight, or keep the larger of the two. PX4 takes",
-        "  gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, and bias",
-        "  noise up to 0.01.",
+        "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench "
+        "does not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer "
+        "0.35 m/s^2) stand for it. Record in flight, or keep the larger of the two. PX4 takes "
+        "gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, and bias "
+        "noise up to 0.01.",
     ),
 )  # fmt: skip
 

@@ -20,6 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.export.comments import wrapped
 from gmwm.export.imu import numbers_of
 from gmwm.export.json_targets import json_text
 from gmwm.export.target import Target
@@ -36,7 +37,11 @@ class StateSpaceTarget(Target):
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         channels = self._channels(given, horizon, form)
         content = {
-            "comment": [f"{self.title}: {self.convention}", *self.warnings],
+            "comment": [
+                line
+                for text in (f"{self.title}: {self.convention}", *self.warnings)
+                for line in wrapped(text)
+            ],
             "channels": {name: _plain(each) for name, each in channels.items()},
         }
         return json_text(content) + "\n"

@@ -12,7 +12,7 @@ from gmwm._core import checks
 from gmwm._core.files import written
 from gmwm.errors import InputError
 from gmwm.export import tuning
-from gmwm.export.comments import about, comment
+from gmwm.export.comments import about, comment, wrapped
 from gmwm.export.imu import Imu, imu_of
 from gmwm.filter_numbers import FORMS
 
@@ -100,7 +100,7 @@ class ImuFile(Target):
     def comments(self, imu: Imu) -> list[str]:
         """Lines of comment, without the mark."""
         lines = about(imu, f"{self.title}, {self.file}", f"{self.convention} ({self.source})")
-        return [*lines, *self.warnings]
+        return [*lines, *(line for text in self.warnings for line in wrapped(text))]
 
     def text(self, imu: Imu) -> str:
         """The whole file."""

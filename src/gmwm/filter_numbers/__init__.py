@@ -4,7 +4,7 @@ A small filter has room for white noise with a random walk or a few Gauss-Markov
 axis; which numbers are right depends on how long it goes without aiding, the horizon.
 """
 
-from gmwm.filter_numbers.bound import bound
+from gmwm.filter_numbers.bound import bound, judged
 from gmwm.filter_numbers.certificate import CONSUMERS, Cause, Certificate, Check
 from gmwm.filter_numbers.certify import certify
 from gmwm.filter_numbers.chain import Chain, ChainErrors
@@ -30,6 +30,7 @@ __all__ = [
     "SensorNumbers",
     "bound",
     "certify",
+    "judged",
     "read_numbers",
     "reduce",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -182,6 +183,22 @@ def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
     return float(np.sqrt(variance))
 
 
+def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
+    """The same numbers with what is predicted where an error model is the truth.
+
+    Parameters
+    ----------
+    source : Process, Model, Fit or mapping
+        The error model of the axis; as a mapping, with its name.
+    numbers : FilterNumbers
+        Of any origin; the times of its predictions are kept.
+    """
+    axis = Axes.of(source, None, 0.0).axes[0]
+    times = [each.time for each in numbers.predicted]
+    found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
+    return replace(numbers, predicted=found)
+
+
 def predicted(
     axis: Axis, chain: Chain, model: Model, sd: float, times: Sequence[float]
 ) -> tuple[Predicted, ...]:
@@ -210,6 +227,12 @@ def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
     if not axis.fit.valid:
         text = "the fit is not valid, nor are numbers from it"
         found.append(Notice("fit-not-valid", "warning", "", text, {}, "read its notices first"))
+    if axis.bias_sd == 0.0:
+        text = (
+            "the bias at the start leaves out that of switching on, which no recording at rest "
+            "shows: add the square of its standard deviation to that of initial_sd"
+        )
+        found.append(Notice("turn-on-left-out", "note", "", text))
     if level is None:
         text = "the uncertainty of the fitted parameters is not covered"
         found.append(Notice("uncertainty-not-covered", "note", "", text))

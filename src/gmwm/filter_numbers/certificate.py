@@ -15,13 +15,15 @@ from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm.estimate.result import plain
+from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.result import SensorNumbers
+from gmwm.filter_numbers.table import shown_unit
 
 if TYPE_CHECKING:
     import pandas
 
 CONSUMERS = {
-    "free": "Without aiding, after fixes every second",
+    "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
     "outage": "INS/GNSS filter, at the end of an outage",
     "keyframes": "Relative pose between keyframes",
 }
@@ -159,6 +161,16 @@ class Certificate(Document):
         return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: str = "field") -> str:
+        """What `print` shows, numbers in the units of the field or, with ``"si"``, in SI.
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
         lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
         for consumer, title in CONSUMERS.items():
             checks = self.of(consumer)
@@ -173,22 +185,38 @@ class Certificate(Document):
                     f"{check.believed:>11.4g} {check.nees:>9.3g}"
                 )
         for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
-            lines += ["", f"{quantity or 'axis'}: what N and K have to cover, all axes"]
-            lines.append(f"{'':<32}{'N':>11} {'K':>11} {'N times':>9} {'K times':>9}")
-            lines += [
-                f"{cause.name:<32}{cause.N:>11.3e} {cause.K:>11.3e} {cause.N_factor:>9.3g} "
-                f"{cause.K_factor:>9.3g}"
-                for cause in self.causes
-                if cause.quantity == quantity
-            ]
+            lines += ["", *self._covered(quantity, units)]
         if self.causes:
+            time = self.recommended.horizon
             lines += ["", *wrapped(
-                "times: of the error model and of all together, over the numbers in use; of the "
-                "others, over those of the error model."
+                f"Each row below the first has N and K for {time:g} s without aiding that are "
+                "never too optimistic for the error model together with what the row names, and "
+                "their factors over those in use and over those of the error model alone. N and K "
+                "belong together: a larger one pays for a smaller other, whose factor can be below "
+                "1."
             )]  # fmt: skip
         for notice in self.notices:
             lines += wrapped(str(notice), first="- ", indent=2)
-        return "\n".join([*lines, "", "Recommended: " + str(self.recommended)])
+        return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
+
+    def _covered(self, quantity: str, units: str) -> list[str]:
+        """The table of causes of a kind of sensor: the first is in use, the second the model."""
+        rows = [cause for cause in self.causes if cause.quantity == quantity]
+        (N, n_scale), (K, k_scale) = (shown_unit(letter, quantity, units) for letter in "NK")
+        lines = [
+            f"{quantity or 'axis'}, all axes: what N [{N}] and K [{K}] have to cover",
+            f"{'':<48}{'over in use':>16}{'over model':>16}",
+            f"{'':<28}{'N':>10}{'K':>10}{'N':>8}{'K':>8}{'N':>8}{'K':>8}",
+        ]
+        for cause in rows:
+            factors = [
+                f"{_ratio(value, by):>8.3g}"
+                for other in rows[:2]
+                for value, by in ((cause.N, other.N), (cause.K, other.K))
+            ]
+            values = f"{cause.N * n_scale:>10.4g}{cause.K * k_scale:>10.4g}"
+            lines.append(f"{cause.name:<28}{values}{''.join(factors)}")
+        return lines
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the checks; needs pandas."""
@@ -218,6 +246,10 @@ class Certificate(Document):
             causes=tuple(Cause(**_python(each)) for each in content["causes"]),
             notices=tuple(map(Notice.from_dict, content["notices"])),
         )
+
+
+def _ratio(value: float, by: float) -> float:
+    return value / by if by > 0.0 else float("inf")
 
 
 def _json(row: dict[str, Any]) -> dict[str, Any]:

@@ -187,7 +187,7 @@ def _causes(
         if N > tuning.OTHER_UNITS * first.N:
             notices.append(_units(kind, N / first.N))
         causes.append(Cause(kind, "in use", N, K, 1.0, 1.0))
-        causes.append(row("error model, slow terms and all", first, (N, K)))
+        causes.append(row("error model with slow terms", first, (N, K)))
         if all(axis.fit is not None for axis in group):
             try:
                 wide = _bound(group, horizon, 0.95)

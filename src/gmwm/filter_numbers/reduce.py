@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
@@ -140,11 +141,24 @@ def _reduced(
             initial_sd=sd,
             method="reduce",
             predicted=predicted(axis, chain, model, sd, (*times, 10.0 * longest)),
-            notices=(*target.notices, *about(axis, None)),
+            notices=(*target.notices, *_below(axis, model), *about(axis, None)),
             quantity=axis.quantity,
         )
         for axis, chain, target in zip(group, chains, targets, strict=True)
     ]
+
+
+def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:
+    """Where less white noise is believed than there is."""
+    own = float(np.sqrt(axis.model.white_density()))
+    share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
+    if share > tuning.BELOW:
+        return ()
+    text = (
+        f"N is {share:.3g} times that of the error model: the other terms pay for it, at the times "
+        "without aiding that the numbers are for"
+    )
+    return (Notice("less-white-noise", "note", "", text, {"share": share}),)
 
 
 def _start(

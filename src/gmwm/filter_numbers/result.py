@@ -16,9 +16,10 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
-from gmwm._core.units import SI_UNIT, si_parameter_unit
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import MissingNameError
 from gmwm.estimate.result import plain
+from gmwm.filter_numbers.table import shown_unit, stacked
 from gmwm.process import Model, model_from_list
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ FORMS = ("N+K", "N+GM", "N+K+GM", "N+2GM")
 
 METHODS = ("bound", "reduce", "given")
 """Where numbers come from: `bound`, `reduce`, or somebody who gave them."""
-
-_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
 
 
 class PredictedForm(Form):
@@ -177,12 +176,21 @@ class FilterNumbers(Document):
         return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: str = "field") -> str:
+        """What `print` shows, in the units of the field or, with ``"si"``, in SI.
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
         lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
         for key, value in self._shown():
-            letter = key if key in _UNITS else key.partition("_")[0]
-            unit = si_parameter_unit(_UNITS[letter], self.quantity)
-            error = f" +- {self.stderr[key]:.2g}" if key in self.stderr else ""
-            lines.append(f"  {key:<10} {value:>11.4g}{error} {unit}")
+            unit, per_si = shown_unit(key, self.quantity, units)
+            error = f" +- {self.stderr[key] * per_si:.2g}" if key in self.stderr else ""
+            lines.append(f"  {key:<10} {value * per_si:>11.4g}{error} {unit}")
         for each in self.predicted:
             lines.append(
                 f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
@@ -329,17 +337,32 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
         return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: str = "field") -> str:
+        """What `print` shows, in the units of the field or, with ``"si"``, in SI.
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
         first = next(iter(self.values()))
         head = f"{self.form} for {self.horizon:g} s, {first.method}"
         lines = [f"{self.source}: {head}" if self.source else head]
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
-            title = f"{quantity or 'channel'} [{SI_UNIT.get(quantity, 'u')}, s]"
-            lines += ["", *_stacked(title, self.of(quantity))]
+            rows = {name: each._columns() for name, each in self.of(quantity).items()}
+            lines += ["", *stacked(quantity or "channel", rows, quantity, units)]
         if first.predicted:
             lines += ["", *wrapped(
                 "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
                 "predicted over true standard deviation then."
             )]  # fmt: skip
+        if first.form != "N+GM":
+            lines += wrapped(
+                "N and the slow terms belong together: where one is smaller, a larger other pays "
+                "for it."
+            )
         places: dict[str, list[str]] = {}
         for notice in self.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
@@ -382,19 +405,3 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
             duration=number(content["duration_s"]),
             shared=bool(content["shared"]),
         )
-
-
-def _stacked(title: str, group: Mapping[str, FilterNumbers]) -> list[str]:
-    """A table of values above one of predictions, each within the width of a terminal."""
-    lines: list[str] = []
-    width = max(map(len, [title, *group]))
-    for parts in zip(*(each._columns() for each in group.values()), strict=True):
-        # Errors are known of some axes only.
-        columns = max(map(tuple, parts), key=len)
-        cells = [[f"{part[key]:.4g}" if key in part else "-" for key in columns] for part in parts]
-        widths = [max(9, *map(len, column)) for column in zip(columns, *cells, strict=True)]
-        for name, row in zip((title, *group), (columns, *cells), strict=True):
-            values = (f" {cell:>{w}}" for cell, w in zip(row, widths, strict=True))
-            lines.append(f"{name:<{width}}" + "".join(values))
-        title = "predicted"
-    return lines

@@ -98,6 +98,9 @@ EVENNESS = 20.0
 a NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.76 to 1.09 without, and errors that are 2 %
 larger on the mean: ``python benchmarks/filter_numbers.py balance``."""
 
+BELOW = 0.98
+"""N over that of the error model, below which reduced numbers say so."""
+
 STEPS = 60
 """Of the search, at most."""
 
@@ -167,9 +170,6 @@ OTHER_UNITS = 40.0
 """Times the N of the error model, above which N in use may be in other units: values in deg/s are
 57 times as large, in m/s/sqrt(h) 60, in deg/sqrt(h) 3,438; people enlarge theirs up to 20 times
 (https://github.com/ethz-asl/kalibr/issues/663)."""
-
-CONSISTENT = (0.5, 2.0)
-"""NEES per degree of freedom within which numbers are called consistent."""
 
 # -- files of programs ----------------------------------------------------------------------------
 

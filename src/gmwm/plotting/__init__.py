@@ -22,6 +22,7 @@ from gmwm.plotting.navigation import (
     literal,
     measured_outage,
     measured_track,
+    outages_compared,
     track,
 )
 
@@ -42,6 +43,7 @@ __all__ = [
     "literal",
     "measured_outage",
     "measured_track",
+    "outages_compared",
     "residuals",
     "straight_lines",
     "trace",

@@ -25,6 +25,7 @@ _BAND = "#9ecae1"
 _TRUE = "true track"
 _WIDEST_TITLE = 30  # characters over a panel
 _IN_LEGEND = 24
+_DENSE = 3000  # points, beyond which an image of them is smaller than they are
 _PREDICTED_SHOWN = 2.0  # of the largest true error: a prediction far above it leaves the view
 _T = TypeVar("_T")
 
@@ -231,10 +232,12 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=3, label="fixes")
+    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=3, label="fixes",
+            rasterized=len(fixes) > _DENSE)  # fmt: skip
     ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
             label="longest time without fixes")  # fmt: skip
-    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
+    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution",
+            rasterized=len(track) > _DENSE)  # fmt: skip
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_xlabel("east [m]")
     ax.set_ylabel("north [m]")
@@ -307,14 +310,61 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
             ax = axes[row, column]
             for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
                 ax.fill_between(time, -factor * sd[:, row], factor * sd[:, row], color=_BAND,
-                                alpha=alpha, linewidth=0,
+                                alpha=alpha, linewidth=0, rasterized=time.size > _DENSE,
                                 label=f"{factor:g} sigma expected")  # fmt: skip
             ax.plot(time, value[:, row], ".", color=COMPONENT_COLOURS[1], markersize=3,
-                    label="innovation")  # fmt: skip
+                    rasterized=time.size > _DENSE, label="innovation")  # fmt: skip
             _plain(ax)
             if column == 0:
                 ax.set_ylabel(label)
         axes[0, column].set_title(title, fontsize="medium")
         axes[2, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    return figure
+
+
+def outages_compared(
+    time: FloatArray,
+    panels: Mapping[str, Mapping[str, tuple[FloatArray, float]]],
+    ratios: Mapping[str, tuple[float, float, float]],
+) -> Figure:
+    """Errors at the end of each outage, model by model, and their ratios.
+
+    Parameters
+    ----------
+    time : (K,) ndarray
+        Ends of the outages, s.
+    panels : mapping of str to mapping of str to ((K,) ndarray, float)
+        Quantity with its unit -> name -> errors, and their root mean square as predicted.
+    ratios : mapping of str to three floats
+        What is compared with what -> ratio of the errors, lower and upper end of its interval.
+    """
+    import matplotlib.pyplot as plt
+
+    count = len(panels)
+    figure, axes = plt.subplots(
+        count + 1, 1, figsize=(7.4, 2.1 * count + 0.9 + 0.25 * len(ratios)),
+        height_ratios=[2.0] * count + [0.4 + 0.25 * len(ratios)], layout="constrained",
+    )  # fmt: skip
+    for ax, (title, solutions) in zip(axes, panels.items(), strict=False):
+        for i, (name, (error, predicted)) in enumerate(solutions.items()):
+            colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
+            ax.plot(time / 60.0, error, "osD^"[i % 4], color=colour, markersize=3.5,
+                    label=literal(name))  # fmt: skip
+            ax.axhline(predicted, color=colour, linestyle=_DASHES[i % len(_DASHES)], linewidth=1.1)
+        ax.set_ylim(bottom=0.0)
+        ax.set_ylabel(title)
+        _plain(ax)
+    axes[0].legend(fontsize="x-small", title="points: errors; lines: RMS as predicted",
+                   title_fontsize="x-small")  # fmt: skip
+    axes[count - 1].set_xlabel("end of the outage [min]")
+    ax = axes[count]
+    for row, (ratio, lower, upper) in enumerate(ratios.values()):
+        ax.plot([lower, upper], [row, row], color=DATA_COLOUR, linewidth=1.6)
+        ax.plot([ratio], [row], "o", color=DATA_COLOUR, markersize=5)
+    ax.axvline(1.0, color=SUM_COLOUR, linewidth=0.9)
+    ax.set_yticks(range(len(ratios)), [literal(name) for name in ratios])
+    ax.set_ylim(len(ratios) - 0.5, -0.5)
+    ax.set_xlabel("ratio of errors, 95 %")
+    _plain(ax)
     return figure

@@ -2,7 +2,13 @@
 
 from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process, Shape
-from gmwm.process.catalogue import CATALOGUE, model_from_list
+from gmwm.process.catalogue import (
+    CATALOGUE,
+    compiled_levels,
+    model_from_list,
+    shaped_curve,
+    shaped_slope,
+)
 from gmwm.process.gauss_markov import GaussMarkov, Resonance
 from gmwm.process.low_pass import BUTTERWORTH, AveragedNoise, LowPassNoise
 from gmwm.process.model import Model, as_model, simulate
@@ -48,6 +54,7 @@ __all__ = [
     "WhiteNoise",
     "as_model",
     "block_diagonal",
+    "compiled_levels",
     "evaluated",
     "haar_gain",
     "legendre",
@@ -55,6 +62,8 @@ __all__ = [
     "pair_weights",
     "parameter",
     "quadrature",
+    "shaped_curve",
+    "shaped_slope",
     "simulate",
     "unit_legendre",
     "wavelet",

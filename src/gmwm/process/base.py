@@ -82,6 +82,10 @@ class Process:
     has_finite_state_space: ClassVar[bool] = True
     """Whether `state_space`, where there is one, is exact."""
 
+    compiled_kind: ClassVar[int] = 0
+    """Number of its curve in `gmwm.process.catalogue.shaped_curve`, of this very class; 0 if it has
+    none."""
+
     _constructor: ClassVar[Signature] = Signature()
     _accepted: ClassVar[tuple[str, ...]] = ()  # names of its arguments
 
@@ -96,6 +100,7 @@ class Process:
         cls.parameters = tuple(declared.values())
         cls._constructor = signature(cls.__init__)
         cls._accepted = tuple(cls._constructor.parameters)[1:]
+        cls.compiled_kind = vars(cls).get("compiled_kind", 0)
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         # A constructor that names its parameters would answer with a TypeError.

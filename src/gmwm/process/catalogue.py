@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process
-from gmwm.process.gauss_markov import GaussMarkov, Resonance
-from gmwm.process.low_pass import AveragedNoise, LowPassNoise
+from gmwm.process.gauss_markov import GaussMarkov, Resonance, real_haar, real_slope, resonance_haar
+from gmwm.process.low_pass import AveragedNoise, LowPassNoise, low_pass_haar, on_panels
 from gmwm.process.model import Model
 from gmwm.process.noise import BiasInstability, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.process.sinusoid import Sinusoid
@@ -31,6 +35,48 @@ CATALOGUE: tuple[type[Process], ...] = (
     ARIMA,
 )
 """Every built-in process."""
+
+
+_GAUSS_MARKOV, _RESONANCE, _LOW_PASS = (
+    kind.compiled_kind for kind in (GaussMarkov, Resonance, LowPassNoise)
+)
+
+
+def compiled_levels(tau: FloatArray, dt: float, kinds: Collection[int]) -> tuple[Any, ...]:
+    """What curves of some kinds need to know of averaging times (s) in `shaped_curve`."""
+    nothing = np.zeros(0), np.zeros((tau.size, 0))
+    m = np.ascontiguousarray(tau) / dt
+    panels = on_panels(tuple(m.tolist())) if _LOW_PASS in kinds else (nothing, nothing)
+    return (m, dt, *panels)
+
+
+@compiled()
+def shaped_curve(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
+    """`Process.unit_haar_variance` of a compiled kind, (J,), for inner loops; empty where unknown.
+
+    Parameters
+    ----------
+    kind : int
+        `Process.compiled_kind`.
+    shape : ndarray
+        Values of the shape parameters.
+    levels : tuple
+        From `compiled_levels`.
+    """
+    m, dt, wide, narrow = levels
+    if kind == _GAUSS_MARKOV:
+        return real_haar(dt / shape[0], m)
+    if kind == _RESONANCE:
+        return resonance_haar(shape[0], shape[1], dt, m)
+    return low_pass_haar(shape[0], shape[1], shape[2], dt, wide, narrow)
+
+
+@compiled()
+def shaped_slope(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
+    """Its derivative by the coordinate of the only shape parameter; empty if not in closed form."""
+    if kind == _GAUSS_MARKOV:
+        return real_slope(levels[1] / shape[0], levels[0])[:, 0].copy()
+    return np.zeros(0)
 
 
 def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:

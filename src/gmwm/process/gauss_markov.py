@@ -52,6 +52,7 @@ class GaussMarkov(Process):
     sigma: float = parameter("u", "scale", meaning="Gauss-Markov standard deviation")
     tau: float = parameter("s", meaning="Gauss-Markov correlation time")
     label: ClassVar[str] = "Gauss-Markov"
+    compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
@@ -70,15 +71,15 @@ class GaussMarkov(Process):
         return self.sigma**2 * self.unit_haar_variance((self.tau,), tau, dt)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        flat = _real_haar(dt / shape[0], np.ascontiguousarray(tau).ravel() / dt)
+        flat = real_haar(dt / shape[0], np.ascontiguousarray(tau).ravel() / dt)
         return flat.reshape(tau.shape)
 
     def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
         m = np.asarray(tau, dtype=float) / dt
-        return lambda shape: _real_haar(dt / shape[0], m)
+        return lambda shape: real_haar(dt / shape[0], m)
 
     def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        return _real_slope(dt / shape[0], np.asarray(tau, dtype=float) / dt)
+        return real_slope(dt / shape[0], np.asarray(tau, dtype=float) / dt)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
@@ -137,6 +138,7 @@ class Resonance(Process):
     frequency: float = parameter("Hz", meaning="resonance frequency")
     damping: float = parameter("-", upper=1.0, meaning="resonance damping ratio")
     label: ClassVar[str] = "resonance"
+    compiled_kind: ClassVar[int] = 2
     prefix: ClassVar[str] = "resonance_"
 
     def __init__(
@@ -147,38 +149,28 @@ class Resonance(Process):
     ) -> None:
         super().__init__(sigma, frequency, damping)
 
-    @staticmethod
-    def _exponential(shape: Shape, dt: float) -> tuple[complex, complex]:
-        """Rate per sample and weight of one of the two conjugate exponentials."""
-        frequency, damping = shape
-        root = math.sqrt(1.0 - damping**2)
-        rate = 2.0 * math.pi * frequency * dt * complex(damping, -root)
-        return rate, complex(1.0, -damping / root)
-
     @property
     def _shape(self) -> Shape:
         return self.frequency, self.damping
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(self._shape, dt)
+        rate, weight = _exponential(*self._shape, dt)
         return self.sigma**2 * np.real(weight * _exponential_psd(rate, f, dt))
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * self.unit_haar_variance(self._shape, tau, dt)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(shape, dt)
         tau = np.asarray(tau, dtype=float)
-        return _complex_haar(rate, weight, np.ascontiguousarray(tau).ravel() / dt).reshape(
-            tau.shape
-        )
+        m = np.ascontiguousarray(tau).ravel() / dt
+        return resonance_haar(*shape, dt, m).reshape(tau.shape)
 
     def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
         m = np.asarray(tau, dtype=float) / dt
-        return lambda shape: _complex_haar(*self._exponential(shape, dt), m)
+        return lambda shape: resonance_haar(*shape, dt, m)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
-        rate, weight = self._exponential(self._shape, dt)
+        rate, weight = _exponential(*self._shape, dt)
         return self.sigma**2 * np.real(weight * np.exp(-rate * np.asarray(lag)))
 
     def state_space(self, dt: float) -> StateSpace:
@@ -229,7 +221,15 @@ def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
 
 
 @compiled()
-def _real_haar(rate: float, m: FloatArray) -> FloatArray:
+def _exponential(frequency: float, damping: float, dt: float) -> tuple[complex, complex]:
+    """Rate per sample and weight of one of the two conjugate exponentials of a resonance."""
+    root = math.sqrt(1.0 - damping**2)
+    rate = 2.0 * math.pi * frequency * dt * complex(damping, -root)
+    return rate, complex(1.0, -damping / root)
+
+
+@compiled()
+def real_haar(rate: float, m: FloatArray) -> FloatArray:
     """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
     Parameters
@@ -266,12 +266,12 @@ def _real_haar(rate: float, m: FloatArray) -> FloatArray:
 
 
 @compiled()
-def _real_slope(rate: float, m: FloatArray) -> FloatArray:
-    """Derivative of `_real_haar` by the logarithm of the correlation time, (J, 1)."""
+def real_slope(rate: float, m: FloatArray) -> FloatArray:
+    """Derivative of `real_haar` by the logarithm of the correlation time, (J, 1)."""
     result = np.zeros((m.size, 1))
     if rate > _WHITE_ABOVE:
         return result
-    curve = _real_haar(rate, m)
+    curve = real_haar(rate, m)
     square = math.sinh(0.5 * rate) ** 2
     for i in range(m.size):
         bend = math.expm1(-m[i] * rate) ** 2  # half of h'
@@ -279,6 +279,13 @@ def _real_slope(rate: float, m: FloatArray) -> FloatArray:
         slope = numerator / (8.0 * m[i] * m[i] * square) - curve[i] / math.tanh(0.5 * rate)
         result[i, 0] = -rate * slope
     return result
+
+
+@compiled()
+def resonance_haar(frequency: float, damping: float, dt: float, m: FloatArray) -> FloatArray:
+    """Haar wavelet variance of a resonance of unit variance."""
+    rate, weight = _exponential(frequency, damping, dt)
+    return _complex_haar(rate, weight, m)
 
 
 @compiled()

@@ -7,20 +7,22 @@ state-space form is that white noise, without a state.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy import fft
 from scipy.signal import lfilter
 
+from gmwm._core.compiled import compiled
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, panel_weights, quadrature
+from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, WIDER, panel_weights, quadrature
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
@@ -76,6 +78,7 @@ class LowPassNoise(_Filtered):
     order: float = parameter("-", lower=0.9, upper=16.0, meaning="order of the sensor's low-pass")
     damping: float = parameter("-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass")
     label: ClassVar[str] = "low-pass noise"
+    compiled_kind: ClassVar[int] = 3
     prefix: ClassVar[str] = "lowpass_"
 
     def __init__(
@@ -90,7 +93,8 @@ class LowPassNoise(_Filtered):
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         with np.errstate(divide="ignore"):
             log_tangent = np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5)))
-        return self.N**2 * _gain((self.bandwidth, self.order, self.damping), log_tangent, dt)
+        found = _gain(self.bandwidth, self.order, self.damping, log_tangent.ravel(), dt)
+        return self.N**2 * found.reshape(log_tangent.shape)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)
@@ -190,45 +194,69 @@ class AveragedNoise(_Filtered):
         return (cls(0.3, 4.0), cls(2.0, 21.6))
 
 
-def _gain(shape: Shape, log_tangent: FloatArray, dt: float) -> FloatArray:
-    """|H|^2 of the low-pass at frequencies of which log tan(pi f dt) is given."""
-    bandwidth, order, damping = shape
+@compiled()
+def _gain(
+    bandwidth: float, order: float, damping: float, log_tangent: FloatArray, dt: float
+) -> FloatArray:
+    """|H|^2 of the low-pass at frequencies (K,) of which log tan(pi f dt) is given."""
+    result = np.ones(log_tangent.size)
     if bandwidth * dt >= 0.5:
-        return np.ones_like(log_tangent)
+        return result
     bend = 4.0 * damping**2 - 2.0
-    half_power = 2.0 / (bend + np.sqrt(bend**2 + 4.0))
-    exponent = np.log(half_power) + order * (log_tangent - np.log(np.tan(np.pi * bandwidth * dt)))
-    q = np.exp(np.minimum(exponent, 0.5 * _LARGEST_LOG))
-    return np.asarray(1.0 / (1.0 + q * (bend + q)))
+    half_power = 2.0 / (bend + math.sqrt(bend**2 + 4.0))
+    start = math.log(half_power) - order * math.log(math.tan(math.pi * bandwidth * dt))
+    for k in range(result.size):
+        q = math.exp(min(start + order * log_tangent[k], 0.5 * _LARGEST_LOG))
+        result[k] = 1.0 / (1.0 + q * (bend + q))
+    return result
+
+
+@compiled()
+def low_pass_haar(
+    bandwidth: float, order: float, damping: float, dt: float, wide: Any, narrow: Any
+) -> FloatArray:
+    """Haar wavelet variance at unit N, (J,); empty where panels are too wide for the spectrum.
+
+    Parameters
+    ----------
+    bandwidth, order, damping, dt : float
+    wide, narrow : (points, weights)
+        Of panels, see `on_panels`.
+    """
+    # Distance of the next pole of the spectrum from the real axis of log tan(pi f dt).
+    pole = math.acos(max(1.0 - 2.0 * damping**2, -1.0)) / order
+    if pole > WIDER * PANEL_POLE * HALF_PANEL:
+        return wide[1] @ _gain(bandwidth, order, damping, wide[0], dt) / dt
+    if pole > PANEL_POLE * HALF_PANEL:
+        return narrow[1] @ _gain(bandwidth, order, damping, narrow[0], dt) / dt
+    return np.zeros(0)
 
 
 @lru_cache(maxsize=1024)
 def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatArray:
     """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
-    nodes = _on_panels if _is_smooth(shape) else _nodes
-    log_tangent, weight = nodes(averaging)
-    found: FloatArray = frozen(weight @ _gain(shape, log_tangent, dt) / dt)
-    return found
+    found = low_pass_haar(*shape, dt, *on_panels(averaging))
+    if not found.size:
+        log_tangent, weight = _nodes(averaging)
+        found = weight @ _gain(*shape, log_tangent, dt) / dt
+    curve: FloatArray = frozen(found)
+    return curve
 
 
-def _is_smooth(shape: Shape) -> bool:
-    """Whether the spectrum over a panel is a polynomial to 1e-8."""
-    _, order, damping = shape
-    angle = np.arccos(np.clip(1.0 - 2.0 * damping**2, -1.0, 1.0))
-    return bool(angle / order > PANEL_POLE * HALF_PANEL)
+Weights = tuple[FloatArray, FloatArray]
 
 
 @lru_cache(maxsize=8)
-def _nodes(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+def _nodes(averaging: tuple[float, ...]) -> Weights:
     """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
     found = quadrature(_rounded(averaging))
     return np.log(np.tan(np.pi * found.frequency)), 2.0 * found.gain * found.weight
 
 
-@lru_cache(maxsize=8)
-def _on_panels(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """The same at Chebyshev points of panels, which are a tenth as many."""
-    return panel_weights(_rounded(averaging))
+def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
+    """The same at Chebyshev points of panels, wide and narrow, which are so many fewer."""
+    rounded = _rounded(averaging)
+    return panel_weights(rounded, WIDER), panel_weights(rounded)
 
 
 def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:

@@ -169,6 +169,9 @@ PANEL_POLE = 2.21
 
 HALF_PANEL = 0.5 * _PANEL
 
+WIDER = 4
+"""Panels that are one panel of a spectrum whose poles are as many times as far."""
+
 
 @dataclass(frozen=True, eq=False)
 class Panels:
@@ -189,20 +192,19 @@ class Panels:
     share: FloatArray
 
     @classmethod
-    def of(cls, frequency: FloatArray) -> Panels:
-        """Those of rising nodes (K,), cycles per sample."""
-        log_tangent = np.log(np.tan(np.pi * frequency))
-        panel = np.floor(log_tangent / _PANEL)
+    def of(cls, log_tangent: FloatArray, width: float = _PANEL) -> Panels:
+        """Those of nodes (K,), panel by panel."""
+        panel = np.floor(log_tangent / width)
         starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
         angles = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
         points = np.cos(angles)
-        within = 2.0 * (log_tangent / _PANEL - panel) - 1.0
+        within = 2.0 * (log_tangent / width - panel) - 1.0
         # By the barycentric formula, whose limit at a point is one.
         distance = within[:, None] - points
         distance[distance == 0.0] = np.finfo(float).tiny
         share = (-1.0) ** np.arange(_POINTS) * np.sin(angles) / distance
         share /= np.sum(share, axis=1, keepdims=True)
-        return cls(_PANEL * (panel[starts, None] + 0.5 * (points + 1.0)), starts, share)
+        return cls(width * (panel[starts, None] + 0.5 * (points + 1.0)), starts, share)
 
     def gathered(self, weight: FloatArray) -> FloatArray:
         """Weights of the points from weights of the nodes, (..., K) to (..., P, 12)."""
@@ -219,20 +221,27 @@ class Panels:
         return np.asarray(tail <= _SMOOTH * np.max(np.abs(values), axis=1))
 
 
-def panel_weights(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+@lru_cache(maxsize=8)
+def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatArray, FloatArray]:
     """Log tan(pi f) at the points of panels, and the weights of each averaging time.
 
     What `Quadrature.haar_variance` is for a spectrum that is smooth on panels, with a tenth of the
-    points. The gains at all nodes are in memory for some averaging times at a time.
+    points; with fewer still on panels so many times as wide. The gains at all nodes are in memory
+    for some averaging times at a time.
     """
-    frequency, weight = _nodes(max(averaging))
-    panels = Panels.of(frequency)
-    parts = [
-        panels.gathered(2.0 * weight * _gains(averaging[i : i + _TOGETHER], frequency)[0])
-        for i in range(0, len(averaging), _TOGETHER)
-    ]
-    gathered = np.concatenate(parts).reshape(len(averaging), -1)
-    return panels.log_tangent.ravel(), gathered
+    if times > 1:
+        log_tangent, weight = panel_weights(averaging)
+        panels = Panels.of(log_tangent, times * _PANEL)
+        gathered = panels.gathered(weight)
+    else:
+        frequency, weight = _nodes(max(averaging))
+        panels = Panels.of(np.log(np.tan(np.pi * frequency)))
+        parts = [
+            panels.gathered(2.0 * weight * _gains(averaging[i : i + _TOGETHER], frequency)[0])
+            for i in range(0, len(averaging), _TOGETHER)
+        ]
+        gathered = np.concatenate(parts)
+    return panels.log_tangent.ravel(), gathered.reshape(len(averaging), -1)
 
 
 _TOGETHER = 16

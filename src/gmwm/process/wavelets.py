@@ -190,5 +190,5 @@ def _odd_polynomial(scaling: FloatArray, order: int) -> FloatArray:
     basis = np.polynomial.chebyshev.chebvander(1.0 - 2.0 * y, degree)[:, 1::2]
     basis *= ((y * (1.0 - y)) ** order)[:, None]
     result = np.zeros(degree + 1)
-    result[1::2] = np.linalg.lstsq(basis, excess)[0]
+    result[1::2] = np.linalg.lstsq(basis, excess, rcond=None)[0]
     return result

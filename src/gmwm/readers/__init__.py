@@ -20,6 +20,7 @@ from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
 from gmwm.readers.reader import read
 from gmwm.readers.recording import READING, Channel, Recording
 from gmwm.readers.table import label
+from gmwm.readers.text_file import content_size
 
 __all__ = [
     "AUXILIARY",
@@ -33,6 +34,7 @@ __all__ = [
     "TurningGravity",
     "bare",
     "block_means",
+    "content_size",
     "is_frame",
     "is_text",
     "label",

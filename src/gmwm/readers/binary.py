@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.table import usable
+from gmwm.readers.table import LARGEST, usable
 
 
 @dataclass(frozen=True)
@@ -175,28 +175,51 @@ class BinaryTable:
         memory.require(tuning.BYTES_PER_SAMPLE * self.count * (len(columns) + 1), self.source)
         found = {column: np.empty(self.count) for column in {0, *columns}}
         for start in range(0, self.count, tuning.RECORDS_AT_ONCE):
-            block = self._read(start, tuning.RECORDS_AT_ONCE)[: self.count - start]
-            for column, values in found.items():
-                part = block["time"] if column == 0 else block["values"][:, column - 1]
-                values[start : start + part.size] = part
-        for values in found.values():
+            for column, values in self._columns(
+                start, tuning.RECORDS_AT_ONCE, tuple(found)
+            ).items():
+                found[column][start : start + values.size] = values
+        interval = self._interval(found[0])
+        return {column: self._scaled(column, found[column], interval) for column in columns}
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` at a time; the interval of increments is that of the first."""
+        interval = 0.0
+        for start in range(0, self.count, rows):
+            found = self._columns(start, rows, tuple({0, *columns}))
+            interval = interval or self._interval(found[0])
+            yield {column: self._scaled(column, found[column], interval) for column in columns}
+
+    def _columns(self, start: int, rows: int, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Numbers of some records as they are."""
+        block = self._read(start, rows)[: self.count - start]
+        found = {0: block["time"]} | {i: block["values"][:, i - 1] for i in columns if i}
+        result = {column: found[column].astype(float) for column in columns}
+        for values in result.values():
             if not usable(values):
-                row = int(np.flatnonzero(~(np.abs(values) < np.inf))[0])
+                row = int(np.flatnonzero(np.abs(values) >= LARGEST)[0])
                 raise InputError(
-                    f"{self.source}, {self.where(row)}: {values[row]} is not a usable number: "
-                    "check the layout"
+                    f"{self.source}, {self.where(start + row)}: {values[row]} is not a usable "
+                    "number: check the layout"
                 )
-        scale = 1.0
-        if self.layout.increments:
-            steps = np.diff(found[0])
-            usual = float(np.median(steps))
+        return result
+
+    def _interval(self, times: FloatArray) -> float:
+        """Seconds between records that follow each other; 1 where numbers are rates."""
+        if not self.layout.increments:
+            return 1.0
+        steps = np.diff(times)
+        usual = float(np.median(steps))
+        with np.errstate(all="ignore"):
             near = steps[np.abs(steps / usual - 1.0) < 0.5]
-            scale = 1.0 / float(np.mean(near))
-        for column in columns:
-            if column:
-                unit = self.layout.gyro if column <= 3 else self.layout.accel
-                found[column] *= unit * scale
-        return {column: found[column] for column in columns}
+        if not (near.size and usual > 0.0):
+            raise InputError(f"{self.source}: its times do not advance: check the layout", "layout")
+        return float(np.mean(near))
+
+    def _scaled(self, column: int, values: FloatArray, interval: float) -> FloatArray:
+        if not column:
+            return values
+        return values * ((self.layout.gyro if column <= 3 else self.layout.accel) / interval)
 
     def where(self, row: int) -> str:
         """Say which record."""

@@ -227,7 +227,7 @@ def _parse_with_arrow(
     except pyarrow.ArrowInvalid:
         return None
     found: list[FloatArray] = [
-        _since_1970(table.column(name)) if i in layout.dates else table.column(name).to_numpy()
+        _since_1970(table.column(name)) if i in layout.dates else _numbers(table.column(name))
         for i, name in zip(columns, wanted, strict=True)
     ]
     return found if all(map(usable, found)) else None
@@ -240,6 +240,20 @@ def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:
     if has_zone is None:
         return pyarrow.float64()
     return pyarrow.timestamp("ns", tz="UTC" if has_zone else None)
+
+
+def _numbers(column: pyarrow.ChunkedArray) -> FloatArray:
+    """NaN where one is missing; Arrow's own way imports pandas."""
+    parts = []
+    for chunk in column.chunks:
+        valid, data = chunk.buffers()
+        part = np.frombuffer(data, np.float64)[chunk.offset : chunk.offset + len(chunk)]
+        if chunk.null_count:
+            is_there = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
+            is_there = is_there[chunk.offset : chunk.offset + len(chunk)]
+            part = np.where(is_there, part, np.nan)
+        parts.append(part)
+    return np.concatenate(parts)
 
 
 def _since_1970(column: pyarrow.ChunkedArray) -> FloatArray:

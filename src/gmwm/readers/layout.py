@@ -13,7 +13,7 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, date_columns, number, split_header, split_line
 from gmwm.readers.names import meaning, of_dates
-from gmwm.readers.table import FORMATS
+from gmwm.readers.table import READABLE
 
 _COMMENT_MARKS = ("#", "%", "//")
 _BLACKBOX = re.compile(rb'"?Product"?\s*,\s*"?Blackbox')
@@ -95,7 +95,7 @@ def find_layout(source: str, head: bytes) -> Layout:
     sample = [line.text for line in following or lines]
     delimiter = _delimiter(sample)
     if delimiter is None and following:
-        raise InputError(f"{source} holds no numbers in its first lines: {FORMATS}")
+        raise InputError(f"{source} holds no numbers in its first lines: {READABLE}")
     if delimiter is None:
         raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
     decimal = _decimal(sample, delimiter)
@@ -150,7 +150,7 @@ def _check_is_text(source: str, head: bytes) -> None:
     if head.startswith(_UTF16_MARKS):
         raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
     if b"\0" in head:
-        raise InputError(f"{source} is not a text file: {FORMATS}, export it as one of these")
+        raise InputError(f"{source} is not a text file: {READABLE}, export it as one of these")
 
 
 def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
@@ -194,7 +194,7 @@ def _check_utf8(source: str, line: int, raw: bytes) -> None:
     except UnicodeDecodeError as error:
         raise InputError(
             f"{source}, line {line}: byte {raw[error.start]:#04x} is not UTF-8 text: save the "
-            f"file as UTF-8; {FORMATS}"
+            f"file as UTF-8; {READABLE}"
         ) from error
 
 

@@ -109,15 +109,24 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    topics = (topic,) if isinstance(topic, str) else tuple(topic)
-    if layout is not None and format is not None:
-        raise InputError("layout is of a binary file without a header: leave out format")
-    tables = (
-        open_tables(path, topics, clock, format)
-        if layout is None
-        else [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
-    )
+    tables = tables_of(path, layout, topic, clock, format)
     return _read(tables, rate, units or {}, channels, time)
+
+
+def tables_of(
+    path: str | os.PathLike[str] | Any,
+    layout: str | None,
+    topic: str | Sequence[str],
+    clock: str,
+    format: str | None,
+) -> Sequence[Table]:
+    """What `read` opens; the arguments are its own."""
+    if layout is None:
+        topics = (topic,) if isinstance(topic, str) else tuple(topic)
+        return open_tables(path, topics, clock, format)
+    if format is not None:
+        raise InputError("layout is of a binary file without a header: leave out format")
+    return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
 
 
 def _read(
@@ -178,6 +187,7 @@ def _part(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
+    arrays = {column.index: arrays[column.index] for column in auxiliary}
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     recording = replace(

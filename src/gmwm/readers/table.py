@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 
-FORMATS = (
+READABLE = (
     "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ, ROS bags, PX4 and "
     "ArduPilot logs, MAT, HDF5, Parquet and Feather"
 )

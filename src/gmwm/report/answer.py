@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.estimate import Fit
+from gmwm.export import Triad
 from gmwm.report.numbers import SHOWN, Certified
 from gmwm.report.text import duration_text, short
 
@@ -158,24 +159,19 @@ def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str,
         return None
     unit = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}[letter]
     text = quantity_text(getattr(certified.axes[name], letter), unit, fit)
-    sign = "≤ " if certified.is_upper(name, letter) else ""
+    sign = "≤ " if letter in certified.axes[name].upper else ""
     return {key: sign + each for key, each in text.items()}
 
 
 def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
-    rows = []
-    for name, each in certified.axes.items():
-        fit = calibration[name]
-        nees = each.nees.get(certified.horizon, float("nan"))
-        rows.append(
-            {
-                "name": name,
-                "N": _number(certified, name, "N", fit),
-                "K": _number(certified, name, "K", fit),
-                "start": quantity_text(each.initial_sd, "u", fit),
-                "nees": f"{nees:.2g}" if np.isfinite(nees) else "not predicted",
-            }
-        )
+    rows = [_shared(triad, certified.horizon, calibration) for triad in certified.triads]
+    for name, fit in calibration.items():
+        if name in certified.axes:
+            each = certified.axes[name]
+            row = {letter: _number(certified, name, letter, fit) for letter in "NK"}
+            start = quantity_text(each.initial_sd, "u", fit)
+            nees = _consistency([each.nees], certified.horizon)
+            rows.append({"name": name, **row, "start": start, "nees": nees})
     return {
         "horizon": f"{certified.horizon:g}",
         "shown": certified.horizon == SHOWN,
@@ -184,6 +180,26 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         "problem": certified.problem,
         "notes": certified.notes,
     }
+
+
+def _shared(triad: Triad, horizon: float, calibration: Calibration) -> dict[str, Any]:
+    """A row of what files hold that have one value for the axes of a sensor."""
+    fit = calibration[triad.axes[0].name]
+    values = {"N": (triad.N, "u/sqrt(Hz)"), "K": (triad.K, "u/s/sqrt(Hz)")}
+    row: dict[str, Any] = {"name": f"{triad.quantity}, shared"}
+    for letter, (value, unit) in values.items():
+        sign = "≤ " if triad.is_upper(letter) else ""
+        row[letter] = {key: sign + each for key, each in quantity_text(value, unit, fit).items()}
+    row["start"] = quantity_text(triad.initial_sd, "u", fit)
+    row["nees"] = _consistency(list((triad.shared_nees or {}).values()), horizon)
+    return row
+
+
+def _consistency(found: Sequence[Mapping[float, float]], time: float) -> str:
+    """NEES of axes at a time: their range."""
+    values = [nees for each in found if np.isfinite(nees := each.get(time, float("nan")))]
+    ends = dict.fromkeys(f"{each:.2g}" for each in (min(values), max(values))) if values else ()
+    return " to ".join(ends) or "not predicted"
 
 
 def known_at(fit: Fit, tau: float) -> float:

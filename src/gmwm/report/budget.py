@@ -112,6 +112,8 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
         )
 
     return (
-        f"A minute without aiding costs {lost(known)} (1 sigma) if the slow errors are known when "
-        f"it begins, and {lost(unknown)} if nothing is known of them."
+        "A minute without aiding from exact attitude, velocity and position costs "
+        f"{lost(known)} (1 sigma) if the slow errors are known when it begins, and "
+        f"{lost(unknown)} if nothing is known of them. After fixes, whose errors are carried on, "
+        "it costs more: gmwm certify."
     )

@@ -58,7 +58,7 @@ def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]
     """
     text = rendered(
         "comparison.html", title=comparison.title, version=gmwm.__version__, c=comparison,
-        summary=str(comparison),
+        summary=str(comparison), errors=svg(comparison.plot()),
     )  # fmt: skip
     with written(path) as stream:
         stream.write(text)

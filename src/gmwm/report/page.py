@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
+from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 def resource(name: str) -> str:
@@ -27,15 +31,23 @@ def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     **values
         Of the template, where ``tojson`` writes figures and ``scripts`` are those above.
     """
+    return (
+        _environment()
+        .get_template(template)
+        .render(policy=_policy(scripts), scripts=scripts, **values)
+    )
+
+
+@cache
+def _environment() -> Environment:
+    """That compiles each template once."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    return environment.get_template(template).render(
-        policy=_policy(scripts), scripts=scripts, **values
-    )
+    return environment
 
 
 def _policy(scripts: Sequence[str]) -> str:

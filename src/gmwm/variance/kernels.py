@@ -20,7 +20,7 @@ _ANY_ORDER = {"reassoc", "contract", "nsz"}
 
 
 @compiled(fastmath=_ANY_ORDER)
-def _sums_and_moments(
+def summed_with_moments(
     out: FloatArray, first: FloatArray, second: FloatArray
 ) -> tuple[float, float]:
     """Of two series the sum; returns the sum and the sum of squares of the difference."""
@@ -34,7 +34,8 @@ def _sums_and_moments(
 
 
 @compiled()
-def _sums(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
+def summed(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
+    """Of two series."""
     for i in range(out.size):
         out[i] = first[i] + second[i]
 
@@ -86,8 +87,8 @@ def fine_moments(
                 break
             following = scratch[level % 2, :count]
             used = min(own, count)
-            total, square = _sums_and_moments(following[:used], now[:used], now[m : m + used])
-            _sums(following[used:], now[used:count], now[m + used : m + count])
+            total, square = summed_with_moments(following[:used], now[:used], now[m : m + used])
+            summed(following[used:], now[used:count], now[m + used : m + count])
             scale = 0.5 / m
             found[level, 0] += used
             found[level, 1] += total * scale

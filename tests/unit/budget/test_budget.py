@@ -239,6 +239,7 @@ def test_the_table_says_what_the_numbers_say(budget):
         assert len(lines) == len(rows) + totals + 1
     assert "attitude [deg]" in text
     assert "values of the slow errors known" in text
+    assert "from\nexact attitude, velocity and position" in text
 
 
 def test_one_term_needs_no_total():

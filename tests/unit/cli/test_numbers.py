@@ -50,6 +50,8 @@ def test_bound_prints_and_saves_what_python_gives(run, calibration, tmp_path):
     expected = gmwm.bound(gmwm.load(calibration), horizon=10.0)
     assert str(expected) in printed
     assert "wrote numbers.json" in printed
+    _, printed, _ = run("bound", calibration, "--horizon", 10, "--units", "si")
+    assert expected.text("si") in printed
     assert gmwm.load(tmp_path / "numbers.json").to_dict() == expected.to_dict()
 
 

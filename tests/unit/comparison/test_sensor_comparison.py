@@ -10,14 +10,15 @@ import pytest
 import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.comparison.compare import _members
+from gmwm.comparison import labelled
+from gmwm.comparison.compare import _labelled, _members
 from gmwm.estimate import estimate
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
 N = 5000
 
 
-def calibration(seed, factor=1.0, rate=100.0, gyro_unit="rad/s", more=()):
+def calibration(seed, factor=1.0, rate=100.0, units=("rad/s", "m/s^2"), more=()):
     """One of a gyro and an accelerometer; ``factor`` multiplies the white noise of the gyro."""
     gyro = WhiteNoise(1e-3 * factor) + RandomWalk(1e-3)
     truths = {"gyro_x": gyro, "accel_x": ACCEL} | dict.fromkeys(more, gyro)
@@ -25,9 +26,12 @@ def calibration(seed, factor=1.0, rate=100.0, gyro_unit="rad/s", more=()):
         key: truth.simulate(N, 1.0 / rate, 10 * seed + i)
         for i, (key, truth) in enumerate(truths.items())
     }
-    if gyro_unit == "deg/s":
+    if units == ("deg/s", "g"):
         data["gyro_x"] = np.degrees(data["gyro_x"])
-    recording = gmwm.Recording.from_arrays(data, rate, {"gyro": gyro_unit, "accel": "m/s^2"})
+        data["accel_x"] = data["accel_x"] / 9.80665
+    recording = gmwm.Recording.from_arrays(
+        data, rate, dict(zip(("gyro", "accel"), units, strict=True))
+    )
     fits = {key: estimate(truths[key].opened(), recording[key]) for key in data}
     return Calibration(fits, {}, f"/data/day{seed}.csv.gz", rate, N)
 
@@ -37,7 +41,7 @@ def three():
     """The second in other units, the third with a larger N; one axis is in the first only."""
     return [
         calibration(1, more=["gyro_y"]),
-        calibration(2, gyro_unit="deg/s"),
+        calibration(2, units=("deg/s", "g")),
         calibration(3, factor=1.25),
     ]
 
@@ -62,6 +66,32 @@ def test_a_changed_axis_differs_and_the_other_agrees(compared):
     assert named.ratios[2] == max(named.ratios)
     assert 0.15 < named.extent < 0.35
     assert "curves-differ" in codes(compared)
+
+
+@pytest.mark.parametrize(
+    ("paths", "labels"),
+    [
+        (["monday/calibration.json", "friday/calibration.json"], ("monday", "friday")),
+        (["/x/u1/day/cal.json", "/x/u2/day/cal.json"], ("u1", "u2")),
+        (["a/1/cal.json", "a/2/cal.json", "b/1/cal.json"], ("a/1", "a/2", "b/1")),
+        (["out/monday.json", "out/friday.json"], ("monday", "friday")),
+        (["calibration.json", "friday/calibration.json"], ("static", "friday")),
+        (["same/calibration.json", "same/calibration.json"], ("static", "static (2)")),
+        (["", ""], ("static", "static (2)")),
+    ],
+)
+def test_recordings_of_one_name_are_distinguished_by_their_paths(three, paths, labels):
+    alike = [replace(each, source="static.csv") for each in [*three, three[0]][: len(paths)]]
+    assert tuple(labelled(alike, paths)) == labels
+    assert tuple(labelled([*alike, three[2]], [*paths, ""])) == (*labels, "day3")
+
+
+def test_files_are_distinguished_by_their_folders(three, tmp_path):
+    paths = []
+    for folder, each in zip(("monday", "friday"), three, strict=False):
+        (tmp_path / folder).mkdir()
+        paths.append(replace(each, source="static.csv").save(tmp_path / folder / "cal.json"))
+    assert tuple(_labelled(paths)) == ("monday", "friday")
 
 
 def test_one_structure_with_its_spread(compared):
@@ -151,3 +181,15 @@ def test_what_is_no_noise_or_missing_is_left_out_and_named(three, compared):
     assert list(fits) == ["a", "c"] and out["b"].code == "channel-skipped"
     fits, out = _members("gyro_x", {"a": three[0], "b": second})
     assert list(fits) == ["a"] and out["b"].values["reason"] == "step"
+
+
+def test_a_calibration_without_its_curve_is_refused_in_one_sentence(three, tmp_path):
+    kept, cut = (
+        each.save(tmp_path / f"{name}.json") for name, each in zip("ab", three[:2], strict=True)
+    )
+    content = json.loads(cut.read_text())
+    del content["channels"]["gyro_x"]["wavelet_variance"]
+    cut.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"b\.json") as refused:
+        gmwm.compare([kept, cut])
+    assert "\n" not in str(refused.value)

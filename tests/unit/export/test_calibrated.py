@@ -1,6 +1,7 @@
 """Files of calibrations: the numbers of `gmwm.bound`, and files that programs can use."""
 
 import json
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import yaml
 
 import gmwm
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
+from gmwm._core.notices import Notice
 from gmwm.export import TARGETS
 from gmwm.process import as_model
 from imu_numbers import numbers
@@ -120,7 +122,7 @@ def line_of(text, key):
 
 
 def block_of(text, key):
-    """The line of a key and the comments under it."""
+    """The line of a key and comments under it."""
     lines = text.splitlines()
     start = lines.index(line_of(text, key))
     end = start + 1
@@ -129,12 +131,9 @@ def block_of(text, key):
     return "\n".join(lines[start:end])
 
 
-def test_each_value_has_its_unit_and_its_axes_beside_it(text, calibration):
+def test_each_value_has_its_unit_beside_it(text):
     for key, unit in UNITS.items():
         assert line_of(text, key).endswith(f"# {unit}")
-        for name in calibration:
-            kind = "gyro" if key.startswith("gyro") else "accel"
-            assert (name in block_of(text, key)) is name.startswith(kind)
     assert "# Hz" in line_of(text, "update_rate")
 
 
@@ -255,13 +254,8 @@ def test_slow_terms_count_as_a_random_walk(slow, horizon):
 
 def test_comments_hold_consistency_and_other_horizons(slow):
     text = gmwm.export(slow, "openvins")
-    found = bound(slow, "N+K", 1.0, shared=True)
     assert "NEES 1 s" in text
     assert "NEES 10 s" in text
-    for name, one in found.items():
-        row = next(line for line in text.splitlines() if line.startswith(f"# {name} "))
-        values = [float(cell) for cell in row.split()[-2:]]
-        assert values == pytest.approx(list(one.nees.values()), rel=5e-3)
     joined = " ".join(line.lstrip("# ") for line in text.splitlines())
     for horizon in (10, 60, 600):
         one = next(iter(bound(slow, "N+K", horizon, shared=True).of("gyro").values()))
@@ -350,8 +344,9 @@ def test_nothing_that_a_filter_divides_by_is_zero():
 def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibration):
     # No stationary process bounds it.
     text = gmwm.export(calibration, "kfgins", horizon=30.0)
-    assert "gyro_x, gyro_y: a random walk, which N+GM cannot bound" in text
-    assert "whose filter has the right errors at the horizon" in text
+    joined = " ".join(line.lstrip("# ") for line in text.splitlines())
+    assert "gyro_x, gyro_y: a random walk, which N+GM cannot bound" in joined
+    assert "whose filter has the right errors at the horizon" in joined
     found = reduce(calibration, "N+GM", [5.0, 15.0, 30.0])
     content = yaml.safe_load(text)["imunoise"]
     arw = np.radians(np.array(content["arw"][:2])) / 60.0
@@ -402,3 +397,69 @@ def test_a_walk_that_is_not_there_has_its_bound_at_every_horizon(calibration):
     walk = float(yaml.safe_load(text)["accelerometer_random_walk"])
     outlook = comments.partition("accel N, K for all axes by horizon:")[2].partition("gyro_x")[0]
     assert outlook.count(f"< {walk:.3e}") == 3
+
+
+# -- what the comments say is true of the file ----------------------------------------------------
+
+
+def rows_of(text, mark="# "):
+    """Cells of the tables in the comments, by the name of the row and its place."""
+    lines = [line.removeprefix(mark).split() or [""] for line in text.splitlines()]
+    return [cells for cells in lines if re.fullmatch(r"shared|(gyro|accel)_\w", cells[0])]
+
+
+def test_shared_numbers_and_those_of_each_axis_have_their_own_consistency(slow):
+    text = gmwm.export(slow, "openvins")
+    own, shared = bound(slow, "N+K", 1.0), bound(slow, "N+K", 1.0, shared=True)
+    found = rows_of(text)
+    names = ["shared", "gyro_x", "gyro_y", "shared", "accel_x", "accel_y"]
+    assert [row[0] for row in found] == names
+    content = yaml.safe_load(text.partition("\n")[2])["imu0"]
+    both = [row for row in found if row[0] == "shared"]
+    for row, sensor in zip(both, ("gyroscope", "accelerometer"), strict=True):
+        N, K = (content[f"{sensor}_{what}"] for what in ("noise_density", "random_walk"))
+        assert [float(cell) for cell in row[1:3]] == pytest.approx([N, K], rel=1e-3)
+    for name, *cells in found:
+        if name != "shared":
+            values = [float(cell) for cell in cells]
+            assert values[:3] == pytest.approx(
+                [own[name].N, own[name].K, own[name].initial_sd], rel=1e-3
+            )
+            # After 1 and 10 s, each with the shared numbers and with its own.
+            pairs = zip(shared[name].nees.values(), own[name].nees.values(), strict=True)
+            assert values[3:] == pytest.approx([v for pair in pairs for v in pair], rel=5e-3)
+    assert "by axis" not in text
+
+
+def test_consistency_is_that_of_the_upper_bound_where_the_file_holds_one(calibration):
+    text = gmwm.export(calibration, "gtsam")
+    squares = text.partition("BiasAccCovariance(np.diag([")[2]
+    walk = np.sqrt(float(squares.split(",")[0]))
+    row = next(row for row in rows_of(text) if row[0] == "accel_x")
+    assert (row[2], float(row[3])) == ("<", pytest.approx(walk, rel=1e-3))
+    # More walk than none is more cautious.
+    without = bound(calibration["accel_x"], "N+K", 1.0).nees.values()
+    assert all(float(cell) < nees for cell, nees in zip(row[-2:], without, strict=True))
+
+
+def test_all_comments_are_at_most_80_columns_wide(slow):
+    lines = gmwm.export(slow, "openvins").splitlines()
+    assert any(line.startswith("# gyro N, K for all axes by horizon") for line in lines)
+    assert max(map(len, lines)) <= 80
+
+
+@pytest.mark.parametrize(
+    ("topics", "expected"),
+    [
+        ((), "/imu0"),
+        (("/imu/data_raw",), "/imu/data_raw"),
+        (("/imu", "/imu"), "/imu"),
+        (("/gyro", "/accel"), "/imu0"),
+        (("/imu: {x}\n",), "/imu0"),
+    ],
+)
+def test_the_topic_is_that_of_the_bag_where_it_is_one(calibration, topics, expected):
+    found = tuple(Notice("topic", "note", "", "", {"topic": name}) for name in topics)
+    text = gmwm.export(replace(calibration, notices=(*calibration.notices, *found)), "kalibr")
+    assert yaml.safe_load(text)["rostopic"] == expected
+    assert ("set to the topic of your bag" in text) is (expected == "/imu0")

@@ -32,6 +32,16 @@ def test_file(name):
     assert values[0] == pytest.approx(values[1], rel=1e-9, abs=1e-30)
 
 
+@pytest.mark.parametrize("name", TARGETS)
+def test_comments_are_at_most_80_columns_wide(name):
+    text = path_of(name).read_text(encoding="utf-8")
+    is_comment = {"<": bool, "{": lambda line: line[:5] == '    "'}.get(
+        text[0], lambda line: line.lstrip().startswith(("#", "//", "%"))
+    )
+    lines = text.partition("-->")[0].splitlines() if text[0] == "<" else text.splitlines()
+    assert [line for line in lines if is_comment(line) and len(line) > 80] == []
+
+
 READ = {
     "kalibr": 1, "openvins": 1, "vins": 1, "orbslam3": 1, "fastlio": 1, "liosam": 1, "kimera": 1,
     "okvis2": 1, "maplab": 1, "px4": 1, "basalt": 3, "gtsam": 3, "gtsam-cpp": 3, "gnss-ins-sim": 3,

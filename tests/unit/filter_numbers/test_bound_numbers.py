@@ -325,7 +325,19 @@ def test_standard_errors_of_shared_axes_and_of_none(fitted):
     assert not gmwm.bound(fitted, level=0.95).stderr
     assert not gmwm.bound(fitted, "N+GM").stderr
     assert FilterNumbers.from_dict(one.to_dict()) == one
-    assert f"+- {one.stderr['K']:.2g}" in str(one)
+    assert f"+- {one.stderr['K']:.2g}" in one.text("si")
+
+
+def test_the_bias_at_switch_on_is_missed_where_none_is_given(fitted):
+    def missed(numbers):
+        return any(notice.code == "turn-on-left-out" for notice in numbers.notices)
+
+    assert missed(gmwm.bound(fitted))
+    assert missed(gmwm.bound({"gyro_x": fitted}))
+    assert not missed(gmwm.bound(fitted, bias_sd=1e-3))
+    # A model is the truth as it is given.
+    assert not missed(gmwm.bound(ONE))
+    assert "switching on" in str(gmwm.bound(fitted, "N+GM"))
 
 
 def test_the_region_reaches_to_the_joint_interval(fitted):

@@ -88,7 +88,7 @@ def test_the_numbers_that_it_recommends_pass(sheet):
         assert check.true < 1.001 * check.believed
         assert check.believed < 1.6 * check.true
     causes = factors(again, "gyro")
-    assert causes["error model, slow terms and all"] == pytest.approx((1.0, 1.0), rel=1e-3)
+    assert causes["error model with slow terms"] == pytest.approx((1.0, 1.0), rel=1e-3)
 
 
 def test_the_truth_passes_exactly():
@@ -135,8 +135,8 @@ def test_relative_poses_are_those_of_a_simulated_filter():
 
 def test_causes_multiply_the_numbers(sheet):
     gyro = factors(sheet, "gyro")
-    assert list(gyro) == ["in use", "error model, slow terms and all"]
-    assert gyro["error model, slow terms and all"][1] > 100.0
+    assert list(gyro) == ["in use", "error model with slow terms"]
+    assert gyro["error model with slow terms"][1] > 100.0
     found = gmwm.certify(
         SENSOR, SHEET, dt=0.1, motion="drone",
         imperfections=Imperfections(
@@ -177,10 +177,21 @@ def test_what_the_navigation_filter_cannot_hold_is_left_out_with_a_notice():
 def test_text_and_files(sheet, tmp_path):
     text = str(sheet)
     for part in (
-        "Without aiding", "INS/GNSS filter", "Relative pose between keyframes", "gyro: what N",
+        "Without aiding", "INS/GNSS filter", "Relative pose between keyframes",
+        "gyro, all axes: what N [deg/sqrt(h)]", "after 120 s of fixes every 1 s",
         "Recommended: N+K for 60 s", "position by tilt [m]", "angle [deg]",
     ):  # fmt: skip
         assert part in text
+    in_use, model = (
+        next(line for line in text.splitlines() if line.startswith(name)).split()[-6:]
+        for name in ("in use", "error model")
+    )
+    cause = sheet.causes[1]
+    assert float(in_use[0]) == pytest.approx(3437.75 * sheet.causes[0].N, rel=1e-3)
+    assert float(model[3]) == pytest.approx(cause.K_factor, rel=1e-2)
+    assert model[4:] == in_use[2:4] == ["1", "1"]
+    assert "gyro, all axes: what N [rad/s/sqrt(Hz)]" in sheet.text("si")
+    assert max(map(len, (text + sheet.text("si")).splitlines())) <= 80
     again = gmwm.load(sheet.save(tmp_path / "certificate.json"))
     assert isinstance(again, Certificate)
     assert again.to_dict() == sheet.to_dict()
@@ -258,6 +269,6 @@ def test_the_demo_sensor_explains_times_ten():
     read_off = {kind: (TABLE_6.models[f"{kind}_x"].params["N"], 1e-7) for kind in ("gyro", "accel")}
     found = gmwm.certify(TABLE_6.models, read_off, dt=0.1)
     for quantity in ("gyro", "accel"):
-        N, K = factors(found, quantity)["error model, slow terms and all"]
+        N, K = factors(found, quantity)["error model with slow terms"]
         assert N > 1.0
         assert K > 50.0

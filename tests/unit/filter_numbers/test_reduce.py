@@ -140,3 +140,14 @@ def test_a_turn_on_bias_is_part_of_the_start():
 def test_what_cannot_be_used(options, message):
     with pytest.raises(InputError, match=message):
         gmwm.reduce(ONE, **options)
+
+
+def test_less_white_noise_than_the_model_has_is_reported():
+    sensor = WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0)
+    found = gmwm.reduce(sensor, "N+GM", outages=(10.0,))
+    notice = next(each for each in found.notices if each.code == "less-white-noise")
+    assert notice.values["share"] == pytest.approx(found.N / 8e-5)
+    assert found.nees[10.0] == pytest.approx(1.0, abs=0.05)
+    walk = gmwm.reduce(sensor, "N+K", outages=(10.0,))
+    assert walk.N > 8e-5
+    assert not any(each.code == "less-white-noise" for each in walk.notices)

@@ -78,6 +78,12 @@ def test_text_names_units_and_every_number():
     lines = str(WALK).splitlines()
     assert lines[0] == "N+K for 60 s, bound"
     assert [line.split() for line in lines[1:4]] == [
+        ["N", "0.3438", "deg/sqrt(h)"],
+        ["K", "61.88", "deg/h/sqrt(h)"],
+        ["initial_sd", "6.188", "deg/h"],
+    ]
+    lines = WALK.text("si").splitlines()
+    assert [line.split() for line in lines[1:4]] == [
         ["N", "0.0001", "rad/s/sqrt(Hz)"],
         ["K", "5e-06", "rad/s/s/sqrt(Hz)"],
         ["initial_sd", "3e-05", "rad/s"],
@@ -87,14 +93,18 @@ def test_text_names_units_and_every_number():
     text = str(SENSOR)
     assert "static.csv: N+K for 60 s, bound" in text
     for part in (
-        "gyro [rad/s, s]",
-        "accel [m/s^2, s]",
+        "deg/sqrt(h) deg/h/sqrt(h)      deg/h",
+        "ug/sqrt(Hz)        ug         s        ug         s         ug",
         "sigma_2",
         "NEES 600 s",
         "0.91",
         "gyro_x: ",
     ):
         assert part in text
+    assert "rad/s/sqrt(Hz) rad/s/s/sqrt(Hz)      rad/s" in SENSOR.text("si")
+    for numbers in (WALK, SENSOR):
+        with pytest.raises(InputError, match="units = 'SI': known are field, si"):
+            numbers.text("SI")
     assert "<pre>" in SENSOR._repr_html_()
     assert repr(SENSOR) == "<SensorNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
 
@@ -105,19 +115,23 @@ def test_columns_stand_under_their_names_where_some_axes_have_no_errors(order):
     text = str(SensorNumbers({name: axes[name] for name in order}))
     starts = ("gyro", "predicted", "none", "known")
     lines = [line for line in text.splitlines() if line.startswith(starts)]
+    assert sum("deg/sqrt(h) deg/h/sqrt(h)" in line for line in text.splitlines()) == 1
     cells = {}
     for head, *rows in (lines[:3], lines[3:6]):
         for name in (n for n in ("N +-", "K +-", "NEES 60 s", "sd 600 s") if n in head):
             end = head.index(name) + len(name)
             for row in rows:
                 cells.setdefault(row.split()[0], []).append(row[:end].split()[-1])
-    assert cells == {"none": ["-", "-", "0.91", "1.4"], "known": ["1e-06", "2e-07", "0.91", "1.4"]}
+    known = ["0.003438", "2.475", "0.91", "1.4"]  # deg/sqrt(h), deg/h/sqrt(h)
+    assert cells == {"none": ["-", "-", "0.91", "1.4"], "known": known}
 
 
 def test_tables_fit_a_terminal():
     known = replace(WALK, stderr={"N": 1.234e-6, "K": 2.345e-7})
     text = str(SensorNumbers({"gyro_x": known, "accel_x": TWO}, "static.csv"))
     assert max(map(len, text.splitlines())) <= 80
+    si = SensorNumbers({"gyro_x": known, "accel_x": TWO}, "static.csv").text("si")
+    assert max(map(len, si.splitlines())) <= 80
     assert text == (GOLDEN / "filter_numbers.txt").read_text()
 
 

@@ -200,6 +200,14 @@ def naive(data: bytes, delimiter: str | None) -> np.ndarray | None:
     return np.array(rows) if all(len(row) == 6 for row in rows) else None
 
 
+def same_but_for(rows, found, named):
+    """Whether all numbers are those of the file, but for so many that a notice takes as missing."""
+    if rows is None or rows.shape != found.shape:
+        return False
+    gone = np.isnan(found) & ~np.isnan(rows)
+    return gone.sum() == named and np.array_equal(found[~gone], rows[~gone], equal_nan=True)
+
+
 @thorough
 @given(data=mutated())
 def test_what_is_accepted_is_what_the_file_says(folder, data):
@@ -212,7 +220,8 @@ def test_what_is_accepted_is_what_the_file_says(folder, data):
         return
     found = np.column_stack([channel.values for channel in outcome.values()])
     said = [naive(data, mark) for mark in (";", "\t", ",", None)]
-    assert any(rows is not None and np.array_equal(found, rows, equal_nan=True) for rows in said)
+    named = sum(each.values["count"] for each in outcome.notices if each.code == "sentinel")
+    assert any(same_but_for(rows, found, named) for rows in said)
 
 
 @thorough

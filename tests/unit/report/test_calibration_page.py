@@ -15,6 +15,7 @@ import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
 from gmwm._core.notices import Notice
 from gmwm.report import write_report
+from gmwm.report.answer import answer
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import page
 from gmwm.report.datasheet import read_datasheet
@@ -24,6 +25,7 @@ from gmwm.report.figure import (
     residual_figure,
     series_figure,
 )
+from gmwm.report.numbers import certified
 from gmwm.report.text import duration_text, needed, number
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -277,7 +279,7 @@ def test_the_notes_of_the_error_budget(parsed, calibration):
 def test_the_headline_of_a_minute(parsed, calibration):
     budgets = [gmwm.error_budget(calibration, [60.0], calibrated=c) for c in (True, False)]
     metres = [budget.total()["position"][0] for budget in budgets]
-    sentence = re.search(r"A minute without aiding costs .*? of them\.", parsed.text).group()
+    sentence = re.search(r"A minute without aiding from exact .*? of them\.", parsed.text).group()
     found = re.findall(r"([\d.,]+) m of horizontal position", sentence)
     assert [float(text.replace(",", "")) for text in found] == pytest.approx(metres, rel=6e-3)
 
@@ -359,6 +361,31 @@ def test_marks_and_the_curve_of_the_filter_are_the_certified_numbers(parsed, cal
     assert float(shown[1].split()[0]) == pytest.approx(numbers.N, rel=5e-3)
     assert float(shown[2].split()[0]) == pytest.approx(numbers.K, rel=5e-3)
     assert float(shown[4]) == pytest.approx(numbers.nees[60.0], rel=0.05)
+
+
+def test_what_is_copied_is_what_is_exported(calibration):
+    inertial = {name: fit for name, fit in calibration.items() if fit.wv.quantity}
+    found = certified(calibration)[60.0]
+    for title, target in (("YAML, Kalibr", "kalibr"), ("Python, GTSAM", "gtsam")):
+        expected = gmwm.export(replace(calibration, fits=inertial), target, horizon=60.0)
+        assert found.texts[title] == expected
+
+
+def test_shared_numbers_stand_beside_those_of_the_axes(calibration):
+    quiet = WhiteNoise(2e-4) + RandomWalk(1e-4)
+    samples = Channel("gyro_y", quiet.simulate(8000, 0.01, 5), 0.01, "gyro", "rad/s")
+    other = gmwm.fit(quiet.opened(), gmwm.wavelet_variance(samples))
+    fits = {"gyro_x": calibration["gyro_x"], "gyro_y": other, "accel_x": calibration["accel_x"]}
+    both = replace(calibration, fits=fits)
+    shared = gmwm.bound(both, horizon=60.0, shared=True)
+    rows = {row["name"]: row for row in answer(both, certified(both))["boxes"][0]["rows"]}
+    first = rows["gyro, shared"]
+    assert float(first["N"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
+    assert float(first["K"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
+    nees = sorted(shared[name].nees[60.0] for name in ("gyro_x", "gyro_y"))
+    assert [float(cell) for cell in first["nees"].split(" to ")] == pytest.approx(nees, rel=0.05)
+    assert nees[0] < 0.5
+    assert float(rows["gyro_y"]["nees"]) == pytest.approx(1.0, rel=0.05)
 
 
 def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):

@@ -167,7 +167,7 @@ def _means(recording: Recording, sensor: str, size: int) -> FloatArray:
     found = [channel.values for channel in _channels(recording, sensor)]
     if not found:
         return np.empty((recording.n // size, 0))
-    return block_means(np.column_stack(found), size)
+    return block_means(found, size)
 
 
 def _smooth(means: FloatArray) -> FloatArray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from itertools import islice
 
 from scipy.stats import chi2
 
@@ -13,7 +15,7 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.problem import weight_root
-from gmwm.estimate.result import Fit
+from gmwm.estimate.result import Fit, Goodness
 from gmwm.process import Model, Process, Shape
 
 
@@ -81,7 +83,7 @@ def with_doubtful_terms(
     fit: Fit,
     redundant: Sequence[tuple[int, Notice]],
     places: Mapping[str, int],
-    without: Callable[[int], Fit | None],
+    without: Callable[[int], Goodness | None],
 ) -> Fit:
     """A fit with the notice of the term that the data can do without, if there is one.
 
@@ -98,19 +100,22 @@ def with_doubtful_terms(
     places : mapping of str to int
         Noise term of each amplitude.
     without : callable
-        The fit without a noise term; None if nothing is left to fit.
+        How well the fit without a noise term describes the data; None if nothing is left to fit.
     """
     present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
     if not redundant and not present:
         return fit
 
+    @lru_cache
     def is_needed(i: int) -> bool:
+        if not fit.goodness.describes_all:
+            return False
         reduced = without(i)
-        return reduced is not None and reduced.goodness.loses_to(fit.goodness)
+        return reduced is not None and reduced.loses_to(fit.goodness)
 
     found = {key for key in present if is_needed(places[key])}
     notices = [n for n in fit.notices if n.code != "amplitude-bound" or n.where not in found]
-    notices += [notice for i, notice in redundant if not is_needed(i)][:1]
+    notices += islice((notice for i, notice in redundant if not is_needed(i)), 1)
     bounds = {key: bound for key, bound in fit.upper_bounds.items() if key not in found}
     return replace(fit, notices=tuple(notices), upper_bounds=bounds)
 

@@ -17,11 +17,12 @@ from gmwm.estimate.moments.checks import (
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import Moments, weight_root
+from gmwm.estimate.problem import FittedMoments, Moments, drift_key, weight_root
 from gmwm.estimate.result import (
     Comparison,
     Estimates,
     Fit,
+    Goodness,
     conclude,
     upper_amplitude,
 )
@@ -38,7 +39,7 @@ def conclude_moments(
     weights: Weights,
     method: str,
     discrepancy: float,
-    without: Callable[[int], Fit | None] | None = None,
+    without: Callable[[int], Goodness | None],
 ) -> Fit:
     """Make the `Fit` of a minimum.
 
@@ -59,8 +60,8 @@ def conclude_moments(
     method : str
     discrepancy : float
         Relative error allowed for at each level, part of ``covariance``.
-    without : callable, optional
-        The fit without a noise term, which shows whether it is needed.
+    without : callable
+        How well the fit without a noise term describes the data: whether it is needed.
     """
     target = moments.target
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
@@ -93,8 +94,6 @@ def conclude_moments(
             *level_notices(target.size, design.n_free),
         ],
     )  # fmt: skip
-    if without is None:
-        return fit
     keys = design.coordinates.fitted(found.processes, None)[1]
     places = {
         key: i
@@ -104,6 +103,19 @@ def conclude_moments(
     judged = replace(point, objective=comparison.objective)
     redundant = redundant_notices(design, judged, target, covariance)
     return with_doubtful_terms(fit, redundant, places, without)
+
+
+def goodness_of(design: Design, moments: Moments, point: Point, discrepancy: float) -> Goodness:
+    """How well a minimum describes the data: what `Fit.goodness` of its fit is."""
+    slope = moments.slope if moments.slope_is_free else None
+    processes = design.fitted_processes(point.x, point.shapes)
+    model, keys = design.coordinates.fitted(processes, None if slope is None else slope.value)
+    error = 0.0
+    if slope is not None:
+        keys.append(str(drift_key(model)))
+        error = float(np.sqrt(slope.variance))
+    at = FittedMoments.of(model, moments.wv, keys, error, discrepancy)
+    return Goodness.of(at, moments.wv, is_tested=True)
 
 
 def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:

@@ -8,9 +8,9 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,16 +18,47 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.moments.conclusion import conclude_moments
+from gmwm.estimate.moments.conclusion import conclude_moments, goodness_of
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.discrepancy import Discrepancy
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.moments.start import DICTIONARY, Reference, dictionary_fit, search
 from gmwm.estimate.moments.weights import WEIGHTS, Weights
-from gmwm.estimate.problem import Moments, Scales, Simulation
-from gmwm.estimate.result import Fit
+from gmwm.estimate.problem import Moments, Scales, Simulation, Slope, is_plain
+from gmwm.estimate.result import Fit, Goodness
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where an estimation ended, without the series: kept with it, this must not keep it.
+
+    Attributes
+    ----------
+    design : Design
+    slope : Slope or None
+        Drift removed from the wavelet variances.
+    covariance, statistical, point, basis
+        As of `State`.
+    discrepancy : float
+    """
+
+    design: Design
+    slope: Slope | None
+    covariance: FloatArray
+    statistical: FloatArray
+    point: Point
+    basis: FloatArray
+    discrepancy: float
+
+    def moments(self, wv: WaveletVariance) -> Moments:
+        """What was fitted."""
+        return replace(Moments.of(wv, self.design.model, self.design.scales), slope=self.slope)
+
+
+_ends: WeakKeyDictionary[WaveletVariance, dict[tuple[GMWM, Model], End]] = WeakKeyDictionary()
+"""A selection and the tests of its terms ask for the same model again."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +101,30 @@ class GMWM:
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Fit the open parameters of a model to wavelet variances."""
 
-        def without(i: int) -> Fit | None:
+        def without(i: int) -> Goodness | None:
             noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
             left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
             if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
                 return None
-            return self._estimate(Model(left), wv)
+            found = self._ended(Model(left), wv)
+            return goodness_of(found.design, found.moments(wv), found.point, found.discrepancy)
 
-        return self._estimate(model, wv, without)
+        found = self._ended(model, wv)
+        return conclude_moments(
+            found.design, found.moments(wv), found.covariance, found.statistical, found.point,
+            found.basis, Weights.of(self.weights, wv), self.name, found.discrepancy, without,
+        )  # fmt: skip
 
-    def _estimate(
-        self, model: Model, wv: WaveletVariance, without: Callable[[int], Fit | None] | None = None
-    ) -> Fit:
-        """The fit; doubtful terms are judged if it is known what is left without them."""
+    def _ended(self, model: Model, wv: WaveletVariance) -> End:
+        """Where the estimation ends; searched once for each model and series."""
+        if not all(is_plain(term) for term in model.terms):
+            return self._searched(model, wv)
+        known, key = _ends.setdefault(wv, {}), (self, model)
+        if key not in known:
+            known[key] = self._searched(model, wv)
+        return known[key]
+
+    def _searched(self, model: Model, wv: WaveletVariance) -> End:
         weights = Weights.of(self.weights, wv)
         scales = self.scales(wv)
         design = Design(model, scales)
@@ -107,9 +149,9 @@ class GMWM:
                 break
         if settled is None:
             settled = _under_reference(design, state, level, weights, extra)
-        return conclude_moments(
-            design, settled.moments, settled.covariance, settled.statistical, settled.point,
-            settled.basis, weights, self.name, level.value, without,
+        return End(
+            design, settled.moments.slope, settled.covariance, settled.statistical, settled.point,
+            settled.basis, level.value,
         )  # fmt: skip
 
 

@@ -15,11 +15,13 @@ import numpy as np
 from scipy.optimize import leastsq
 
 from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments.design import Design
+from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.profile_kernels import profiled, projected
+from gmwm.estimate.moments.refinement_kernels import refined
 from gmwm.process import Shape
 
 _MAX_EVALUATIONS = 200
+_TOLERANCES = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-9}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,34 @@ class Profile:
         z0 = design.pack(start.shapes)
         if z0.size == 0:
             return self.at(start.shapes)
+        if z0.size > self.target.size:
+            return self.at(start.shapes)
+        point = self._compiled(z0, start) or self._stepwise(z0, start)
+        return point if point.objective <= start.objective else start
+
+    def _compiled(self, z0: FloatArray, start: Point) -> Point | None:
+        """The local minimum, if all curves are known in compiled form."""
+        design = self.design
+        compiled = design.compiled
+        if compiled is None:
+            return None
+        shapes = np.zeros((len(design.shaped), MOST_SHAPES))
+        for row, i in zip(shapes, design.shaped, strict=True):
+            row[: len(start.shapes[i])] = start.shapes[i]
+        fixed = np.zeros((self.target.size, len(design.terms)))
+        for i, term in enumerate(design.terms):
+            if not term.n_shapes:
+                fixed[:, i] = design.curve(i, start.shapes[i])
+        weighted = (self.root, self._linear, self._given, compiled.amplitudes, self.target)
+        found, z, x, objective = refined(
+            z0, design.bounds, compiled.terms, shapes, fixed, compiled.levels, weighted,
+            (*_TOLERANCES.values(), _MAX_EVALUATIONS),
+        )  # fmt: skip
+        return Point(design.unpack(z, start.shapes), x, objective) if found else None
+
+    def _stepwise(self, z0: FloatArray, start: Point) -> Point:
+        """The same for curves of any process."""
+        design = self.design
         low, high = design.bounds
         template = start.shapes
         owners = design.owners()
@@ -113,11 +143,7 @@ class Profile:
             slopes, factor = design.shape_derivatives(shapes), design.amplitudes(x)[owners]
             return np.asarray(projected(self.root, columns, x, slopes, factor))
 
-        if z0.size > self.target.size:
-            return self.at(start.shapes)
         found = leastsq(
-            residual, z0, Dfun=jacobian, xtol=1e-7, ftol=1e-9, gtol=1e-9,
-            maxfev=_MAX_EVALUATIONS, full_output=True,
-        )[0]  # fmt: skip
-        point = self.at(design.unpack(np.clip(found, low, high), template))
-        return point if point.objective <= start.objective else start
+            residual, z0, Dfun=jacobian, maxfev=_MAX_EVALUATIONS, full_output=True, **_TOLERANCES
+        )[0]
+        return self.at(design.unpack(np.clip(found, low, high), template))

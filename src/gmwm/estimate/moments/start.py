@@ -17,6 +17,7 @@ from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.problem import (
     Scales,
+    is_plain,
     objectives_with,
     solve_nonnegative,
     weight_root,
@@ -163,7 +164,17 @@ def dictionary_fit(
     ``extra`` together follow almost any wavelet variance. Their fit is a spectrum close enough for
     first weights, whatever model is to be fitted, and what it cannot follow no such model can.
     """
-    design, atoms, matrix = dictionary(Scales.of(wv), extra)
+    kinds = _kinds(extra)
+    if not all(is_plain(kind) for kind in kinds):
+        return _mixture(wv, target, kinds)
+    known, key = _references.setdefault(wv, {}), (kinds, target.tobytes())
+    if key not in known:
+        known[key] = _mixture(wv, target, kinds)
+    return known[key]
+
+
+def _mixture(wv: WaveletVariance, target: FloatArray, kinds: tuple[Process, ...]) -> Reference:
+    design, atoms, matrix = _dictionary(Scales.of(wv), kinds)
     covariance, discrepancy = wv.covariance, 0.0
     for _ in range(tuning.REWEIGHTINGS):
         discrepancy = _needed(matrix, target, covariance)

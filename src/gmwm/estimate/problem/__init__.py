@@ -4,6 +4,7 @@ from gmwm.estimate.problem.information import (
     density,
     error_growth,
     frequency_nodes,
+    information_with,
     slope_dof,
     spectral_information,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "frequency_nodes",
     "gls_slope",
     "in_model_order",
+    "information_with",
     "is_plain",
     "keys_by_term",
     "objectives_with",

@@ -9,10 +9,12 @@ samples on; with 1/(2 n dt) a walk that is just seen loses a third.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
+from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
@@ -24,6 +26,7 @@ _NODES = 8
 _SINGULAR = 1e10
 
 
+@lru_cache(maxsize=16)
 def frequency_nodes(n: int, dt: float) -> tuple[FloatArray, FloatArray]:
     """Gauss-Legendre nodes (Hz) from 1/(4 n dt) to 1/(2 dt), and their weights times n dt."""
     octaves = np.log2(n * 0.5 / tuning.LOWEST_FREQUENCY)
@@ -34,7 +37,7 @@ def frequency_nodes(n: int, dt: float) -> tuple[FloatArray, FloatArray]:
     middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
     frequency = 0.5 * np.exp2((middle + half * x).ravel())
     weight = (half * w).ravel() * np.log(2.0) * frequency
-    return frequency / dt, n * weight
+    return frozen(frequency / dt), frozen(n * weight)
 
 
 def density(processes: Sequence[Process], f: FloatArray, dt: float) -> FloatArray:
@@ -45,24 +48,32 @@ def density(processes: Sequence[Process], f: FloatArray, dt: float) -> FloatArra
     return total
 
 
-def log_slopes(
+def slopes(
     coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
-) -> FloatArray:
-    """Slopes d log S / d z at ``f`` (Hz), shape (len(f), d)."""
+) -> tuple[FloatArray, FloatArray]:
+    """Spectrum of each process at ``f`` (Hz), (terms, len(f)), and slopes dS / d z, (d, len(f))."""
+    own = np.array([evaluated(process.psd, f, dt) for process in processes])
+    rows = np.empty((len(coordinates.owners), f.size))
     z = coordinates.pack(processes)
-    total = density(processes, f, dt)
-    columns = []
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
         if is_amplitude:
-            columns.append(processes[i].psd(f, dt) / total)
+            rows[k] = own[i]
             continue
         pair = []
         for step in (_STEP, -_STEP):
             moved = z.copy()
             moved[k] += step
-            pair.append(coordinates.processes(moved, processes)[i].psd(f, dt))
-        columns.append((pair[0] - pair[1]) / (2.0 * _STEP) / total)
-    return np.reshape(columns, (len(columns), f.size)).T
+            pair.append(coordinates.process(i, moved, processes[i]).psd(f, dt))
+        rows[k] = (pair[0] - pair[1]) / (2.0 * _STEP)
+    return own, rows
+
+
+def log_slopes(
+    coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
+) -> FloatArray:
+    """Slopes d log S / d z at ``f`` (Hz), shape (len(f), d)."""
+    own, rows = slopes(coordinates, processes, f, dt)
+    return (rows / np.sum(own, axis=0)).T
 
 
 def spectral_information(
@@ -70,8 +81,30 @@ def spectral_information(
 ) -> FloatArray:
     """Expected information of z, (d, d)."""
     f, weight = frequency_nodes(n, dt)
-    slopes = log_slopes(coordinates, processes, f, dt)
-    return np.asarray(slopes.T @ (weight[:, None] * slopes))
+    scaled = log_slopes(coordinates, processes, f, dt)
+    return np.asarray(scaled.T @ (weight[:, None] * scaled))
+
+
+def information_with(
+    coordinates: Coordinates, processes: Sequence[Process], term: int, n: int, dt: float
+) -> Callable[[float], FloatArray]:
+    """Expected information as a function of the amplitude of one term, of positive amplitude.
+
+    The spectrum and the slopes of a term are proportional to its amplitude.
+    """
+    f, weight = frequency_nodes(n, dt)
+    own, rows = slopes(coordinates, processes, f, dt)
+    others = np.sum(np.delete(own, term, axis=0), axis=0)
+    linear = coordinates.terms[term].linear
+    now = float(processes[term].values[linear.name] or 0.0) ** linear.power
+    mine = np.array([i == term for i, _ in coordinates.owners])[:, None]
+
+    def information(amplitude: float) -> FloatArray:
+        times = amplitude / now
+        scaled = np.where(mine, times * rows, rows) / (others + times * own[term])
+        return np.asarray((weight * scaled) @ scaled.T)
+
+    return information
 
 
 def slope_dof(

@@ -7,7 +7,7 @@ each process maps them. Rate ramps take no part: they are regressors.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -159,18 +159,22 @@ class Coordinates:
         InputError
             Where a parameter is out of range.
         """
-        result = []
-        with np.errstate(over="ignore"):
-            for term, process, (scale, shape) in zip(self.terms, like, self._split(z), strict=True):
-                changes: dict[str, float] = {}
-                if scale.size:
-                    changes[term.linear.name] = float(np.exp(scale[0] / term.linear.power))
-                if shape.size:
-                    found = term.moved(shape_of(process), shape)
-                    named = zip(process.shape_parameters, found, term.free_shape, strict=True)
-                    changes.update({p.name: value for p, value, is_free in named if is_free})
-                result.append(process.with_values(**changes))
-        return tuple(result)
+        return tuple([self.process(i, z, process) for i, process in enumerate(like)])
+
+    def process(self, i: int, z: FloatArray, like: Process) -> Process:
+        """Term ``i`` at ``z``, as in `processes`."""
+        term, (scale, shape) = self.terms[i], self._places[i]
+        changes: dict[str, float] = {}
+        if term.free_scale:
+            with np.errstate(over="ignore"):
+                value = np.exp(z[scale] / term.linear.power)
+            changes[term.linear.name] = float(value[0])
+        if term.n_shapes:
+            with np.errstate(over="ignore"):
+                found = term.moved(shape_of(like), z[shape])
+            named = zip(like.shape_parameters, found, term.free_shape, strict=True)
+            changes.update({p.name: value for p, value, is_free in named if is_free})
+        return like.with_values(**changes)
 
     def jacobian(self, processes: Sequence[Process]) -> FloatArray:
         """Derivative of the parameters by z at these values, (d, d), block diagonal."""
@@ -219,14 +223,16 @@ class Coordinates:
             by_term[moved[id(terms[self.terms[i].place])], name] for i, name in self.names
         ]
 
-    def _split(self, z: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    @cached_property
+    def _places(self) -> list[tuple[slice, slice]]:
         """Coordinates of the amplitude (none or one) and of the shape, term by term."""
-        start = 0
+        start, places = 0, []
         for term in self.terms:
             middle = start + int(term.free_scale)
             end = middle + term.n_shapes
-            yield z[start:middle], z[middle:end]
+            places.append((slice(start, middle), slice(middle, end)))
             start = end
+        return places
 
 
 def keys_by_term(model: Model) -> Mapping[tuple[int, str], str]:

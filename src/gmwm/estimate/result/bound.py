@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2, norm
+from scipy.special import gammaincinv, ndtr, ndtri
 
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import Coordinates, Scales, spectral_information
+from gmwm.estimate.problem import Coordinates, Scales, information_with
 from gmwm.process import Process
 from gmwm.variance import WaveletVariance
 
@@ -19,8 +19,8 @@ _NEGLIGIBLE = 1e-3  # of that bound: an amplitude that changes no standard error
 
 def quantile_above_zero(centre: float, deviation: float) -> float:
     """95 % quantile of N(centre, deviation^2) restricted to positive values."""
-    tail = norm.sf(-centre / deviation) * (1.0 - tuning.UPPER_LEVEL)
-    return centre + deviation * float(norm.isf(tail))
+    tail = ndtr(centre / deviation) * (1.0 - tuning.UPPER_LEVEL)
+    return centre - deviation * float(ndtri(tail))
 
 
 def upper_amplitude(
@@ -67,14 +67,16 @@ def upper_amplitude(
     kept = [k for k, (i, is_amplitude) in enumerate(owners) if i != term or is_amplitude]
     place = kept.index(owners.index((term, True)))
 
+    present = [p.with_amplitude(plain) if i == term else p for i, p in enumerate(processes)]
+    information_at = information_with(coordinates, present, term, wv.n, wv.dt)
+
     def error(amplitude: float) -> float:
         """Standard error of the amplitude where it is the true one, at the present shape."""
-        raised = list(processes)
-        raised[term] = raised[term].with_amplitude(amplitude)
-        information = spectral_information(coordinates, raised, wv.n, wv.dt)[np.ix_(kept, kept)]
+        information = information_at(amplitude)[np.ix_(kept, kept)]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
-        return float(amplitude * scale[place] * np.sqrt(inverse[place, place]))
+        variance = inverse[place, place]
+        return float(amplitude * scale[place] * np.sqrt(variance)) if variance > 0.0 else np.nan
 
     vanishing, there = (error(max(value, _NEGLIGIBLE * plain)) for value in (0.0, at))
     if not (np.isfinite(vanishing * there) and vanishing > 0.0 and there > 0.0):
@@ -89,8 +91,8 @@ def upper_amplitude(
         below = 0.0
         if growth > 0.0:
             dof = 2.0 / growth
-            below = 1.0 - float(chi2.ppf(1.0 - tuning.UPPER_LEVEL, dof)) / dof
-        spread = np.hypot(least, amplitude * below / norm.ppf(tuning.UPPER_LEVEL))
+            below = 1.0 - 2.0 * float(gammaincinv(0.5 * dof, 1.0 - tuning.UPPER_LEVEL)) / dof
+        spread = np.hypot(least, amplitude * below / ndtri(tuning.UPPER_LEVEL))
         return amplitude - quantile_above_zero(centre, float(spread))
 
     # Terms that stand in for each other leave their amplitudes open, but not beyond the data.
@@ -105,5 +107,7 @@ def _whole(process: Process, wv: WaveletVariance) -> float:
     """95 % upper bound of an amplitude to which every level is due, whichever has the least."""
     alone = Scales.of(wv).curve(process.with_amplitude(1.0))
     tail = (1.0 - tuning.UPPER_LEVEL) / wv.tau.size
-    upper = wv.dof * wv.variance / np.maximum(chi2.ppf(tail, wv.dof), _LEAST_QUANTILE)
+    upper = (
+        wv.dof * wv.variance / np.maximum(2.0 * gammaincinv(0.5 * wv.dof, tail), _LEAST_QUANTILE)
+    )
     return float(np.min(upper[alone > 0.0] / alone[alone > 0.0], initial=np.inf))

@@ -168,7 +168,12 @@ class Goodness:
 
         The sum over all levels may tie all the same.
         """
-        return self.misses_a_level and larger.largest_p >= tuning.REDUNDANT_P
+        return self.misses_a_level and larger.describes_all
+
+    @property
+    def describes_all(self) -> bool:
+        """Whether the model is seen to miss no level, to one in a hundred."""
+        return self.largest_p >= tuning.REDUNDANT_P
 
     @property
     def sentence(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import norm, t
@@ -25,6 +25,9 @@ from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
 from gmwm.ins.montecarlo import InnovationTest, Ratio, mean_ratio
 from gmwm.ins.spec import read_models
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PARTS = {"horizontal": (0, 1), "vertical": (2,)}
 
@@ -224,6 +227,24 @@ class Comparison:
             "verdict": self.verdict.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
         }  # fmt: skip
+
+    def plot(self) -> Figure:
+        """Errors at the end of each outage, and their ratios with intervals."""
+        from gmwm import plotting
+
+        first, *others = self.outcomes
+        panels = {
+            f"{part} [m]": {
+                name: (np.linalg.norm(each.error[:, axes], axis=1), each.predicted[part])
+                for name, each in self.outcomes.items()
+            }
+            for part, axes in _PARTS.items()
+        }
+        pairs = {f"{name} / {first}": self.pairs[name, first] for name in others}
+        ratios = {what: (pair.ratio, pair.lower, pair.upper) for what, pair in pairs.items()}
+        return plotting.outages_compared(
+            np.array([each.end for each in self.outages]), panels, ratios
+        )
 
     def __str__(self) -> str:
         first, *others = self.outcomes

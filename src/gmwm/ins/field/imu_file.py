@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,13 +11,22 @@ from typing import Literal
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.spool import ROWS, Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
-from gmwm.readers import Recording, bare, is_text, read
+from gmwm.readers import (
+    Recording,
+    bare,
+    content_size,
+    is_text,
+    notices_of_blocks,
+    read,
+    read_blocks,
+)
 
 Columns = Mapping[str, str | int] | None
 
@@ -99,31 +108,105 @@ def read_imu_log(
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
     columns, turned = _signs(channels)
-    recording = read(path, rate, units, columns, time, layout, format=format)
+    is_log = layout is None and (is_text(Path(path)) if format is None else format == "text")
+    parts: Iterator[Recording]
+    if is_log and content_size(Path(path)) > tuning.READ_AT_ONCE:
+        parts = read_blocks(path, rate, units, columns, time, rows=ROWS)
+    else:
+        parts = iter((read(path, rate, units, columns, time, layout, format=format),))
+    record = _Record.of(parts, turned)
+    clock = _clock(Path(path), record, time if is_log else False, start)
+    filled = _fill(record)
+    mean = record.mean()
+    force = float(np.linalg.norm(mean))
+    least, most = tuning.SPECIFIC_FORCE
+    if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
+        raise InputError(
+            f"{record.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
+            "check the unit of the accelerometers, and that gravity is not subtracted"
+        )
+    imu = record.imu(clock.dt)
+    notices = (*clock.notices, *filled)
+    if mean[2] > 0.0:
+        text = "its mean is positive: the axis points up, and roll is near 180 deg"
+        notices = (*notices, Notice("axis-up", "warning", "accel_z", text))
+    return ImuLog(imu, clock.start, record.source, (*record.notices, *notices))
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """Samples, (n, 3) each, rad/s and m/s^2, NaN where missing; on disk if there are many."""
+
+    rate: FloatArray
+    force: FloatArray
+    dt: float
+    source: str
+    notices: tuple[Notice, ...]
+
+    n = property(lambda self: len(self.rate))
+
+    @classmethod
+    def of(cls, parts: Iterator[Recording], turned: frozenset[str]) -> _Record:
+        """All parts, one after the other; ``turned`` channels with the opposite sign."""
+        sign = np.array([-1.0 if axis in turned else 1.0 for axis in AXES])
+        first = _checked(next(parts))
+        samples = _samples(first, sign)
+        missing = {name: first[name].missing for name in AXES}
+        spools: tuple[Spool, Spool] | None = None
+        for part in parts:
+            if spools is None:
+                spools = Spool(3), Spool(3)
+                _append(spools, samples)
+            _append(spools, _samples(_checked(part), sign))
+            missing = {name: count + part[name].missing for name, count in missing.items()}
+        if spools is None:
+            return cls(
+                np.ascontiguousarray(samples[:, :3]), np.ascontiguousarray(samples[:, 3:]),
+                first.dt, first.source, first.notices,
+            )  # fmt: skip
+        notices = notices_of_blocks(first, missing, spools[0].n)
+        return cls(spools[0].array(), spools[1].array(), first.dt, first.source, notices)
+
+    def column(self, name: str) -> FloatArray:
+        """Samples of an axis, to be changed in place."""
+        axis = AXES.index(name)
+        return np.asarray((self.rate if axis < 3 else self.force)[:, axis % 3])
+
+    def mean(self) -> FloatArray:
+        """Mean specific force, (3,)."""
+        total = np.zeros(3)
+        for part in windows(self.n):
+            total += np.sum(self.force[part], axis=0)
+            release(self.force)
+        return total / self.n
+
+    def imu(self, dt: float) -> Imu:
+        """As increments; the samples become those."""
+        for each in (self.rate, self.force):
+            for part in windows(self.n):
+                each[part] *= dt
+                release(each)
+        return Imu(dt, self.rate, self.force)
+
+
+def _checked(recording: Recording) -> Recording:
+    """A recording of all axes at one rate."""
     recording = recording.of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
             f"{recording.source}: there is no channel {missing[0]}: an IMU has {', '.join(AXES)}"
         )
-    samples = np.column_stack([recording[axis].values for axis in AXES])
-    samples[:, [axis in turned for axis in AXES]] *= -1.0
-    filled = _fill(samples, recording)
-    force = float(np.linalg.norm(np.mean(samples[:, 3:], axis=0)))
-    least, most = tuning.SPECIFIC_FORCE
-    if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
-        raise InputError(
-            f"{recording.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
-            "check the unit of the accelerometers, and that gravity is not subtracted"
-        )
-    imu = Imu(recording.dt, samples[:, :3] * recording.dt, samples[:, 3:] * recording.dt)
-    is_log = layout is None and (is_text(Path(path)) if format is None else format == "text")
-    first, notices = _clock(Path(path), recording, time if is_log else False, start)
-    notices = (*notices, *filled)
-    if np.mean(samples[:, 5]) > 0.0:
-        text = "its mean is positive: the axis points up, and roll is near 180 deg"
-        notices = (*notices, Notice("axis-up", "warning", "accel_z", text))
-    return ImuLog(imu, first, recording.source, (*recording.notices, *notices))
+    return recording
+
+
+def _samples(recording: Recording, sign: FloatArray) -> FloatArray:
+    return np.column_stack([recording[axis].values for axis in AXES]) * sign
+
+
+def _append(spools: tuple[Spool, Spool], samples: FloatArray) -> None:
+    spools[0].append(samples[:, :3])
+    spools[1].append(samples[:, 3:])
 
 
 def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
@@ -143,7 +226,7 @@ def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
     return columns, frozenset(turned)
 
 
-def _fill(samples: FloatArray, recording: Recording) -> tuple[Notice, ...]:
+def _fill(record: _Record) -> tuple[Notice, ...]:
     """Fill short holes along straight lines, in place.
 
     Raises
@@ -151,25 +234,32 @@ def _fill(samples: FloatArray, recording: Recording) -> tuple[Notice, ...]:
     InputError
         If one is too long, or at an end.
     """
-    holes = np.isnan(samples)
-    if not np.any(holes):
-        return ()
-    most = max(round(tuning.LONGEST_FILLED / recording.dt), 1)
+    most = max(round(tuning.LONGEST_FILLED / record.dt), 1)
     longest = 0
-    for column, name in enumerate(AXES):
-        edges = np.flatnonzero(np.diff(holes[:, column].astype(np.int8), prepend=0, append=0))
-        for begin, end in edges.reshape(-1, 2):
-            longest = max(longest, int(end - begin))
-            if end - begin > most or begin == 0 or end == len(samples):
+    rows = []
+    for name in AXES:
+        samples = record.column(name)
+        found = []
+        for part in windows(record.n):
+            found.append(part.start + np.flatnonzero(np.isnan(samples[part])))
+            release(samples)
+        missing = np.concatenate(found)
+        for hole in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
+            if not hole.size:
+                continue
+            begin, end = int(hole[0]), int(hole[-1]) + 1
+            longest = max(longest, end - begin)
+            if end - begin > most or begin == 0 or end == record.n:
                 raise InputError(
-                    f"{recording.source}: sample {begin + 1:,} of {name}, "
-                    f"{begin * recording.dt:.6g} s after the first, is missing, {end - begin:,} in "
+                    f"{record.source}: sample {begin + 1:,} of {name}, "
+                    f"{begin * record.dt:.6g} s after the first, is missing, {end - begin:,} in "
                     f"a row: up to {most} between others are filled; use the part before or after"
                 )
-        there = np.flatnonzero(~holes[:, column])
-        missing = np.flatnonzero(holes[:, column])
-        samples[missing, column] = np.interp(missing, there, samples[there, column])
-    count = int(np.count_nonzero(np.any(holes, axis=1)))
+            samples[begin:end] = np.interp(hole, [begin - 1, end], samples[[begin - 1, end]])
+        rows.append(missing)
+    count = np.unique(np.concatenate(rows)).size
+    if not count:
+        return ()
     text = (
         f"{count:,} missing samples, at most {longest} in a row, are filled from those beside them"
     )
@@ -177,14 +267,23 @@ def _fill(samples: FloatArray, recording: Recording) -> tuple[Notice, ...]:
     return (Notice("samples-filled", "warning", "", text, values),)
 
 
+@dataclass(frozen=True)
+class _Clock:
+    """Time of the first epoch and sampling interval, s."""
+
+    start: float
+    dt: float
+    notices: tuple[Notice, ...] = ()
+
+
 def _clock(
-    path: Path, recording: Recording, time: str | int | bool | None, start: float | None
-) -> tuple[float, tuple[Notice, ...]]:
-    """Time of the first epoch, s, and its notices."""
+    path: Path, record: _Record, time: str | int | bool | None, start: float | None
+) -> _Clock:
+    """Of a record with time stamps, or without."""
     text = "the IMU has no time stamps: fixes are timed from its first sample"
-    none: tuple[float, tuple[Notice, ...]] = 0.0, (Notice("no-time-stamps", "note", "", text),)
+    none = _Clock(0.0, record.dt, (Notice("no-time-stamps", "note", "", text),))
     if start is not None:
-        none = start - recording.dt, ()
+        none = _Clock(start - record.dt, record.dt)
     if time is False:
         return none
     table = open_log(path)
@@ -196,12 +295,24 @@ def _clock(
     if not found:
         return none
     if start is not None:
-        raise InputError(f"{recording.source} has time stamps: leave its start out")
-    stamps = table.load(found[:1])[found[0]]
-    span = (recording.n - 1) * recording.dt
-    ratio = np.array(_CLOCKS) * (stamps[-1] - stamps[0]) / span
+        raise InputError(f"{record.source} has time stamps: leave its start out")
+    first = last = np.nan
+    for part in table.segments(found[:1], ROWS):
+        stamps = part[found[0]]
+        first, last = first if np.isfinite(first) else float(stamps[0]), float(stamps[-1])
+    ratio = np.array(_CLOCKS) * (last - first) / ((record.n - 1) * record.dt)
     unit = _CLOCKS[int(np.argmin(np.abs(np.log(ratio))))]
-    # One stamp may come late: the grid is where most of them are.
-    elapsed = (stamps - stamps[0]) * unit
-    late = float(np.median(elapsed - np.rint(elapsed / recording.dt) * recording.dt))
-    return float(stamps[0]) * unit + late - recording.dt, ()
+    # What one block shows of the interval adds up over hours: all of them show it.
+    dt = unit * (last - first) / (record.n - 1) if is_spooled(record.rate) else record.dt
+    middle, late = [], []
+    for part in table.segments(found[:1], ROWS):
+        elapsed = (part[found[0]] - first) * unit
+        epoch = np.rint(elapsed / dt)
+        # One stamp may come late: the grid is where most of them are.
+        middle.append(float(np.median(epoch)))
+        late.append(float(np.median(elapsed - epoch * dt)))
+    begin = float(np.median(late))
+    if is_spooled(record.rate):
+        slope, begin = (float(each) for each in np.polyfit(middle, late, 1))
+        dt += slope
+    return _Clock(first * unit + begin - dt, dt)

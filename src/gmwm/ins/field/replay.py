@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from gmwm._core.typing import FloatArray
 from gmwm.ins.field.measured import Measured
-from gmwm.ins.field.start import Alignment, started
+from gmwm.ins.field.start import Alignment, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
 from gmwm.ins.geometry import matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
@@ -34,6 +34,9 @@ class Replay:
     models : SensorModels
     aiding : Aiding
         On the time of ``imu``.
+    stood : float
+        Time at rest of which the gyros' mean is subtracted, s; their ``bias_sd`` is how well it is
+        known then. 0 if there is none.
     """
 
     imu: Imu
@@ -41,6 +44,7 @@ class Replay:
     sd: InitialSd
     models: SensorModels
     aiding: Aiding
+    stood: float = 0.0
 
     @classmethod
     def of(cls, measured: Measured, alignment: Alignment) -> Replay:
@@ -56,7 +60,7 @@ class Replay:
         if alignment.gyro_bias_sd is not None:
             known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
             models = replace(models, bias_sd={**models.bias_sd, **known})
-        return cls(imu, alignment.state, alignment.sd, models, aiding)
+        return cls(imu, alignment.state, alignment.sd, models, aiding, alignment.stood)
 
     # -- what comes of it -------------------------------------------------------------------------
 
@@ -140,13 +144,22 @@ class Replay:
     def with_sensors_scaled(self, factor: float, kind: str, white: bool) -> Replay:
         """White noise, or else all slow terms and the constant, of a kind of sensors scaled."""
         models, bias = dict(self.models.models), dict(self.models.bias_sd)
+        averaged = kind == "gyro" and self.stood > 0.0
         for axis in AXES:
             if axis.startswith(kind):
                 terms = models[axis].terms
                 models[axis] = Model(tuple(
                     _scaled(term, factor) if term.is_white is white else term for term in terms
                 ))  # fmt: skip
-                bias[axis] *= 1.0 if white else factor
+                bias[axis] *= 1.0 if white or averaged else factor
+        scaled = SensorModels(models, bias)
+        if averaged:
+            # The mean at rest is as far off as the noise makes it, not as the constant was.
+            before, after = (
+                mean_sd(each, kind, self.stood, self.imu.dt) for each in (self.models, scaled)
+            )
+            for axis in AXES[:3]:
+                bias[axis] = float(np.sqrt(max(bias[axis] ** 2 - before**2, 0.0) + after**2))
         return replace(self, models=SensorModels(models, bias))
 
     def without(self, rejected: dict[str, npt.NDArray[np.bool_]]) -> Replay:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.spool import release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
-from gmwm.ins.filter.filter_kernels import IS_POSITION, run
+from gmwm.ins.filter.filter_kernels import IS_POSITION, KINDS, PAUSED, run
 from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
@@ -166,8 +168,9 @@ class Filter:
         used = np.ones(events.epoch.size, dtype=np.bool_)
         axis = table.axis[table.axis != NO_AXIS]
         first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
-        stopped = run(
-            imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
+        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
+        ready = partial(
+            run, imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
             first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
             table.noise, table.noise_off, table.cross, table.integral, self.coloured,
             events.epoch, events.kind, events.offset, events.value, events.sd, events.gate,
@@ -175,14 +178,22 @@ class Filter:
             outputs.epoch, outputs.before,
             nav, matrices, nav_P, sensor, sensor_P, innovation, sd, used,
         )  # fmt: skip
+        stopped = PAUSED
+        for part in (*windows(imu.n), slice(imu.n, imu.n)):
+            if stopped == PAUSED:
+                stopped = ready(part.stop, place, carry)
+            release(imu.rotation)
+            release(imu.velocity)
         done = kept if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
+        for part in windows(done):
+            nav_P[part] = unmodified(nav_P[part], nav[part, 3:])
         return Solution(
             time=outputs.time(imu.dt)[:done],
             before=outputs.before[:done] == 1,
             lla=nav[:done, :3],
             velocity=nav[:done, 3:],
             matrix=matrices[:done],
-            covariance=unmodified(nav_P[:done], nav[:done, 3:]),
+            covariance=nav_P[:done],
             sensor_errors=sensor[:done],
             sensor_covariance=sensor_P[:done],
             innovations=FilterInnovations(

@@ -21,8 +21,12 @@ from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
 
-IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = 0, 1, 2, 3
+KINDS = (0, 1, 2, 3)
+IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL = KINDS
 """Kinds of measurements."""
+
+PAUSED = -2
+"""What `run` returns where it is to be called again."""
 
 _LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
 _PATIENCE = tuning.GATE_PATIENCE
@@ -224,9 +228,9 @@ def run(
     second_order: bool, out_epoch: IntArray, out_before: IntArray,
     out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
     out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
-    used: npt.NDArray[np.bool_],
+    used: npt.NDArray[np.bool_], last: int, place: IntArray, carry: FloatArray,
 ) -> int:  # fmt: skip
-    """Filter a record; returns the epoch at which it diverged, or -1.
+    """Filter a record; returns the epoch at which it diverged, -1 at its end, or `PAUSED`.
 
     Parameters
     ----------
@@ -269,6 +273,10 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
         deviation.
     used : (E,) ndarray of bool
         Set to False where a measurement was rejected.
+    last : int
+        Epoch from which on the filter pauses, to go on with the next call.
+    place : (4 + kinds,) ndarray of int, carry : (7,) ndarray
+        Where it is and what it needs of the samples before: zeros at first.
     """
     n, m = P.shape[0], x.size
     n_samples, n_events, n_out = rotation.shape[0], event_epoch.size, out_epoch.size
@@ -280,13 +288,13 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
     row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
     estimated, held = np.zeros(n), np.zeros(m)
     P_held, estimated_held = np.zeros((n, n)), np.zeros(n)
-    rejected = np.zeros(4, dtype=np.int64)
+    rejected = place[4:]
     C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)
-    ax = ay = az = fx = fy = fz = 0.0
-    epoch = event = out = steps = 0
-    gathered = 0.0
+    ax, ay, az, fx, fy, fz = carry[0], carry[1], carry[2], carry[3], carry[4], carry[5]
+    gathered = carry[6]
+    epoch, event, out, steps = place[0], place[1], place[2], place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
         while out < n_out and out_epoch[out] == epoch and out_before[out] == 1:
@@ -425,6 +433,11 @@ out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
             and abs(lla[2]) < 1e7
         ):
             return epoch
+        if last <= epoch < n_samples:
+            place[0], place[1], place[2], place[3] = epoch, event, out, steps
+            carry[0], carry[1], carry[2], carry[3], carry[4], carry[5] = ax, ay, az, fx, fy, fz
+            carry[6] = gathered
+            return PAUSED
 
 
 @compiled()

@@ -93,33 +93,6 @@ def gravity(lat: float, h: float) -> float:
     return gravity_at(np.sin(lat), h)
 
 
-@compiled()
-def earth_rate(lat: float) -> tuple[float, float]:
-    """North and down component of the Earth's rotation, rad/s; there is none to the east."""
-    return RATE * np.cos(lat), -RATE * np.sin(lat)
-
-
-@compiled()
-def transport_rate(lat: float, h: float, v_n: float, v_e: float) -> tuple[float, float, float]:
-    """Rotation of the local north-east-down frame that follows a vehicle over the Earth.
-
-    Parameters
-    ----------
-    lat, h : float
-        Latitude, rad, and height, m.
-    v_n, v_e : float
-        Velocity to the north and east, m/s.
-
-    Returns
-    -------
-    north, east, down : float
-        rad/s, relative to the Earth. Groves (2013), eq. 5.44.
-    """
-    meridian, transverse = radii(lat)
-    north = v_e / (transverse + h)
-    return north, -v_n / (meridian + h), -north * np.tan(lat)
-
-
 def radii_along(lat: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Radii of curvature of the meridian and of the prime vertical, m, at many latitudes, rad."""
     formula: Any = radii_at.py_func

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gmwm._core.checks import is_number, positive, real_numbers, sampling_interval, shown
+from gmwm._core.spool import release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.logs import read_log
@@ -218,7 +219,9 @@ def finite_numbers(values: object, name: str) -> FloatArray:
         With the row of the first that is not finite.
     """
     array = np.ascontiguousarray(real_numbers(values, name))
-    if not np.all(np.isfinite(array)):
-        row = int(np.argwhere(~np.isfinite(array))[0][0])
-        raise InputError(f"{name} is not finite at index {row}: give a number for every epoch")
+    for part in windows(len(array)):
+        if not np.all(np.isfinite(array[part])):
+            row = part.start + int(np.argwhere(~np.isfinite(array[part]))[0][0])
+            raise InputError(f"{name} is not finite at index {row}: give a number for every epoch")
+        release(array)
     return array

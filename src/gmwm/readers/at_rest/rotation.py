@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
+
+_ROWS = 1 << 16  # at a time
 
 
 @dataclass(frozen=True)
@@ -31,31 +34,34 @@ class TurningGravity:
     change: float
 
 
-def triad(recording: Recording, sensor: str) -> FloatArray | None:
-    """Samples of three axes, (n, 3), if the recording has them all."""
+def triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
+    """Samples of three axes, if the recording has them all."""
     names = [f"{sensor}_{axis}" for axis in AXES]
     if not all(name in recording for name in names):
         return None
-    return np.column_stack([recording[name].values for name in names])
+    return [recording[name].values for name in names]
 
 
-def block_means(values: FloatArray, size: int) -> FloatArray:
-    """Means of blocks of ``size`` rows; NaN where three quarters of one are missing.
+def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
+    """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
 
     Parameters
     ----------
-    values : (n, k) ndarray
+    axes : sequence of (n,) ndarray
     size : int
 
     Returns
     -------
-    (n // size, k) ndarray
+    (n // size, axes) ndarray
     """
-    blocks = values.shape[0] // size
-    rows = values[: blocks * size].reshape(blocks, size, values.shape[1])
+    return np.stack([_means(values, size) for values in axes], axis=1)
+
+
+def _means(values: FloatArray, size: int) -> FloatArray:
+    rows = values[: values.size // size * size].reshape(-1, size)
     known = ~np.isnan(rows)
     count = np.count_nonzero(known, axis=1)
-    total = np.sum(np.where(known, rows, 0.0), axis=1)
+    total = np.sum(rows, axis=1, where=known)
     return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
 
 
@@ -82,10 +88,8 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
     rate, force = triad(recording, "gyro"), triad(recording, "accel")
     if rate is None or force is None or recording.n < 4 * size:
         return None
-    change = np.cross(np.nan_to_num(rate - np.nanmedian(rate, axis=0)), np.nan_to_num(force))
     # The same means of the integral as of the force: both changes are filtered alike.
-    integral = np.cumsum(change, axis=0) * -recording.dt
-    predicted = np.diff(block_means(integral, size), axis=0)
+    predicted = np.diff(_integral_means(rate, force, size) * -recording.dt, axis=0)
     observed = np.diff(block_means(force, size), axis=0)
     found = []
     for x, y in zip(np.array_split(predicted, parts), np.array_split(observed, parts), strict=True):
@@ -99,6 +103,24 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
         return None
     factor, explained, change = np.median(found, axis=0)
     return TurningGravity(float(factor), float(explained), float(change))
+
+
+def _integral_means(
+    rate: Sequence[FloatArray], force: Sequence[FloatArray], size: int
+) -> FloatArray:
+    """Means over blocks of the sum of w x a, some blocks at a time: memory is that of the means."""
+    middle = [np.nanmedian(column) for column in rate]
+    rows = size * max(_ROWS // size, 1)
+    total, means = np.zeros((1, 3)), []
+    for start in range(0, rate[0].size // size * size, rows):
+        part = slice(start, min(start + rows, rate[0].size // size * size))
+        w = np.stack([column[part] - m for column, m in zip(rate, middle, strict=True)], axis=1)
+        a = np.stack([column[part] for column in force], axis=1)
+        change = np.cross(np.nan_to_num(w), np.nan_to_num(a))
+        integral = np.cumsum(np.concatenate([total, change]), axis=0)
+        means.append(integral[1:].reshape(-1, size, 3).mean(axis=1))
+        total = integral[-1:]
+    return np.concatenate(means)
 
 
 def steady_turn(recording: Recording, size: int) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm as normal
+from scipy.special import ndtri
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
@@ -76,35 +76,35 @@ class _Sensor:
         Standard deviation of the length from the fast noise, SI.
     """
 
-    def __init__(self, unit: str, values: FloatArray, dt: float) -> None:
+    def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:
         self.unit = unit
-        self.size = float(np.linalg.norm(np.nanmean(values, axis=0)))
+        self.size = float(np.linalg.norm([np.nanmean(values) for values in axes]))
         second = max(round(1.0 / dt), 1)
-        fast, slow = _steps(values), _steps(block_means(values, second))
+        fast, slow = _steps(axes), _steps(block_means(axes, second).T)
         self.scatter = float(np.max(fast))
         densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
         self.density = float(np.max(densities))
-        self.size_error = self.scatter * math.sqrt(values.shape[1] / values.shape[0])
+        self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
 
     @classmethod
     def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
         """None if an axis is missing or empty, or the axes have several units."""
-        values = triad(recording, sensor)
+        axes = triad(recording, sensor)
         units = {unit_of[name] for name in unit_of if name in {f"{sensor}_{a}" for a in AXES}}
-        if values is None or len(units) > 1 or np.any(np.all(np.isnan(values), axis=0)):
+        if axes is None or len(units) > 1 or any(np.all(np.isnan(values)) for values in axes):
             return None
-        found = cls(units.pop(), values, recording.dt)
+        found = cls(units.pop(), axes, recording.dt)
         return found if found.size > 0.0 else None
 
 
-def _steps(values: FloatArray) -> FloatArray:
+def _steps(axes: Sequence[FloatArray] | FloatArray) -> FloatArray:
     """Robust standard deviation of white noise from differences, axis by axis; 0 if unknown."""
-    steps = np.abs(np.diff(values, axis=0))
-    found = np.zeros(values.shape[1])
-    for axis, column in enumerate(steps.T):
-        known = column[~np.isnan(column)]
+    found = np.zeros(len(axes))
+    for axis, values in enumerate(axes):
+        steps = np.diff(values)
+        known = np.abs(steps[~np.isnan(steps)])
         if known.size:
-            found[axis] = np.median(known) / (normal.ppf(0.75) * math.sqrt(2.0))
+            found[axis] = np.median(known, overwrite_input=True) / (ndtri(0.75) * math.sqrt(2.0))
     return found
 
 

@@ -14,8 +14,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock import agree
-from gmwm.readers.formats import open_tables
-from gmwm.readers.reader import read_table, roles_of
+from gmwm.readers.formats import has_sensors
+from gmwm.readers.reader import read_table, roles_of, tables_of
 from gmwm.readers.recording import Recording
 from gmwm.readers.roles import Reference
 from gmwm.readers.table import Table
@@ -54,15 +54,21 @@ def read_blocks(
     units: Mapping[str, str] | None = None,
     channels: Mapping[str, Reference] | Collection[str] | None = None,
     time: Reference | Literal[False] | None = None,
+    layout: str | None = None,
     *,
+    topic: str | Sequence[str] = (),
+    clock: str = "header",
+    format: str | None = None,
     rows: int = tuning.ROWS_OF_BLOCK,
 ) -> Iterator[Recording]:
     """Read a static recording a block at a time, as `gmwm.read` does as a whole.
 
     Parameters
     ----------
-    path, rate, units, channels, time
-        As in `gmwm.read`, of delimited text, NPY, Parquet, Feather or a table in memory.
+    path, rate, units, channels, time, layout, topic, clock, format
+        As in `gmwm.read`, of delimited text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of
+        ArduPilot, a binary layout or a table in memory; of one topic. Temperatures with stamps of
+        their own are left out.
     rows : int, optional
         Of a block, about.
 
@@ -77,12 +83,19 @@ def read_blocks(
     InputError
         If the file cannot be used, or not a block at a time.
     """
-    tables = open_tables(path)
-    if len(tables) > 1 or not hasattr(tables[0], "segments"):
+    opened = tables_of(path, layout, topic, clock, format)
+    tables = [table for table in opened if has_sensors(table)] or opened
+    if not all(hasattr(table, "segments") for table in tables):
         raise InputError(
             f"{tables[0].source} cannot be read a block at a time: convert it to Parquet, CSV or "
             "NPY, or read fewer channels",
-            "memory",
+            "not-divisible",
+        )
+    if len(tables) > 1:
+        raise InputError(
+            f"{tables[0].source}: {len(tables)} topics cannot be read a block at a time together: "
+            "choose one",
+            "topic",
         )
     table = cast(_Divisible, tables[0])
     first: Recording | None = None

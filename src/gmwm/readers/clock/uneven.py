@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.readers import tuning
@@ -102,7 +102,7 @@ def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
             return None
         trend = _smooth(x - slope * number, is_set)
         late = (x - trend) / slope - number
-        spread = float(np.median(np.abs(late))) / norm.ppf(0.75)
+        spread = float(np.median(np.abs(late))) / ndtri(0.75)
         sigma, age, start = max(spread, tuning.LEAST_JITTER), memory, 0.0
     return Followed(advance, is_set, late, rough * slope, burst)
 

@@ -1,44 +1,154 @@
-"""Flight logs of ArduPilot (DataFlash, binary) by pymavlink.
+"""Flight logs of ArduPilot (DataFlash, binary).
 
-pymavlink finds the messages; their bytes are decoded here, all of a kind at once. `IMU` holds
-samples of the filtered sensors, `GYR` and `ACC` (raw logging) and the batches `ISBH`/`ISBD` those
-at the sensor's own rate (ArduPilot, libraries/AP_InertialSensor/LogStructure.h).
+`IMU` holds samples of the filtered sensors, `GYR` and `ACC` (raw logging) and the batches `ISBH`
+and `ISBD` those at the sensor's own rate (ArduPilot, libraries/AP_InertialSensor/LogStructure.h).
+The former are read in blocks: memory holds no more than the columns that are asked for.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from functools import partial
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from gmwm._core import memory
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
-from gmwm.readers.formats.extras import library
+from gmwm.readers import tuning
+from gmwm.readers.formats.arrays import (
+    AnyArray,
+    ArrayTable,
+    array_of,
+    check_usable,
+    damage_named,
+)
+from gmwm.readers.formats.dataflash import Messages, messages
 from gmwm.readers.formats.topics import Topic, choose_first, left_out
 from gmwm.readers.names import AXES
+from gmwm.readers.table import Table, label
 
-_TYPES = {
-    "a": "(32,)<i2", "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4",
-    "I": "<u4", "f": "<f4", "n": "S4", "N": "S16", "Z": "S64", "c": "<i2", "C": "<u2", "e": "<i4",
-    "E": "<u4", "L": "<i4", "d": "<f8", "M": "u1", "q": "<i8", "Q": "<u8",
-}  # fmt: skip
-"""Letters of a format (ArduPilot, libraries/AP_Logger/README.md) as types of numpy."""
-
+_RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
+_HEADER, _DATA = "ISBH", "ISBD"
 _SENSORS = {"gyro": ("Gyr", "rad/s"), "accel": ("Acc", "m/s^2")}
 _OF_BATCH = ("accel", "gyro")  # IMU_SENSOR_TYPE_ACCEL, IMU_SENSOR_TYPE_GYRO
-_HEADER = 3  # bytes before a message
-_ROWS = 1 << 16
 _TIME = "time [us]"
+_SAMPLES = 32  # of a message of a batch
 
-_Columns = dict[str, AnyArray]
+
+@dataclass(frozen=True)
+class _Series:
+    """Messages of a kind, of one instance if they have a number of it."""
+
+    kind: str
+    instance: int | None
+    fields: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return self.kind if self.instance is None else f"{self.kind}[{self.instance}]"
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Stamps, axes and temperature: column -> field."""
+        # The stamp of the sample where there is one: TimeUS is when it was logged.
+        found = {_TIME: "SampleUS" if "SampleUS" in self.fields else "TimeUS"}
+        for sensor, (part, unit) in _SENSORS.items():
+            for axis in AXES:
+                if f"{part}{axis.upper()}" in self.fields:
+                    found[f"{sensor}_{axis} [{unit}]"] = f"{part}{axis.upper()}"
+        if "T" in self.fields:
+            found["temperature [degC]"] = "T"
+        return found
+
+    @property
+    def sensors(self) -> frozenset[str]:
+        return frozenset(s for s, (part, _) in _SENSORS.items() if f"{part}X" in self.fields)
 
 
-def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable, ...]:
+@dataclass(frozen=True)
+class DataflashTable:
+    """Messages of one IMU, or of one sensor of it: one a row."""
+
+    path: Path
+    series: _Series
+    rows: int
+    notices: tuple[Notice, ...] = ()
+    rate: float | None = None
+    tentative: bool = False
+
+    @property
+    def source(self) -> str:
+        """Name of the log."""
+        return self.path.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the columns."""
+        return tuple(self.series.columns)
+
+    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Read some columns; see `Table`.
+
+        Raises
+        ------
+        InputError
+            If the log is damaged, a number is infinite, or there is not enough memory.
+        """
+        memory.require(tuning.BYTES_PER_SAMPLE * self.rows * len(columns), self.source)
+        found = {column: np.empty(self.rows) for column in columns}
+        done = 0
+        for part in self._parts(columns):
+            size = next(iter(part.values())).size
+            for column, values in part.items():
+                found[column][done : done + size] = values
+            done += size
+        return self._checked(found, 0)
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` or a little more at a time."""
+        held: list[dict[int, FloatArray]] = []
+        count, before = 0, 0
+        for part in self._parts(columns):
+            held.append(part)
+            count += next(iter(part.values())).size
+            if count >= rows:
+                yield self._checked(_joined(columns, held), before)
+                held, count, before = [], 0, before + count
+        if count:
+            yield self._checked(_joined(columns, held), before)
+
+    def where(self, row: int) -> str:
+        """Say which message."""
+        return f"message {row} of {self.series.name} (counted from 0)"
+
+    def _parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+        fields = list(self.series.columns.values())
+        with damage_named(self.source, _damage):
+            for found in messages(self.path, (self.series.kind,)):
+                part = {column: found[fields[column]].astype(float) for column in columns}
+                if self.series.instance is not None:
+                    mine = found["I"] == self.series.instance
+                    part = {column: values[mine] for column, values in part.items()}
+                yield part
+
+    def _checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
+        for column, values in found.items():
+            place = f"{self.source}, column {label(self.names, column)}"
+            check_usable(place, values, lambda row: self.where(before + row))
+        return found
+
+
+def _joined(
+    columns: Sequence[int], parts: Sequence[Mapping[int, FloatArray]]
+) -> dict[int, FloatArray]:
+    return {column: np.concatenate([part[column] for part in parts]) for column in columns}
+
+
+def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table, ...]:
     """Open a binary log of ArduPilot.
 
     Parameters
@@ -55,105 +165,75 @@ def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Array
     InputError
         If it is damaged, holds no IMU, or topics have to be chosen.
     """
-    with _opened(path) as log:
-        ranks: list[list[Topic]] = [[], [], []]
-        open_topic: dict[str, Callable[[], _Columns]] = {}
-        for rank, kind in ((0, "IMU"), (0, "IMU2"), (0, "IMU3"), (1, "GYR"), (1, "ACC")):
-            for name, rows in _instances(log, kind):
-                sensors = frozenset(s for s, (part, _) in _SENSORS.items() if f"{part}X" in rows)
-                ranks[rank].append(Topic(name, rows["TimeUS"].size, sensors))
-                open_topic[name] = partial(_columns, rows)
-        for name, sensor, columns in _batches(log):
-            ranks[2].append(Topic(name, columns[_TIME].size, frozenset((sensor,))))
-            open_topic[name] = partial(dict, columns)
-        if not any(ranks):
-            raise InputError(
-                f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
-            )
-        chosen = choose_first(path.name, ranks, topics)
-        notices = left_out(ranks, chosen)
-        return tuple(
-            ArrayTable.of_entries(
-                path.name,
-                {name: array_of(values) for name, values in open_topic[topic.name]().items()},
-                notices if i == 0 else (),
-            )
-            for i, topic in enumerate(chosen)
-        )
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    reader = library("pymavlink.DFReader", "ardupilot", path.name).DFReader_binary
-    quiet = io.StringIO()  # for what pymavlink prints of damaged bytes
     with damage_named(path.name, _damage):
-        with redirect_stdout(quiet), redirect_stderr(quiet):
-            log = reader(str(path))
-        try:
-            yield log
-        finally:
-            log.filehandle.close()
+        counts, batches = _contents(path)
+    ranks: list[list[Topic]] = [[], [], []]
+    for series, count in counts.items():
+        ranks[_RANKS[series.kind]].append(Topic(series.name, count, series.sensors))
+    for name, (sensor, columns) in batches.items():
+        ranks[2].append(Topic(name, columns[_TIME].size, frozenset((sensor,))))
+    if not any(ranks):
+        raise InputError(
+            f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
+        )
+    chosen = choose_first(path.name, ranks, topics)
+    by_name = {series.name: series for series in counts}
+    tables: list[Table] = []
+    for topic in chosen:
+        notices = () if tables else left_out(ranks, chosen)
+        if topic.name in by_name:
+            tables.append(DataflashTable(path, by_name[topic.name], topic.count, notices))
+        else:
+            _, columns = batches[topic.name]
+            entries = {name: array_of(values) for name, values in columns.items()}
+            tables.append(ArrayTable.of_entries(path.name, entries, notices))
+    return tuple(tables)
 
 
 def _damage(error: Exception) -> str:
     return "is no binary log of ArduPilot, or is damaged or cut off: get a whole copy"
 
 
-def _rows(log: Any, kind: str) -> _Columns | None:
-    """Messages of a kind as columns."""
-    number = log.name_to_id.get(kind)
-    if number is None or not len(log.offsets[number]):
-        return None
-    form = log.formats[number]
-    dtype = np.dtype([(n, _TYPES[c]) for n, c in zip(form.columns, form.msg_fmts, strict=True)])
-    data = np.frombuffer(log.data_map, np.uint8)
-    offsets = np.asarray(log.offsets[number], np.int64)
-    offsets = offsets[offsets + _HEADER + dtype.itemsize <= data.size]
-    inside = _HEADER + np.arange(dtype.itemsize)
-    rows = np.concatenate(
-        [
-            data[offsets[i : i + _ROWS, None] + inside].view(dtype)[:, 0]
-            for i in range(0, max(offsets.size, 1), _ROWS)
-        ]
-    )
-    found: _Columns = {"offset": offsets}
-    for name, factor in zip(form.columns, form.msg_mults, strict=True):
-        found[name] = rows[name] if factor is None else rows[name] * factor
-    return found
+_Batches = dict[str, tuple[str, dict[str, AnyArray]]]
 
 
-def _instances(log: Any, kind: str) -> Iterator[tuple[str, _Columns]]:
-    """Messages of a kind by the number of the sensor, if they have one."""
-    rows = _rows(log, kind)
-    if rows is None or "TimeUS" not in rows:
-        return
-    if "I" not in rows:
-        yield kind, rows
-        return
-    for number in np.unique(rows["I"]):
-        mine = rows["I"] == number
-        yield f"{kind}[{number}]", {name: values[mine] for name, values in rows.items()}
+def _contents(path: Path) -> tuple[dict[_Series, int], _Batches]:
+    """How many messages there are of each series, and the batches."""
+    counts: Counter[_Series] = Counter()
+    headers: list[Messages] = []
+    data: list[Messages] = []
+    held = 0
+    for found in messages(path, (*_RANKS, _HEADER, _DATA)):
+        if found.kind in (_HEADER, _DATA):
+            (headers if found.kind == _HEADER else data).append(found)
+            held += 4 * found.rows.nbytes  # as float64
+            memory.require(held, path.name)
+        elif "TimeUS" in found.fields:
+            numbers: AnyArray = found["I"] if "I" in found.fields else np.zeros(0)
+            for number, count in zip(*np.unique(numbers, return_counts=True), strict=True):
+                counts[_Series(found.kind, int(number), found.fields)] += int(count)
+            if "I" not in found.fields:
+                counts[_Series(found.kind, None, found.fields)] += found.rows.size
+    order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
+    return {each: counts[each] for each in order}, _batches(headers, data)
 
 
-def _columns(rows: _Columns) -> _Columns:
-    """Stamps, axes and temperature of messages."""
-    # That of the sample where there is one: TimeUS is when it was logged.
-    found = {_TIME: rows.get("SampleUS", rows["TimeUS"])}
-    for sensor, (part, unit) in _SENSORS.items():
-        for axis in AXES:
-            if f"{part}{axis.upper()}" in rows:
-                found[f"{sensor}_{axis} [{unit}]"] = rows[f"{part}{axis.upper()}"]
-    if "T" in rows:
-        found["temperature [degC]"] = rows["T"]
-    return found
+def _field(parts: Sequence[Messages], name: str) -> AnyArray:
+    return np.concatenate([part[name] for part in parts])
 
 
-def _batches(log: Any) -> Iterator[tuple[str, str, _Columns]]:
+def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> _Batches:
     """Samples of each sensor from its batches: a header, then messages of 32 samples."""
-    headers, data = _rows(log, "ISBH"), _rows(log, "ISBD")
-    if headers is None or data is None:
-        return
-    of = np.searchsorted(headers["offset"], data["offset"]) - 1
+    found: _Batches = {}
+    if not parts_of_header or not parts:
+        return found
+    names = ("N", "type", "instance", "mul", "smp_cnt", "SampleUS", "smp_rate")
+    headers = {name: _field(parts_of_header, name) for name in names}
+    data = {name: _field(parts, name) for name in ("N", "seqno", *AXES)}
+    place, place_of_header = (
+        np.concatenate([part.places for part in each]) for each in (parts, parts_of_header)
+    )
+    of = np.searchsorted(place_of_header, place) - 1
     known = (of >= 0) & (headers["N"][of] == data["N"])
     rate, scale = headers["smp_rate"].astype(float), headers["mul"].astype(float)
     for kind, number in np.unique(np.column_stack([headers["type"], headers["instance"]]), axis=0):
@@ -163,12 +243,14 @@ def _batches(log: Any) -> Iterator[tuple[str, str, _Columns]]:
         header = of[mine]
         if not header.size:
             continue
-        index = data["seqno"][mine].astype(np.int64)[:, None] * 32 + np.arange(32)
+        index = data["seqno"][mine].astype(np.int64)[:, None] * _SAMPLES + np.arange(_SAMPLES)
         there = index < headers["smp_cnt"][header][:, None]
         first = headers["SampleUS"][header].astype(float)[:, None]
         sensor = _OF_BATCH[kind]
-        columns = {_TIME: (first + 1e6 * index / rate[header][:, None])[there]}
-        for axis in AXES:
-            values = data[axis][mine] / scale[header][:, None]
-            columns[f"{sensor}_{axis} [{_SENSORS[sensor][1]}]"] = values[there]
-        yield f"batch_{sensor}[{number}]", sensor, columns
+        with np.errstate(all="ignore"):  # a rate of zero is refused with its stamps
+            columns = {_TIME: (first + 1e6 * index / rate[header][:, None])[there]}
+            for axis in AXES:
+                values = data[axis][mine] / scale[header][:, None]
+                columns[f"{sensor}_{axis} [{_SENSORS[sensor][1]}]"] = values[there]
+        found[f"batch_{sensor}[{number}]"] = (sensor, columns)
+    return found

@@ -125,9 +125,39 @@ class BagTable:
             there is not enough memory.
         """
         memory.require(tuning.BYTES_PER_SAMPLE * self.topic.count * len(columns), self.source)
+        result = {column: np.empty(self.topic.count) for column in columns}
+        row = 0
+        for part in self._parts(columns):
+            size = next(iter(part.values())).size
+            room = max(self.topic.count - row, 0)
+            for column, values in part.items():
+                result[column][row : row + size] = values[:room]
+            row += size
+        if not 0 < row <= self.topic.count:
+            raise InputError(
+                f"{self.source}, topic {self.topic.name}: its messages are not as many as its "
+                "index says: get a whole copy, or reindex it"
+            )
+        result = {column: values[:row] for column, values in result.items()}
+        return self._checked(result, 0)
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, ``rows`` or a little more at a time."""
+        held: list[dict[int, FloatArray]] = []
+        before, row = 0, 0
+        for part in self._parts(columns):
+            held.append(part)
+            row += next(iter(part.values())).size
+            if row - before >= rows:
+                yield self._checked(_joined(columns, held), before)
+                held, before = [], row
+        if held:
+            yield self._checked(_joined(columns, held), before)
+
+    def _parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+        """Columns of one block of messages after another."""
         wanted = [column for column in columns if column > 0]
         numbers = [self.message.columns[self.names[column]] for column in wanted]
-        parts: dict[int, list[FloatArray]] = {column: [] for column in columns}
         row = 0
         with self.bag.opened() as reader:
             for block in _blocks(reader, self.topic.name):
@@ -136,22 +166,21 @@ class BagTable:
                 stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
                 if self.log:
                     stamps = np.array(times, np.int64)
-                if 0 in parts:
-                    parts[0].append((stamps - self.origin).astype(float))
-                for column, values in zip(wanted, found, strict=True):
-                    parts[column].append(values)
                 row += len(block)
-        # One column at a time lets the blocks go before the next one is joined.
-        result = {column: np.concatenate(parts.pop(column)) for column in columns}
-        for column, values in result.items():
-            check_usable(f"{self.source}, column {label(self.names, column)}", values, self.where)
-        if 0 in result and row > 1 and not np.any(np.diff(result[0])):
+                part = dict(zip(wanted, found, strict=True))
+                yield {0: (stamps - self.origin).astype(float)} | part if 0 in columns else part
+
+    def _checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
+        for column, values in found.items():
+            place = f"{self.source}, column {label(self.names, column)}"
+            check_usable(place, values, lambda row: self.where(before + row))
+        if 0 in found and found[0].size > 1 and not np.any(np.diff(found[0])):
             raise InputError(
                 f"{self.source}, topic {self.topic.name}: every header has the same stamp",
                 "no-stamps",
                 'use the time of recording, clock="log"',
             )
-        return result
+        return found
 
     def where(self, row: int) -> str:
         """Say which message."""
@@ -159,6 +188,12 @@ class BagTable:
 
     def _place(self, first: int, row: int) -> str:
         return f"{self.source}, {self.where(first + row)}"
+
+
+def _joined(
+    columns: Sequence[int], parts: Sequence[dict[int, FloatArray]]
+) -> dict[int, FloatArray]:
+    return {column: np.concatenate([part[column] for part in parts]) for column in columns}
 
 
 def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, ...]:
@@ -198,14 +233,16 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
                 f"{path.name} has no messages of sensor_msgs/Imu: "
                 + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
             )
+        of_imu = counts["sensor_msgs/msg/Imu"]
+        heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
         found = {
-            topic: Topic(topic, count, _sensors(reader, topic, bag))
-            for topic, count in counts["sensor_msgs/msg/Imu"].items()
+            topic: Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
+            for topic, count in of_imu.items()
         }
         chosen = choose(path.name, list(found.values()), topics)
         warmth = counts["sensor_msgs/msg/Temperature"]
         is_log = clock == "log"
-        origin = _first_stamp(reader, chosen[0].name, bag, is_log)
+        origin = _first_stamp(heads[chosen[0].name], bag, is_log)
     tables = [_table(bag, topic, is_log, origin, found) for topic in chosen]
     tables += [
         BagTable(bag, Topic(name, count), _thermometer(name, len(warmth)),
@@ -218,10 +255,8 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
 def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]) -> BagTable:
     sensors = topic.sensors or frozenset(SI_UNIT)
     names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
-    notices = []
-    if len(found) > 1 or len(sensors) < len(SI_UNIT):
-        text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
-        notices.append(Notice("topic", "note", "", text, {"topic": topic.name}))
+    text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
+    notices = [Notice("topic", "note", "", text, {"topic": topic.name})]
     known = frozenset[str]().union(*(each.sensors for each in found.values()))
     if topic.sensors and (absent := set(SI_UNIT) - known):
         words = {"gyro": "angular rates", "accel": "accelerations"}
@@ -280,13 +315,13 @@ def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Re
     return iter(reader.messages(connections, start=start))
 
 
-def _sensors(reader: Any, topic: str, bag: _Bag) -> frozenset[str]:
+def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> frozenset[str]:
     """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
     first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
     found: set[str] = set()
     middle = (reader.start_time + reader.end_time) // 2
-    for start in (None, middle):
-        raw = [message for _, _, message in islice(_messages(reader, topic, start), _SEEN)]
+    for records in (head, islice(_messages(reader, topic, middle), _SEEN)):
+        raw = [message for _, _, message in records]
         for sensor, index in first.items() if raw else ():
             wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
             where = partial(_somewhere, bag, topic)
@@ -302,8 +337,8 @@ def _somewhere(bag: _Bag, topic: str, row: int) -> str:
     return f"{bag.path.name}, a message of {topic}"
 
 
-def _first_stamp(reader: Any, topic: str, bag: _Bag, is_log: bool) -> int:
-    _, time, message = next(_messages(reader, topic))
+def _first_stamp(head: Sequence[_Record], bag: _Bag, is_log: bool) -> int:
+    _, time, message = next(iter(head))
     if is_log:
         return int(time)
     stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: bag.path.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.comparison import AxisComparison
+from gmwm.comparison import AxisComparison, Equality
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
 from gmwm.report.datasheet import Datasheet
@@ -76,8 +76,9 @@ def multiple(
         at = x(np.log10(fit.wv.tau) + shifts[label])
         ends = [y(_log(factor, each)) for each in (fit.wv.lower, fit.wv.upper)]
         parts.append(_points(labels.index(label), at, y(_log(factor, fit.wv.variance)), *ends))
-    if axis.equality is not None and axis.equality.tau.size:
-        parts.append(_ratios(axis, labels, x, shifts))
+    equality = axis.equality
+    if equality is not None and equality.tau.size:
+        parts.append(_ratios(equality, axis.fits, labels, x, shifts))
     else:
         middle = 0.5 * (_LEFT + _RIGHT), 0.5 * (_LOW + _BOTTOM) + 4.0
         parts.append(_text(*middle, "nothing to compare with", "middle"))
@@ -137,11 +138,10 @@ def _ticks(y: _Scale) -> list[float]:
 
 
 def _ratios(
-    axis: AxisComparison, labels: Sequence[str], x: _Scale, shifts: dict[str, float]
-) -> str:
+    equality: Equality, shown: Iterable[str], labels: Sequence[str], x: _Scale,
+    shifts: dict[str, float],
+) -> str:  # fmt: skip
     """Differences from the common curve in per cent, with their intervals."""
-    equality = axis.equality
-    assert equality is not None
     away = 100.0 * (equality.ratios - 1.0)
     error = 196.0 * equality.errors
     sure = np.abs(away[equality.errors < _SURE])
@@ -154,7 +154,7 @@ def _ratios(
             _text(_LEFT - 4.0, float(y(value)) + 3.5, f"{value:+g}" if value else "0", "end")
         )
     parts.append(_text(_LEFT + 5.0, _LOW + 11.0, "from their mean [%]", "start"))
-    for row, label in enumerate(axis.fits):
+    for row, label in enumerate(shown):
         known = np.isfinite(away[row])
         at = x(np.log10(equality.tau[known]) + shifts[label])
         value, half = away[row][known], error[row][known]

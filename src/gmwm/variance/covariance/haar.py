@@ -18,7 +18,6 @@ ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -27,6 +26,7 @@ import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, Panels, evaluated, haar_gain, quadrature
+from gmwm.variance.covariance.haar_kernels import lag_sums
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
 
 # Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
@@ -92,30 +92,19 @@ class _LagSums:
     weights: FloatArray
     counts: FloatArray
 
-    def covariances(self, spectrum: FloatArray) -> Iterator[FloatArray]:
-        """For each level, its covariances with itself and the coarser ones, (levels, H).
-
-        A Haar gain over its phase is (1 - cos(2 pi m f)) / (2 m sin(pi f)), so that that of the
-        coarser level is a second difference over its averaging time m.
-        """
+    def of(self, spectrum: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Sums over the lags for a spectrum of block means, as `lag_sums` has them, (L, L)."""
         sine = np.sin(np.pi * self.grid.frequency[1:])
         base = np.zeros_like(self.amplitude)
         base[:, 1:] = self.amplitude[:, 1:] * (spectrum[1:] / sine)
-        once = self.grid.transform(base)
-        longest, lags = self.averaging[-1], self.weights.size
-        around = np.concatenate([once[:, -longest:], once[:, : lags + longest]], axis=1)
-        for j, own in enumerate(around):
-            centre = own[longest : longest + lags]
-            rows = np.empty((self.averaging.size - j, lags))
-            for row, m in zip(rows, self.averaging[j:], strict=True):
-                later, earlier = own[longest + m :][:lags], own[longest - m :][:lags]
-                row[:] = (centre - 0.5 * (later + earlier)) / (2.0 * m)
-            # The bin at zero frequency, which no difference shows.
-            product = self.amplitude[j, 0] * self.amplitude[j:, :1]
-            yield rows + product * (spectrum[0] / self.grid.size)
+        zero = np.outer(self.amplitude[:, 0], self.amplitude[:, 0] * (spectrum[0] / self.grid.size))
+        found: tuple[FloatArray, FloatArray, FloatArray] = lag_sums(
+            self.grid.transform(base), self.averaging, zero, self.counts, self.weights
+        )
+        return found
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=16)  # recordings that are fitted jointly; 3 MB each
 def _lag_sums(n: int) -> _LagSums:
     """Set-up of the sums over lags, on means of blocks of samples."""
     m = dyadic_levels(n)
@@ -127,8 +116,9 @@ def _lag_sums(n: int) -> _LagSums:
     weights[[0, -1]] = 1.0
     counts = np.empty((available.size, available.size, lag.size))
     for j, own in enumerate(available):
-        for k, other in enumerate(available):
-            counts[j, k] = centred_pairs(own, other, lag, block) / (block * min(own, other))
+        for k, other in enumerate(available[: j + 1]):
+            pairs = centred_pairs(own, other, lag, block) / (block * min(own, other))
+            counts[j, k] = counts[k, j] = pairs
     averaging = m[first:] / block
     amplitude = grid.haar_amplitude(averaging)
     return _LagSums(first, grid, averaging.astype(np.intp), amplitude, weights, weights * counts)
@@ -136,14 +126,11 @@ def _lag_sums(n: int) -> _LagSums:
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     """Sum over the lags that occur, relative to the sum over all lags, for the coarse levels."""
-    spectrum = block_spectrum(psd, dt, sums.grid)
-    levels = sums.averaging.size
-    result = np.empty((levels, levels))
-    for j, cross in enumerate(sums.covariances(spectrum)):
-        cross *= cross
-        result[j, j:] = np.sum(sums.counts[j, j:] * cross, axis=-1) / (cross @ sums.weights)
-        result[j:, j] = result[j, j:]
-    return result
+    _, square, whole = sums.of(block_spectrum(psd, dt, sums.grid))
+    ratio = np.ones_like(square)
+    above = np.triu_indices_from(ratio)
+    ratio[above] = ratio.T[above] = square[above] / whole[above]
+    return ratio
 
 
 @lru_cache(maxsize=4)
@@ -191,7 +178,7 @@ class _Pairs:
 @lru_cache(maxsize=4)
 def _pairs(averaging: tuple[float, ...]) -> _Pairs:
     grid = quadrature(averaging)
-    panels = Panels.of(grid.frequency)
+    panels = Panels.of(np.log(np.tan(np.pi * grid.frequency)))
     first, second = np.triu_indices(len(averaging))
     weighted = grid.weight * grid.gain
     weight = np.concatenate(
@@ -251,14 +238,12 @@ def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     a drift that the record can show is far below the noise, it is left at zero.
     """
     sums = _lag_sums(n)
-    spectrum = block_spectrum(psd, dt, sums.grid)
+    mean = sums.of(block_spectrum(psd, dt, sums.grid))[0]
     m = dyadic_levels(n)
     counts = haar_counts(n, m)[sums.first :] / sums.grid.block
     result = np.zeros((m.size, m.size))
-    for j, cross in enumerate(sums.covariances(spectrum)):
-        row = np.sum(sums.counts[j, j:] * cross, axis=-1) / np.maximum(counts[j], counts[j:])
-        result[sums.first + j, sums.first + j :] = row
-        result[sums.first + j :, sums.first + j] = row
+    mean /= np.maximum.outer(counts, counts)
+    result[sums.first :, sums.first :] = mean + np.triu(mean, 1).T
     return result
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
+from gmwm.variance.kernels import summed, summed_with_moments
 
 STARTS = tuning.STREAMING_STARTS
 FINE = STARTS.bit_length()  # levels of single samples: 1, 2, 4, ... STARTS
@@ -64,26 +65,6 @@ def _total(values: FloatArray) -> float:
     return total
 
 
-@compiled()
-def _sums(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
-    for i in range(out.size):
-        out[i] = first[i] + second[i]
-
-
-@compiled(fastmath=_ANY_ORDER)
-def _sums_and_moments(
-    out: FloatArray, first: FloatArray, second: FloatArray
-) -> tuple[float, float]:
-    """The sums, and the sum and the sum of squares of the differences."""
-    total, square = 0.0, 0.0
-    for i in range(out.size):
-        out[i] = first[i] + second[i]
-        difference = second[i] - first[i]
-        total += difference
-        square += difference * difference
-    return total, square
-
-
 @compiled(fastmath=_ANY_ORDER)
 def _fourth(values: FloatArray) -> float:
     total = 0.0
@@ -128,8 +109,8 @@ def complete_windows(
         following = scratch[level % 2, :count]
         if row == 0 or level == FINE - 1:
             begin = max(new - 2 * m + 1, 0)
-            _sums(following[:begin], now[:begin], now[m : m + begin])
-            mean, square = _sums_and_moments(
+            summed(following[:begin], now[:begin], now[m : m + begin])
+            mean, square = summed_with_moments(
                 following[begin:], now[begin:count], now[m + begin : m + count]
             )
             own = sums[level + row]
@@ -139,7 +120,7 @@ def complete_windows(
             if level == 0:
                 _add(totals, FOURTH, LOST_FOURTH, _fourth(now[begin:]) / 16.0)
         else:
-            _sums(following, now[:count], now[m : m + count])
+            summed(following, now[:count], now[m : m + count])
         now = following
         m *= 2
 

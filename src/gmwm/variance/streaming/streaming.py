@@ -255,7 +255,8 @@ class StreamingVariance:
         """
         file = existing_file(Path(path))
         with suppress(Exception):  # whatever damaged bytes raise
-            with np.load(file, allow_pickle=False) as stored:
+            # numpy leaves a file open that it cannot read.
+            with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
             return cls._of_arrays(arrays)
         raise InputError(f"{file.name} is no saved streaming variance: write it with save()")

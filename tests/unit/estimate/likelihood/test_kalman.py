@@ -147,7 +147,7 @@ def test_filter_and_smoother_agree_with_statsmodels(model, gap):
     p = space.n_states
     if p == 0:
         pytest.skip("statsmodels knows no model without states")
-    y = columns(N, gap, seed=3)[:, :1]
+    y = columns(N, gap, seed=3)[:, :1].copy()
     peer = KalmanSmoother(k_endog=1, k_states=p)
     peer.bind(y.copy())
     peer["design"] = space.output[None, :]
@@ -213,7 +213,7 @@ def test_a_settled_gain_is_as_good_as_a_new_one(model, gap):
 def test_a_gap_that_begins_at_a_settled_gain_is_seen():
     """The samples after a gap weigh more: the gain must not stay as it was."""
     space = (WhiteNoise(1.0) + RandomWalk(0.3)).state_space(1.0)
-    y = columns(LONG, slice(3000, 3700), seed=5)[:, :1]
+    y = columns(LONG, slice(3000, 3700), seed=5)[:, :1].copy()
     y[3700] = 10.0
     innovations = whiten(*arguments(space), y)[0][:, 0]
     # After 701 steps the prediction is off by 0.3 sqrt(701) = 7.9 beside the noise of 1.

@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from gmwm.ins.geometry.earth import (
-    earth_rate,
     gravity,
     ned_difference,
     offset,
     radii,
-    transport_rate,
 )
 
 LATITUDES = st.floats(-math.radians(88), math.radians(88))
@@ -58,11 +56,6 @@ def test_radii_and_gravity_agree_with_pyins() -> None:
         north, east, _ = theirs.principal_radii(lat, 0.0)
         assert radii(math.radians(lat)) == pytest.approx((north, east), rel=1e-12)
         assert gravity(math.radians(lat), 0.0) == pytest.approx(theirs.gravity(lat, 0), rel=1e-9)
-        curvature = theirs.curvature_matrix(lat, 500.0)
-        found = transport_rate(math.radians(lat), 500.0, 30.0, -20.0)
-        np.testing.assert_allclose(found, curvature @ [30.0, -20.0, 3.0], rtol=1e-12)
-        rate = theirs.rate_n(lat)
-        np.testing.assert_allclose(earth_rate(math.radians(lat)), rate[[0, 2]], atol=1e-18)
 
 
 @given(LATITUDES, st.floats(-4, 4), st.floats(0, 2 * math.pi), st.floats(1, 3000))

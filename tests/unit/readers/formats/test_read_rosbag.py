@@ -120,7 +120,9 @@ def test_several_imus_ask_for_a_topic(tmp_path):
     message = refusal(path)
     assert "/imu0 (200 messages), /imu1 (200 messages)" in message
     assert 'topic="/imu0"' in message
-    assert exact(gmwm.read(path, topic="/imu1"), other)
+    found = gmwm.read(path, topic="/imu1")
+    assert exact(found, other)
+    assert [n.values["topic"] for n in found.notices if n.code == "topic"] == ["/imu1"]
     assert exact(gmwm.read(path, topic="imu0"))
     assert "no topic '/imu3'" in refusal(path, topic="/imu3")
     assert "no pair" in refusal(path, topic=["/imu0", "/imu1"])

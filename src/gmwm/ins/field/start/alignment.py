@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -46,6 +47,8 @@ class Alignment:
         How well it is known, rad/s; ``None`` if the vehicle never stood still.
     notices : tuple of Notice
         How it came about.
+    stood : float
+        Time over which that was averaged, s.
     """
 
     epoch: int
@@ -54,6 +57,7 @@ class Alignment:
     gyro_bias: FloatArray
     gyro_bias_sd: float | None
     notices: tuple[Notice, ...]
+    stood: float = 0.0
 
 
 def align(
@@ -112,7 +116,7 @@ def align(
     levelled = epoch if still and first <= epoch <= last else (first + last) // 2
     level = np.array([np.arctan2(-mean[4], -mean[5]), np.arctan2(mean[3], np.hypot(*mean[4:])), 0])
     body = turned(imu, bias, matrix_from_rpy(level), levelled, epoch)
-    gyro_sd = _mean_sd(models, "gyro", length, imu.dt)
+    gyro_sd = mean_sd(models, "gyro", length, imu.dt)
     biased = float(np.hypot(gyro_sd, _bias(models, "gyro")))
     drift = gyro_sd if still else float(np.hypot(biased, RATE))
     tilt_sd = float(
@@ -148,7 +152,7 @@ def align(
     )  # fmt: skip
     return Alignment(
         epoch, *_at_fix(imu, aiding, epoch, fix, C, velocity, (velocity_sd, tilt_sd, yaw_sd)),
-        bias - earth if still else bias, known_sd, notices,
+        bias - earth if still else bias, known_sd, notices, length if still else 0.0,
     )  # fmt: skip
 
 
@@ -179,7 +183,7 @@ def _in_motion(imu: Imu, aiding: Aiding, models: SensorModels) -> Alignment:
     positions = positions_of(aiding)
     epoch, fix = _starting_fix(positions, imu.dt, 0)
     constant = [
-        float(np.hypot(_bias(models, kind), _mean_sd(models, kind, tuning.MOTION_LEAST, imu.dt)))
+        float(np.hypot(_bias(models, kind), mean_sd(models, kind, tuning.MOTION_LEAST, imu.dt)))
         for kind in ("gyro", "accel")
     ]
     C, sd = attitude_in_motion(
@@ -251,7 +255,7 @@ def _bias(models: SensorModels, kind: str) -> float:
     return max(models.bias_sd[axis] for axis in AXES if axis.startswith(kind))
 
 
-def _mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
+def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     """Standard deviation of an error later, less its mean over a time; the worst axis."""
     variances = [
         float(models.models[axis].haar_variance(np.array([length]), dt)[0])
@@ -266,7 +270,7 @@ def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> flo
     slow = [
         float(np.sqrt(_stationary(models, axis, dt))) for axis in AXES if axis.startswith("accel")
     ]
-    error = np.hypot(max(slow), _mean_sd(models, "accel", length, dt))
+    error = np.hypot(max(slow), mean_sd(models, "accel", length, dt))
     sd = np.hypot(np.hypot(error, _bias(models, "accel")) / STANDARD_GRAVITY, tuning.TILT_FLOOR)
     return float(sd if still else np.hypot(sd, tuning.TILT_MOVING))
 
@@ -286,10 +290,21 @@ def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding
     alignment : Alignment
     """
     first = alignment.epoch
-    rotation = imu.rotation[first:] - alignment.gyro_bias * imu.dt
+    rotation = _less(imu.rotation[first:], alignment.gyro_bias * imu.dt)
     fixes = []
     for each in aiding.fixes:
         shifted = replace(each, time=each.time - first * imu.dt)
         # Those of the first epoch made the initial state.
         fixes.append(shifted.part(shifted.time > 0.5 * imu.dt))
     return Imu(imu.dt, rotation, imu.velocity[first:]), replace(aiding, fixes=tuple(fixes))
+
+
+def _less(rotation: FloatArray, constant: FloatArray) -> FloatArray:
+    """Increments less a constant; on disk if they are there."""
+    if not is_spooled(rotation):
+        return np.asarray(rotation - constant)
+    spool = Spool(3)
+    for part in windows(len(rotation)):
+        spool.append(rotation[part] - constant)
+        release(rotation)
+    return spool.array()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmwm._core.spool import release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import Imu
+
+_WINDOWS = 1024  # looked at together: a few MB
 
 
 def positions_of(aiding: Aiding) -> Fixes:
@@ -33,7 +36,7 @@ def steady(imu: Imu) -> tuple[int, int] | None:
     """
     window = max(round(tuning.STEADY_WINDOW / imu.dt), 1)
     count = min(imu.n, round(tuning.SEARCHED / imu.dt)) // window
-    increments = np.hstack([imu.rotation, imu.velocity])[: count * window]
+    increments = np.hstack([each[: count * window] for each in (imu.rotation, imu.velocity)])
     means = increments.reshape(count, window, 6).mean(axis=1) / imu.dt
     least, most = (
         round(tuning.STEADY_LEAST / tuning.STEADY_WINDOW),
@@ -105,9 +108,16 @@ def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
         return None
     quieter, length = tuning.ZERO_VELOCITY
     window = max(round(length / imu.dt), 2)
-    samples = np.hstack([imu.rotation, imu.velocity])[: imu.n // window * window] / imu.dt
-    windows = samples.reshape(-1, window, 6)
-    mean, scatter = windows.mean(axis=1), windows.std(axis=1)
+    count = imu.n // window
+    mean, scatter = np.empty((count, 6)), np.empty((count, 6))
+    for begin in range(0, count, _WINDOWS):
+        part = slice(begin, min(begin + _WINDOWS, count))
+        rows = slice(part.start * window, part.stop * window)
+        samples = np.hstack([imu.rotation[rows], imu.velocity[rows]]) / imu.dt
+        seconds = samples.reshape(-1, window, 6)
+        mean[part], scatter[part] = seconds.mean(axis=1), seconds.std(axis=1)
+        release(imu.rotation)
+        release(imu.velocity)
     first, last = (-(-stretch[0] // window), stretch[1] // window)
     rest = slice(first, max(last, first + 1))
     level, usual = mean[rest].mean(axis=0), np.sqrt(np.mean(scatter[rest] ** 2, axis=0))

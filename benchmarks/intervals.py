@@ -3,11 +3,11 @@
 An hour at 100 Hz (360,000 samples), complete and with 0.1 % of the samples missing at random. The
 true kinds of terms are fitted, every run counts, valid or not.
 
-    python benchmarks/coverage.py intervals [--runs 400] [--store coverage.jsonl]
-    python benchmarks/coverage.py limits [--runs 400] [--store coverage.jsonl]
+    python benchmarks/intervals.py intervals [--runs 400] [--store intervals.jsonl]
+    python benchmarks/intervals.py limits [--runs 400] [--store intervals.jsonl]
 
 "intervals": `Fit.interval` of each parameter of N+K, N+B and N+2GM. "limits": the upper 95 % limit
-of a walk whose variance is 0, 1, 2, 3, 4.4 and 7 standard errors of that of no walk: the bound
+of a walk whose variance is 0, 4.4, 15, 30, 60 and 120 standard errors of that of no walk: the bound
 where K is only bounded, the upper end of the 90 % interval where it is found. In brackets the
 binomial interval (95 %, Clopper-Pearson) of each fraction.
 
@@ -39,7 +39,7 @@ TRUTHS: dict[str, Model] = {
     "N+B": WHITE + BiasInstability(1.5e-5),
     "N+2GM": WHITE + GaussMarkov(3e-4, 5.0) + GaussMarkov(2e-4, 100.0),
 }
-SIGMAS = (0.0, 1.0, 2.0, 3.0, 4.4, 7.0)
+SIGMAS = (0.0, 4.4, 15.0, 30.0, 60.0, 120.0)
 
 
 def least_error() -> float:
@@ -113,7 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", choices=["intervals", "limits"])
     parser.add_argument("--runs", type=int, default=400)
-    parser.add_argument("--store", type=Path, default=Path("coverage.jsonl"))
+    parser.add_argument("--store", type=Path, default=Path("intervals.jsonl"))
     given = parser.parse_args()
     warnings.simplefilter("ignore", FitWarning)
     done: dict[tuple[str, str, bool, int], dict[str, Any]] = {}

@@ -1,0 +1,288 @@
+"""The main job: a recording in, an error model for every channel out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from gmwm._core import checks
+from gmwm._core.notices import Notice
+from gmwm._core.typing import Progress
+from gmwm.calibration import tuning
+from gmwm.calibration.calibration import Calibration
+from gmwm.calibration.channel import (
+    ChannelModel,
+    GivenModels,
+    calibration_of,
+    channel_model,
+    model_of,
+    mostly_missing,
+)
+from gmwm.calibration.removal import variance_without
+from gmwm.calibration.screening import (
+    SCREENING,
+    Screened,
+    screened,
+    stretches_at_rest,
+    with_outcomes,
+)
+from gmwm.calibration.stages import current, stage
+from gmwm.diagnosis import thinned
+from gmwm.errors import InputError
+from gmwm.readers import Channel, Recording, is_frame, read
+from gmwm.variance import MIN_SAMPLES
+
+_SPOILING = {
+    "not-static": ("gyro", "accel"),
+    "tilt": ("accel",),
+    "rate-changes": ("gyro", "accel"),
+}
+"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
+
+_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
+"""Codes of issues of a channel that make its fit invalid where they are bad."""
+
+
+def calibrate(
+    recording: Recording | Sequence[Recording] | Any,
+    model: GivenModels = None,
+    *,
+    screening: Collection[str] = SCREENING,
+    still: bool = True,
+    remove_departures: bool = False,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Error model of every channel of a static recording, or of several of one sensor.
+
+    The recording is examined first: samples of shocks and spikes are left out, periodic lines and
+    resonances are terms that a selected model may have, and the wavelet variances of a channel
+    with outliers all over the record are robust; a channel of which each sample is written several
+    times is taken at its own rate. Fits of a recording that was not static, or whose rate changed,
+    are not valid, nor those of an accelerometer that was tilted. Notices report what was found and
+    done. A channel that is constant, or of which more than half of the samples are missing, is
+    skipped; auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps,
+    transients at the start and slow periods are looked for beside its noise
+    (`gmwm.calibration.departures`); a fit of which they make more than a tenth of the deviation at
+    some averaging time is not valid.
+
+    Parameters
+    ----------
+    recording : Recording or sequence of Recording
+        At rest, or with stretches at rest. Several of one sensor have one model, fitted jointly;
+        see `gmwm.JointFit`. A DataFrame or an Arrow table is read with `gmwm.read`, which needs a
+        column of time stamps and units in the names of the others.
+    model : Process, Model or mapping, optional
+        Fitted to every channel, or by channel name; by default the model of each channel is
+        selected.
+    screening : collection of str, optional
+        Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
+        unexamined.
+    still : bool, optional
+        Whether only the stretches at rest of a log that is not static are used, as several
+        recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
+    remove_departures : bool, optional
+        Whether evident steps, transients at the start and slow periods are subtracted, the samples
+        at which a step may be left out, and what is left is fitted again, three times at most; what
+        their estimated sizes take of the noise is given back to the wavelet variances.
+    jobs : int, optional
+        Threads. One is fastest for recordings of usual length, whose fits are small steps that
+        threads of one interpreter do in turns; -1 is one per core.
+    progress : callable, optional
+        Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If no channel can be calibrated, a mapping has no model for one, or a log that is not static
+        has no stretch of ten seconds at rest.
+    """
+    given = _recordings(recording)
+    _check_together(given)
+    with stage("health"):
+        if still and screening:
+            given = [part for each in given for part in stretches_at_rest(each)]
+        treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    recordings = [each.recording for each in treated]
+    alive, dead, sources = _usable(treated)
+    models = {name: model_of(name, model) for name in alive}
+    if not alive:
+        raise InputError(_nothing_alive(recordings, dead))
+    for each in recordings:
+        if each.n < MIN_SAMPLES:
+            raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
+
+    offered = {
+        name: next((e.extra[name] for e in treated if e.extra.get(name)), ()) for name in alive
+    }
+    robust = frozenset[str]().union(*(each.robust for each in treated))
+    finished: list[str] = []
+    watch = current()
+
+    def report(name: str) -> None:
+        if progress is not None:
+            progress(len(finished), len(alive), name)
+
+    def one(name: str) -> ChannelModel | Notice:
+        report(name)
+        with watch.running() if watch is not None else nullcontext():
+            found = channel_model(
+                name,
+                lambda removed: [
+                    variance_without(channel, gone, robust=name in robust)
+                    for channel, gone in zip(alive[name], removed, strict=True)
+                ],
+                models[name],
+                sources[name],
+                extra=offered[name],
+                removals=tuning.REMOVALS if remove_departures else 0,
+            )
+        finished.append(name)
+        return found
+
+    workers = Parallel(n_jobs=jobs, prefer="threads")
+    found = dict(zip(alive, workers(delayed(one)(name) for name in alive), strict=True))
+    report("")
+    source = ", ".join(each.source for each in given)
+    issues = [
+        replace(notice, source=each.recording.source) if len(given) > 1 else notice
+        for each in treated
+        for notice in each.notices
+    ]
+    spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
+    if not still:
+        spoiling.pop("not-static", None)  # as the caller says
+    chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
+    return calibration_of(
+        {
+            name: each
+            if isinstance(each, Notice)
+            else _judged(each, (*_of_sensor(each, spoiling.values()), *_of_channel(name, issues)))
+            for name, each in found.items()
+        },
+        dead,
+        with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
+        source=source,
+        rate=given[0].rate,
+        n=sum(each.n for each in given),
+        left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
+    )
+
+
+def _recordings(given: Any) -> list[Any]:
+    """What was given, as a list; frames are read."""
+    alone = isinstance(given, Recording) or is_frame(given)
+    return [read(each) if is_frame(each) else each for each in ([given] if alone else given)]
+
+
+def _each_once(notices: Iterable[Notice]) -> list[Notice]:
+    """Sensors with rates of their own share those of the reader."""
+    found: list[Notice] = []
+    for notice in notices:
+        if notice not in found:
+            found.append(notice)
+    return found
+
+
+def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tuple[int, int], ...]]:
+    """The samples that screening took from a recording, by channel."""
+    spans = {}
+    for before, after in zip(given.channels, screened_one.channels, strict=True):
+        gone = np.isnan(after.values) & ~np.isnan(before.values)
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False)).tolist()
+        if edges:
+            spans[before.name] = tuple(zip(edges[::2], edges[1::2], strict=True))
+    return spans
+
+
+def _check_together(recordings: Sequence[Recording]) -> None:
+    if not recordings:
+        raise InputError("there is no recording: give one at least")
+    for each in recordings:
+        if not isinstance(each, Recording):
+            raise InputError(
+                f"{checks.shown(each)} is not a recording: give what gmwm.read returns, or "
+                "make one with Recording.from_arrays"
+            )
+    first = recordings[0]
+    for other in recordings[1:]:
+        for channel in other.inertial:
+            known = first.get(channel.name, channel)
+            if abs(known.dt / channel.dt - 1.0) > tuning.SAME_RATE:
+                raise InputError(
+                    f"{other.source} has {1.0 / channel.dt:g} Hz and {first.source} "
+                    f"{1.0 / known.dt:g} Hz: calibrate recordings of different rates one by one"
+                )
+
+
+def _usable(
+    treated: Sequence[Screened],
+) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
+    """Each channel in the recordings where it can be used, why others are skipped, and which."""
+    interval: dict[str, float] = {}
+    alive: dict[str, list[Channel]] = {}
+    sources: dict[str, list[str]] = {}
+    dead: dict[str, Notice] = {}
+    for each in treated:
+        for channel in each.recording.inertial:
+            straight = (n for n in each.notices if n.code == "interpolated")
+            why = next((n for n in straight if n.where == channel.name), None)
+            why = why or _reason_to_skip(channel)
+            if why is not None:
+                dead.setdefault(channel.name, why)
+            else:
+                channel = replace(channel, dt=interval.setdefault(channel.name, channel.dt))
+                repeated = each.repeated.get(channel.name)
+                own = thinned(channel, repeated) if repeated else channel
+                alive.setdefault(channel.name, []).append(own)
+                sources.setdefault(channel.name, []).append(each.recording.source)
+    return alive, {name: why for name, why in dead.items() if name not in alive}, sources
+
+
+def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) -> str:
+    which = "; ".join(f"{name}: {why.text}" for name, why in dead.items())
+    which = which or "only auxiliary channels"
+    if dead and all(why.code == "constant" for why in dead.values()):
+        which = "every channel is constant"
+    return (
+        f"{recordings[0].source or 'the recording'}: {which}, nothing to calibrate: check the "
+        "sensor and the columns"
+    )
+
+
+def _reason_to_skip(channel: Channel) -> Notice | None:
+    """Why a channel is skipped, if it is."""
+    if channel.missing == channel.n:
+        code, text = "all-missing", "all samples missing"
+    elif channel.is_constant and channel.missing <= channel.n / 2:
+        code, text = "constant", f"constant at {channel.mean:.6g} {channel.unit}"
+    else:
+        return mostly_missing(channel.name, channel.missing, channel.n)
+    return Notice(code, "bad", channel.name, text, {"missing": channel.missing})
+
+
+def _of_sensor(found: ChannelModel, spoiling: Iterable[Notice]) -> list[Notice]:
+    """Those issues of the whole recording that concern its sensor."""
+    sensor = found.fit.wv.quantity or "gyro"
+    return [issue for issue in spoiling if sensor in _SPOILING[issue.code]]
+
+
+def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:
+    """The issues of a channel that make its numbers wrong, once each."""
+    bad = (each for each in issues if each.where == name and each.severity == "bad")
+    return list({each.code: each for each in bad if each.code in _SPOILING_CHANNEL}.values())
+
+
+def _judged(found: ChannelModel, spoiling: Iterable[Notice]) -> ChannelModel:
+    """With a fit that is not valid where an issue of its data makes its numbers wrong."""
+    notices = [Notice(e.code, "bad", "", e.text, e.values, e.action) for e in spoiling]
+    return replace(found, fit=replace(found.fit, notices=(*notices, *found.fit.notices)))

@@ -1,0 +1,121 @@
+"""The compiled search for shapes beside that of MINPACK, and what of fits is found once."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm.estimate.moments import Design, Profile, dictionary_fit, gmwm as method, search
+from gmwm.estimate.problem import Scales, weight_root
+from gmwm.process import compiled_levels, quadrature, shaped_curve, shaped_slope
+
+TAU = 0.01 * 2.0 ** np.arange(18)
+SHAPED = (gmwm.GaussMarkov(), gmwm.Resonance(), gmwm.LowPassNoise())
+
+
+@pytest.fixture(scope="module")
+def wv():
+    truth = gmwm.WhiteNoise(0.02) + gmwm.LowPassNoise(0.2, 12.0, 2.0, 0.7)
+    truth += gmwm.Resonance(0.05, 1.0, 0.05) + gmwm.GaussMarkov(0.05, 40.0)
+    return gmwm.wavelet_variance(truth.simulate(200_000, 0.01, seed=3), 0.01)
+
+
+@pytest.mark.parametrize("process", SHAPED, ids=lambda p: type(p).__name__)
+def test_compiled_curves_are_those_of_the_process(process):
+    kind = process.compiled_kind
+    levels = compiled_levels(TAU, 0.01, {kind})
+    rng = np.random.default_rng(1)
+    grid = process.shape_grid(0.01, 400_000)
+    for place in rng.integers(len(grid), size=20):
+        found = shaped_curve(kind, np.array(grid[place]), levels)
+        expected = process.unit_haar_variance(grid[place], TAU, 0.01)
+        if found.size:  # else on finer nodes than compiled code has
+            np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.4, 2.0, 4.0])
+def test_wide_panels_are_fine_enough(order):
+    process = gmwm.LowPassNoise(1.0, 9.0, order, np.sqrt(0.5))
+    nodes = quadrature(tuple((TAU / 0.01).tolist()))
+    expected = nodes.haar_variance(process.psd, 0.01)
+    np.testing.assert_allclose(process.haar_variance(TAU, 0.01), expected, rtol=1e-7)
+
+
+def test_only_a_gauss_markov_process_has_a_slope_in_closed_form():
+    levels = compiled_levels(TAU, 0.01, {1, 2})
+    slope = shaped_slope(1, np.array([0.3]), levels)
+    near = [gmwm.GaussMarkov(1.0, 0.3 * np.exp(h)).haar_variance(TAU, 0.01) for h in (1e-5, -1e-5)]
+    np.testing.assert_allclose(slope, (near[0] - near[1]) / 2e-5, rtol=1e-6, atol=1e-12)
+    assert shaped_slope(2, np.array([0.3, 0.1]), levels).size == 0
+
+
+def test_a_subclass_is_no_compiled_kind():
+    class Mine(gmwm.GaussMarkov):
+        def haar_variance(self, tau, dt):
+            return 2.0 * super().haar_variance(tau, dt)
+
+    assert Mine.compiled_kind == 0
+    assert Design(gmwm.WhiteNoise() + Mine(), Scales(TAU, 0.01, 400_000)).compiled is None
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        gmwm.WhiteNoise() + gmwm.GaussMarkov(),
+        gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-4) + 2 * gmwm.GaussMarkov(),
+        gmwm.LowPassNoise(order=2.0, damping=0.7) + gmwm.GaussMarkov(),
+        gmwm.LowPassNoise(damping=0.7) + gmwm.Resonance(damping=0.05) + gmwm.GaussMarkov(),
+    ],
+    ids=str,
+)
+def test_the_compiled_search_ends_where_minpack_does(model, wv):
+    design = Design(model, Scales.of(wv))
+    root = weight_root(dictionary_fit(wv, wv.variance).covariance)
+    profile = Profile(design, wv.variance, root)
+    best = search(profile)
+    rng = np.random.default_rng(4)
+    for _ in range(4):
+        z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners()))
+        start = profile.at(design.unpack(z, best.shapes))
+        compiled = profile._compiled(z, start)
+        stepwise = profile._stepwise(z, start)
+        assert compiled.objective <= start.objective
+        assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
+        np.testing.assert_allclose(
+            design.pack(compiled.shapes), design.pack(stepwise.shapes), atol=1e-4
+        )
+        np.testing.assert_allclose(compiled.x, profile.at(compiled.shapes).x, rtol=1e-8)
+
+
+def test_a_term_without_an_amplitude_stays_where_it_is(wv):
+    """Its column of the Jacobian is zero, the others move all the same."""
+    design = Design(gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), Scales.of(wv))
+    profile = Profile(design, wv.variance, np.diag(1.0 / wv.variance))
+    start = profile.at([(), (0.3,), (0.3,)])  # of two alike, one has all
+    absent = int(np.flatnonzero(start.x == 0.0)[0])
+    found = profile._compiled(design.pack(start.shapes), start)
+    assert found.shapes[absent] == pytest.approx((0.3,), rel=1e-9)
+    assert found.objective < start.objective
+
+
+def test_an_estimation_is_searched_once_and_does_not_keep_the_series(monkeypatch):
+    x = (gmwm.WhiteNoise(0.2) + gmwm.GaussMarkov(0.05, 4.0)).simulate(20_000, 0.01, seed=5)
+    data = gmwm.wavelet_variance(x, 0.01)
+    searched = []
+    real = method.GMWM._searched
+    monkeypatch.setattr(
+        method.GMWM, "_searched", lambda *args: searched.append(args[1]) or real(*args)
+    )
+    model = gmwm.WhiteNoise() + gmwm.GaussMarkov()
+    first, second = gmwm.fit(model, data), gmwm.fit(model, data)
+    assert searched.count(model) == 1
+    assert first.to_dict() == second.to_dict()
+    gmwm.fit(model, data, weights="diagonal")
+    assert searched.count(model) == 2
+    kept = weakref.ref(data)
+    searched.clear()
+    del data, first, second
+    gc.collect()
+    assert kept() is None
