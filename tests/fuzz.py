@@ -141,9 +141,15 @@ def _changed(rng: random.Random, content: Any) -> Any:
     return content
 
 
+def _is_number(value: Any) -> bool:
+    """One that can be multiplied by another."""
+    is_some = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_some and not (isinstance(value, int) and abs(value) > 10**300)
+
+
 def _replaced(rng: random.Random, value: Any) -> Any:
     kind = rng.random()
-    if isinstance(value, int | float) and not isinstance(value, bool) and kind < 0.4:
+    if _is_number(value) and kind < 0.4:
         return value * rng.choice((-1, 0, 2, 0.5, 1e-30, 1e30, 1e-300, 1.0000001))
     if kind < 0.45:
         for _ in range(rng.choice((2, 40, 200))):

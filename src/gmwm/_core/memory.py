@@ -85,9 +85,10 @@ def require(needed: float, what: str) -> None:
     if needed > allowed:
         raise InputError(
             f"{what} needs about {_gigabytes(needed)} of memory, and {_gigabytes(allowed)} may be "
-            f"used: read fewer columns with channels=, cut it into parts, or set {VARIABLE} (GB) "
-            "if there is more",
+            "used",
             "memory",
+            f"read fewer columns with channels=, cut it into parts, or set {VARIABLE} (GB) if "
+            "there is more",
         )
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 
-ROWS = 1 << 18
-"""Of a window: 2 MB a column."""
+ROWS = 1 << 16
+"""Of a window: half a MB a column."""
 
 
 class Spool:
@@ -30,7 +30,7 @@ class Spool:
 
     def append(self, rows: FloatArray) -> None:
         """Add rows, (n, width)."""
-        self._file.write(np.ascontiguousarray(rows, dtype=float).tobytes())
+        self._file.write(np.ascontiguousarray(rows, dtype=float).data)
         self.n += len(rows)
 
     def array(self) -> FloatArray:

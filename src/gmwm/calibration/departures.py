@@ -102,7 +102,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     kinds = families(means.blocks.size, means.step)
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
-        known = np.full((1, means.first.size), means.step)
+        known = means.differences(means.step * np.arange(float(means.blocks.size))[None, :])
     found: list[Departure] = []
     for _ in range(tuning.MOST_DEPARTURES):
         beside = [noise.beside(known) for noise in noises]
@@ -161,13 +161,21 @@ class _Means:
 
     @cached_property
     def first(self) -> IntArray:
-        """Blocks that exist beside one that exists."""
-        there = ~np.isnan(self.blocks)
-        return np.flatnonzero(there[:-1] & there[1:])
+        """Blocks that exist, but for the last."""
+        return np.flatnonzero(~np.isnan(self.blocks))[:-1]
 
     def differences(self, curves: FloatArray) -> FloatArray:
-        """Of neighbouring blocks, (..., B) to (..., D)."""
-        return np.asarray(curves[..., self.first + 1] - curves[..., self.first])
+        """Of each block that exists and the next that does, (..., B) to (..., D)."""
+        there = ~np.isnan(self.blocks)
+        return np.asarray(np.diff(curves[..., there], axis=-1))
+
+    def covariance(self, spectrum: PSD) -> FloatArray:
+        """Of these differences under a spectrum, (D, D), u^2."""
+        column = difference_covariance(spectrum, self.dt, self.samples, self.blocks.size)
+        last = int(np.flatnonzero(~np.isnan(self.blocks))[-1])
+        whole = toeplitz(column[:last])
+        # One across missing blocks is the sum of those of neighbours.
+        return np.asarray(np.add.reduceat(np.add.reduceat(whole, self.first), self.first, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,13 +210,9 @@ def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
     # K^2 that equals the floor at that averaging time.
     walk = 3.0 * floor / (tuning.WALK_AT * means.length) ** 2
 
-    def covariance(spectrum: PSD) -> FloatArray:
-        column = difference_covariance(spectrum, means.dt, means.samples, means.blocks.size)
-        return np.asarray(toeplitz(column)[np.ix_(means.first, means.first)])
-
-    flat = floor * covariance(lambda f, _: np.ones_like(f))
-    slow = covariance(psd) - flat
-    unit = walk * covariance(RandomWalk(1.0).psd)
+    flat = floor * means.covariance(lambda f, _: np.ones_like(f))
+    slow = means.covariance(psd) - flat
+    unit = walk * means.covariance(RandomWalk(1.0).psd)
     parts, weights = np.array(tuning.SLOW_PARTS), np.gradient(np.log(tuning.SLOW_PARTS))
     if np.max(np.abs(slow)) < tuning.NO_SLOW_PART * np.max(np.abs(flat)):
         parts, weights = parts[:1], np.sum(weights, keepdims=True)  # all the same noise

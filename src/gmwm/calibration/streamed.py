@@ -40,7 +40,7 @@ def calibrate_stream(
     progress : callable, optional
         As in `gmwm.calibrate`, when the file is read.
     **reading
-        ``rate``, ``units``, ``channels``, ``time`` as in `gmwm.read`; ``rows`` of a block.
+        The arguments of `gmwm.read`; ``rows`` of a block.
 
     Returns
     -------

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("form", "start", "stop", "layout", "topics")
+_WHOLE = ("start", "stop")
 """Options of reading for which the whole file is read."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
@@ -91,9 +91,9 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
 @click.option("--memory", type=float, metavar="GB",
-              help="For the samples; a longer text, NPY, Parquet or Feather file is read a block "
-                   "at a time, and shocks, lines and motion are not looked for then. By default a "
-                   "quarter of the machine's.")  # fmt: skip
+              help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of "
+                   "ArduPilot is read a block at a time, and shocks, lines and motion are not "
+                   "looked for then. By default a quarter of the machine's.")  # fmt: skip
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -211,15 +211,18 @@ def _recordings(
             whole = [name for name in _WHOLE if reading.get(name)]
             if error.code != "memory" or len(files) > 1 or whole:
                 raise
-    return [next(read_blocks(files[0], **_of_stream(reading)))], True
+            too_large = error
+    try:
+        return [next(read_blocks(files[0], **_of_stream(reading)))], True
+    except InputError as error:
+        raise (too_large if error.code == "not-divisible" else error) from None
 
 
 def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
     """What `gmwm.calibrate_stream` is given for the options."""
     from gmwm.cli.options import arguments_of_read
 
-    asked = arguments_of_read(**{k: v for k, v in reading.items() if k not in ("start", "stop")})
-    return {name: asked[name] for name in ("rate", "units", "channels", "time")}
+    return arguments_of_read(**{k: v for k, v in reading.items() if k not in ("start", "stop")})
 
 
 def show(result: Calibration) -> None:

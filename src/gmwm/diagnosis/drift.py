@@ -116,12 +116,28 @@ def variance_notice(
     is_heavy : bool, optional
         Whether the noise has heavy tails: the predictions after a large sample are worse then.
     """
-    level = errors.level
-    if step > 2.0 * level:
+    if step > 2.0 * errors.level:
         return None  # noise below the step is seen only when the level is between two steps
-    unsteady = _unsteady_notice(name, unit, dt, errors, usable, is_heavy)
-    if unsteady is not None or np.count_nonzero(usable) < 1000:
-        return unsteady
+    found = _change_notice(name, dt, errors, usable)
+    values = _unsteadiness(dt, errors, usable, is_heavy)
+    if values is None:
+        return found
+    low, high = (readable(values[each], unit) for each in ("quiet", "loud"))
+    text = (
+        f"the noise is not steady: {low} in the quiet and {high} in the loud tenth of parts of "
+        f"{values['part']:.3g} s, so that its mean is {100.0 * values['excess']:.2g} % above that "
+        "of the quiet quarter"
+    )
+    action = "use a recording, or a part, without what vibrates"
+    if found is not None:
+        text, values = f"{found.text}; {text}", {**found.values, **values}
+    return Notice("variance", "bad", name, text, values, action)
+
+
+def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray) -> Notice | None:
+    """Of the second half against the first, or of one tenth."""
+    if np.count_nonzero(usable) < 1000:
+        return None
     squares = [part[keep] ** 2 for part, keep in _tenths(errors.values, usable)]
     if min(part.size for part in squares) < 50:
         return None
@@ -173,10 +189,10 @@ def variance_notice(
     return None
 
 
-def _unsteady_notice(
-    name: str, unit: str, dt: float, errors: Innovations, usable: BoolArray, is_heavy: bool
-) -> Notice | None:
-    """Say that the noise comes and goes, or swells and dies, so that its mean is that of no time.
+def _unsteadiness(
+    dt: float, errors: Innovations, usable: BoolArray, is_heavy: bool
+) -> dict[str, float] | None:
+    """By how much noise that comes and goes, or swells and dies, is above that of its quiet parts.
 
     Sizes of prediction errors, bounded so that tails do no harm, are averaged over parts of 64,
     256, ... samples. Those of stationary noise vary from part to part by their long-run variance
@@ -188,38 +204,34 @@ def _unsteady_notice(
     memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if is_heavy else 1)
     lengths = 4 * memory * 4 ** np.arange(16)
     lengths = lengths[lengths * tuning.FEWEST_STEADY <= size.size]
-    if not lengths.size or not np.any(size > 0.0):
+    if not lengths.size or not errors.level > 0.0:
         return None
     bounded = np.minimum(size, tuning.LARGE * errors.level)
     # What is far beyond the noise around it is clipped: a shock is no change of the noise.
     squares = np.minimum(size, tuning.CLIP * errors.scale[usable]) ** 2
     squares /= np.mean(squares)
-    excess = float(kurtosis(bounded))
+    kurt = float(kurtosis(bounded))
     by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
-    if not min(by_chance) > 0.0:
+    if min(by_chance) <= 0.0:
         return None
-    worst, parts = 0.0, squares
+    found = {"excess": tuning.UNSTEADY}
     for length in lengths.tolist():
-        variance = float(np.var(_means(bounded, length), ddof=1))
-        freedom = 2.0 / (2.0 / (size.size // length - 1) + excess / size.size)
-        chance = chi2.sf(freedom * variance * length / by_chance[0], freedom)
-        means = _means(squares, length)
-        added = float(np.var(means, ddof=1)) - by_chance[1] / length
-        if chance * lengths.size < tuning.FALSE_ALARM and added > worst:
-            worst, parts = added, means
-    changes = float(np.sqrt(worst))
-    if changes < tuning.UNSTEADY:
-        return None
-    usual = float(np.sqrt(np.mean(size**2)))
-    low, high = (usual * float(np.sqrt(each)) for each in np.quantile(parts, [0.1, 0.9]))
-    part = dt * (size.size // parts.size)
-    text = (
-        f"the noise is not steady: its standard deviation is {readable(low, unit)} in the quiet and "
-        f"{readable(high, unit)} in the loud parts of {part:.3g} s (a tenth of them beyond)"
-    )
-    values = {"changes": changes, "quiet": low, "loud": high, "part": part}
-    action = "the model is that of no part: use a recording, or a part, without what vibrates"
-    return Notice("variance", "bad", name, text, values, action)
+        sizes, means = _means(bounded, length), _means(squares, length)
+        freedom = 2.0 / (2.0 / (means.size - 1) + kurt / size.size)
+        ratio = float(np.var(sizes, ddof=1)) * length / by_chance[0]
+        total = float(np.var(means, ddof=1))
+        added = total - by_chance[1] / length
+        if added <= 0.0 or chi2.sf(freedom * ratio, freedom) * lengths.size > tuning.FALSE_ALARM:
+            continue
+        # Without what chance spreads them.
+        real = np.maximum(1.0 + np.sqrt(added / total) * (means - 1.0), np.min(means))
+        quiet, quarter, loud = np.quantile(real, [0.1, 0.25, 0.9])
+        excess = float(1.0 / np.sqrt(quarter) - 1.0) if quarter > 0.0 else np.inf
+        if excess > found["excess"]:
+            usual = float(np.sqrt(np.mean(size**2)))
+            low, high = (usual * float(np.sqrt(each)) for each in (quiet, loud))
+            found = {"excess": excess, "quiet": low, "loud": high, "part": dt * length}
+    return found if "part" in found else None
 
 
 def _long_run_variance(values: FloatArray, memory: int) -> float:

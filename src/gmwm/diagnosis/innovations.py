@@ -46,7 +46,7 @@ class Innovations:
     @property
     def level(self) -> float:
         """Usual standard deviation, u."""
-        return float(np.median(self.scale))
+        return float(np.median(self.scale[self.known]))
 
 
 def innovations(values: FloatArray, step: float) -> Innovations | None:

@@ -259,9 +259,9 @@ def repeated_value_notice(
         return None
     is_much = share > tuning.MUCH_REPEATED
     text = (
-        f"{count:,} samples ({share:.2g} of all) are {readable(float(levels[most]), unit, digits=5)}"
-        f", which comes {counts[most] / np.max(near):.2g} times as often as the "
-        "values next to it"
+        f"{count:,} samples ({share:.2g} of all) are "
+        f"{readable(float(levels[most]), unit, digits=5)}, which comes "
+        f"{counts[most] / np.max(near):.2g} times as often as the values next to it"
     )
     return Notice(
         "value-repeated",

@@ -145,10 +145,9 @@ STEADY_MEAN, STEADY_OF_TAILS, FEWEST_STEADY = 16, 4, 8
 sample leaves its trace in the predictions of `ORDER` more), and parts of four times as many and
 more that are compared with it at least."""
 
-UNSTEADY = 0.2
-"""Standard deviation of the variance from part to part, over its mean, above which a model is that
-of no part: N is then 10 to 20 % above that of the quiet parts. Real recordings at rest have up to
-0.11 (docs/real-data.md)."""
+UNSTEADY = 0.1
+"""Of the deviation of all above that of the quiet quarter: as much as a valid fit may miss. Real
+recordings at rest have 0.04 (docs/health.md)."""
 
 # -- two channels ---------------------------------------------------------------------------------
 

@@ -27,11 +27,24 @@ _NUMBERS = {
 _MISSING = re.compile(r"[+-]?nan|n/?a|#n/a|null|none|", re.IGNORECASE)
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 
-DATE = re.compile(
-    r"(\d{4})[-/](\d{1,2})[-/](\d{1,2})[T ]\s*(\d{1,2}):(\d{2}):(\d{2}(?:\.\d*)?)"
-    r"\s?(Z|[+-]\d{2}:?\d{2})?"
-)
-"""A date with the time of day, and its zone if one is written."""
+
+def _date(fraction: str, zone: str) -> re.Pattern[str]:
+    """Year to second in groups 1 to 6 or, without marks between, 7 to 12, and the zone in 13."""
+    second = rf"(\d{{2}}(?:{fraction}\d*)?)"
+    return re.compile(
+        rf"(?:(\d{{4}})[-/](\d{{1,2}})[-/](\d{{1,2}})[Tt ]\s*(\d{{1,2}}):(\d{{2}}):{second}"
+        rf"|(\d{{4}})(\d{{2}})(\d{{2}})[Tt](\d{{2}})(\d{{2}}){second})\s?([Zz]|{zone})?"
+    )
+
+
+DATE = _date(r"\.", r"[+-]\d{2}:?\d{2}")
+"""A date with the time of day, and its zone if one is written, within a text."""
+
+FIELD_OF_DATE = _date("[.,]", r"[+-]\d{2}(?::?\d{2})?")
+"""The same as a field of its own, as ISO 8601 allows it."""
+
+_LARGEST_ZONE = timedelta(hours=14)  # of Kiribati
+_MINUTE, _LEAP_MINUTE = 60.0, 61.0  # s
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -87,25 +100,37 @@ def number(cell: str, decimal: str) -> float | None:
 def seconds_of(found: re.Match[str]) -> float:
     """Seconds since 1970-01-01, without leap seconds.
 
-    Whole days and minutes are counted by the calendar, so that a minute may have 61 s.
+    Whole days and minutes are counted by the calendar; the last minute of a day of UTC may have
+    61 s.
 
     Parameters
     ----------
     found : re.Match
-        Of `DATE`.
+        Of `DATE` or `FIELD_OF_DATE`.
 
     Raises
     ------
     ValueError
-        If there is no such day or minute.
+        If there is no such day, minute, second or zone.
     """
-    year, month, day, hour, minute = (int(part) for part in found.groups()[:5])
-    zone = found[7]
-    start = datetime(year, month, day, hour, minute, tzinfo=UTC)
-    if zone and zone != "Z":
-        sign = -1.0 if zone[0] == "-" else 1.0
-        start -= sign * timedelta(hours=int(zone[1:3]), minutes=int(zone[-2:]))
-    return start.timestamp() + float(found[6])
+    *parts, second = (part for part in found.groups()[:12] if part is not None)
+    start = datetime(*map(int, parts), tzinfo=UTC)  # type: ignore[arg-type, misc]
+    zone = found[13]
+    if zone and zone not in "Zz":
+        away = timedelta(hours=int(zone[1:3]), minutes=int(zone[3:].lstrip(":") or 0))
+        if away > _LARGEST_ZONE or int(zone[3:].lstrip(":") or 0) > 59:
+            raise ValueError("no zone")
+        start += away if zone[0] == "-" else -away
+    seconds = float(second.replace(",", "."))
+    is_last = start.minute == 59 and (start.hour == 23 or not zone)
+    if seconds >= (_LEAP_MINUTE if is_last else _MINUTE):
+        raise ValueError("no second")
+    return start.timestamp() + seconds
+
+
+def has_zone(found: re.Match[str]) -> bool:
+    """Whether the zone of a date is written."""
+    return found[13] is not None
 
 
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
@@ -119,7 +144,7 @@ def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
     result = {}
     for column in range(min(map(len, rows), default=0)):
         cells = [row[column] for row in rows if row[column]]
-        found = [DATE.fullmatch(cell) for cell in cells]
+        found = [FIELD_OF_DATE.fullmatch(cell) for cell in cells]
         if cells and all(found):
-            result[column] = any(each is not None and each[7] is not None for each in found)
+            result[column] = any(each is not None and has_zone(each) for each in found)
     return result

@@ -22,7 +22,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, DATE, number, seconds_of, split_line
+from gmwm.readers.cells import BLANKS, FIELD_OF_DATE, has_zone, number, seconds_of, split_line
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
@@ -288,12 +288,13 @@ def _parse_by_field(
         cells = _cells(table, place, text)
         for values, column in zip(found, columns, strict=True):
             value = number(cells[column], layout.decimal)
+            problem = "is not a number"
             if value is None and column in layout.dates:
-                value = _date(cells[column])
+                value, problem = _date(cells[column], layout.dates[column])
             if value is None:
                 raise InputError(
                     f"{table.source}, {place}, column {label(table.names, column)}: "
-                    f"{_excerpt(cells[column])} is not a number: correct the line, or choose other "
+                    f"{_excerpt(cells[column])} {problem}: correct the line, or choose other "
                     "columns with channels= and time="
                 )
             if math.isinf(value):
@@ -302,13 +303,15 @@ def _parse_by_field(
     return [np.array(values) for values in found]
 
 
-def _date(cell: str) -> float | None:
-    """Seconds since 1970, ``None`` where the field is no date."""
-    found = DATE.fullmatch(cell)
+def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
+    """Seconds since 1970, or ``None`` and what is wrong with the field."""
+    found = FIELD_OF_DATE.fullmatch(cell)
+    if found is not None and has_zone(found) is not zoned:
+        return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
     try:
-        return seconds_of(found) if found else None
+        return (seconds_of(found), "") if found else (None, "is no date")
     except ValueError:
-        return None
+        return None, "is no date that exists"
 
 
 def _cells(table: CsvTable, place: str, text: str) -> list[str]:

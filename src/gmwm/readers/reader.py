@@ -20,7 +20,8 @@ from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
-from gmwm.readers.clock import Clock, Timing, agree
+from gmwm.readers.clock import Clock, Timing, agree, without_summer_time
+from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
     has_sensors,
@@ -165,10 +166,11 @@ def _part(
 
     arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
-    start = 0.0
+    start, odd = 0.0, list[Notice]()
     if roles.time is not None:
+        if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
+            arrays[roles.time], odd = without_summer_time(arrays[roles.time], table.where)
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
-    odd: list[Notice] = []
     for name, index in roles.channels.items():
         unit = unit_of[name]
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])

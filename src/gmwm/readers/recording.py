@@ -23,7 +23,7 @@ READING = frozenset(
     | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
     | {"stamps-in-turns", "clock-shifts", "sentinel", "sensor-absent"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
-    | {"partial-record", "still-stretches"}
+    | {"partial-record", "still-stretches", "summer-time"}
 )
 """Codes of the notices about how a file was read."""
 

@@ -7,16 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.readers import tuning
 
 _CODES = {float(sign * (10**k - 1)) for k in range(3, 8) for sign in (-1, 1)} | {-999.25, -99.99}
 _ENDS = {
     float(end): bits
-    for bits in (64, 32, 16)
+    for bits in (64, 32, 24, 16)
     for end in (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1, 2**bits - 1)
 }
 _ODD = np.array([*_CODES, *_ENDS])
+
+_ISOLATED = "far from all others with nothing between"
 
 
 def without_sentinels(
@@ -25,7 +27,8 @@ def without_sentinels(
     """Make missing what is no sample, and report it.
 
     That is a number beyond the range of any sensor, or far outside all others and an error code
-    (999, -9999, ...) or the smallest or largest integer of 16, 32 or 64 bit.
+    (999, -9999, ...) or the smallest or largest integer of 16, 24, 32 or 64 bit, or one that comes
+    again and again, exactly, with nothing between it and the others: what moves passes through.
 
     Parameters
     ----------
@@ -53,13 +56,19 @@ def without_sentinels(
     usual = some[(np.abs(some) <= largest) & ~np.isin(some, _ODD)]
     if not usual.size:
         return values, []
-    low, middle, high = np.quantile(usual, [0.05, 0.5, 0.95])
-    far = np.flatnonzero(np.abs(values - middle) > tuning.FAR_OUTSIDE * (high - low))
+    low, first, middle, third, high = np.quantile(usual, [0.05, 0.25, 0.5, 0.75, 0.95])
+    width = high - low
+    # Codes without a meaning are among the usual ones: a quarter of the samples at most.
+    narrow = min(tuning.OF_QUARTILES * (third - first), width) if third > first else width
+    away = np.abs(values - middle)
+    far = np.flatnonzero(away > tuning.FAR_OUTSIDE * narrow)
     if not far.size:
         return values, []
-    found = values[far]
-    numbers, which = np.unique(found, return_inverse=True)
+    numbers, which = np.unique(values[far], return_inverse=True)
     chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])
+    chosen &= np.abs(numbers - middle) > tuning.FAR_OUTSIDE * width
+    if narrow > 0.0:
+        chosen |= _are_isolated(values, far, numbers, which, middle)
     gone = far[chosen[which]]
     if not gone.size:
         return values, []
@@ -78,12 +87,39 @@ def without_sentinels(
         times = f"{count:,} samples are" if count > 1 else "a sample is"
         also = " and the like" if len(group) > 1 else ""
         text = (
-            f"{times} {number:.10g}{also}, {_meaning(number, largest)}, first at "
+            f"{times} {number:.10g}{also}, {_meaning(number, largest) or _ISOLATED}, first at "
             f"{where(int(rows[0]))}: taken as missing"
         )
         data = {"count": int(count), "value": number, "row": int(rows[0])}
         notices.append(Notice("sentinel", severity, name, text, data, "look at the recorder"))
     return clean, notices
+
+
+def _are_isolated(
+    values: FloatArray, far: IntArray, numbers: FloatArray, which: IntArray, middle: float
+) -> BoolArray:
+    """Which of the numbers that are far outside come several times, and from nowhere.
+
+    The samples before and after are none that are far outside, and hardly any other lies within
+    half of the distance to the middle.
+    """
+    counts = np.bincount(which, minlength=numbers.size)
+    again = counts >= tuning.LEAST_REPEATS
+    if not np.any(again):
+        return again
+    is_far = np.zeros(values.size + 2, dtype=bool)
+    is_far[far + 1] = True
+    # Beside another code, or the same one, is no transition.
+    repeated = np.zeros(values.size + 2, dtype=bool)
+    repeated[far + 1] = again[which]
+    passing = is_far & ~repeated
+    beside = passing[far] | passing[far + 2]
+    transitions = np.bincount(which, beside, minlength=numbers.size)
+    again &= transitions <= tuning.TRANSITIONS * counts
+    others = np.sort(values[far[~again[which]]])
+    reach = 0.5 * np.abs(numbers - middle)
+    near = np.searchsorted(others, numbers + reach) - np.searchsorted(others, numbers - reach)
+    return np.asarray(again & (near <= tuning.TRANSITIONS * counts))
 
 
 def _meaning(number: float, largest: float) -> str:

@@ -56,6 +56,13 @@ LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 BEYOND_SENSORS = 1e6
 """rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
 
+STEPS_OF_HOUR, NEAR_HOUR, MOST_HOURS = 2.0, 0.25, 2
+"""Usual steps, or s, to which a step of an hour is the change of summer time; twice a year."""
+
+OF_QUARTILES, LEAST_REPEATS, TRANSITIONS = 2.44, 3, 0.1
+"""Times the distance of the quartiles, 90 % of Gaussian samples lie in; how often a number comes at
+least that is no sample; and the part of these times that something leads to it or lies near."""
+
 SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
 """Samples that give the range of most, and by how many times the width of 90 % of them a number is
 away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of all

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ from gmwm.variance.gaps.effects import (
     window_centres,
     window_count,
 )
-from gmwm.variance.gaps.filling import Filling
+from gmwm.variance.gaps.filling import Filling, levels_apart
 from gmwm.variance.kernels import cumulative, haar_coefficients
 from gmwm.variance.moments import haar_moments
 from gmwm.variance.pilot import pilot_psd
@@ -50,6 +50,8 @@ class Levels:
         Wavelet variances of the error of the filling, relative.
     filled : (J,) ndarray of bool
         Levels for which gaps are filled.
+    parts : (P,) ndarray
+        Where the series begins anew with another level; its line has one level in each part.
     """
 
     values: FloatArray
@@ -60,6 +62,7 @@ class Levels:
     change: FloatArray
     error: FloatArray
     filled: NDArray[np.bool_]
+    parts: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
     @classmethod
     def of(cls, values: FloatArray, runs: Runs, wavelet: str, dt: float) -> Levels:
@@ -76,6 +79,12 @@ class Levels:
         m = dyadic_levels(gaps.span)
         if not np.any(gaps.filled(m[-1])):
             return plain
+        gaps = replace(gaps, apart=plain._apart(gaps, dt))
+        if np.any(gaps.apart):
+            parts = np.concatenate([[0], gaps.edges[gaps.apart, 1]])
+            plain = replace(plain, parts=parts)
+            if not np.any(gaps.filled(m[-1])):
+                return plain
         none = np.zeros(m.size)
         whole = replace(plain, averaging=m, change=none, error=none, filled=none == 0.0)
         variance = plain._pilot_variance(0)
@@ -84,6 +93,14 @@ class Levels:
         first = whole._filled_under(variance, scarcity, gaps, dt)
         variance = np.append(variance, first._pilot_variance(variance.size))
         return whole._filled_under(variance, scarcity, gaps, dt)
+
+    def _apart(self, gaps: Gaps, dt: float) -> NDArray[np.bool_]:
+        """Gaps that the level changes in, judged by what the series is between them."""
+        between = replace(self, parts=self.runs.edges[:, 0])
+        variance = between._pilot_variance(0)
+        known = self.averaging[: variance.size]
+        psd = pilot_psd(variance, known, dt)
+        return levels_apart(gaps, self.values, between.slope, psd, dt, float(known[-1]))
 
     def _pilot_variance(self, start: int) -> FloatArray:
         """Variances without the drift of the levels from ``start`` on that are well known.
@@ -135,7 +152,7 @@ class Levels:
     @cached_property
     def slope(self) -> float:
         """Of the least-squares line through the samples that exist, per sample."""
-        return _slope(self.values)
+        return _slope(self.values, self.parts)
 
     # -- what exists -------------------------------------------------------------------------------
 
@@ -267,9 +284,12 @@ class Levels:
         return values, integral
 
 
-def _slope(values: FloatArray) -> float:
-    """Of the least-squares line through the samples that exist, per sample."""
-    k = np.flatnonzero(~np.isnan(values)).astype(float)
-    there = values[~np.isnan(values)]
-    k -= np.mean(k)
-    return float(k @ there / (k @ k))
+def _slope(values: FloatArray, parts: IntArray) -> float:
+    """Of the least-squares lines of one slope through the samples of the parts, per sample."""
+    k = np.flatnonzero(~np.isnan(values))
+    part = np.searchsorted(parts, k, "right") - 1
+    count = np.maximum(np.bincount(part), 1)
+    there = values[k]
+    place = k - (np.bincount(part, k) / count)[part]
+    square = float(place @ place)
+    return float(place @ there / square) if square > 0.0 else 0.0

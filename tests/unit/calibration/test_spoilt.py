@@ -34,7 +34,10 @@ SPOILT = {
     "every other one is zero": (
         "value-repeated", "samples_measured", np.where(np.arange(N) % 2, clean(1), 0.0)
     ),
-    "stuck": ("stuck", "samples_change", np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50))),
+    "stuck": (
+        "stuck", "samples_change",
+        np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50)),
+    ),
     "swells to 2 sd and dies": (
         "variance", "noise_steady", shaken(lambda t: 1.0 + np.sin(np.pi * t / 60.0) ** 2)
     ),

@@ -63,7 +63,7 @@ def test_noise_of_one_size_does_not_change(record, model):
     assert count <= binom.isf(1e-6, runs, 3.0 * FALSE_ALARM)
 
 
-@pytest.mark.parametrize(("factor", "severity"), [(1.12, "note"), (1.5, "warning")])
+@pytest.mark.parametrize(("factor", "severity"), [(1.12, "note"), (1.5, "bad")])
 def test_noise_that_grows(record, factor, severity):
     x = white(100_000, 3)
     x[50_000:] *= factor

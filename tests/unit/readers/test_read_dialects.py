@@ -146,3 +146,73 @@ def test_a_date_that_is_none_is_named_with_its_line(tmp_path, wrong):
     path.write_text("time,gyro_x [rad/s]\n" + "\n".join(rows))
     with pytest.raises(InputError, match=f"line 4002, column 'time .s.': '{wrong}'"):
         read(path)
+
+
+def dated(tmp_path, stamps, delimiter=","):
+    path = tmp_path / "log.csv"
+    lines = [f"{stamp}{delimiter}{i}.5" for i, stamp in enumerate(stamps)]
+    path.write_text("\n".join([f"time{delimiter}gyro_x [rad/s]", *lines]))
+    return read(path)
+
+
+FIRST = datetime(2026, 2, 28, 23, 59, 59)
+MOMENTS = [FIRST + timedelta(milliseconds=5 * i) for i in range(400)]
+
+
+@pytest.mark.parametrize(
+    ("form", "zone", "delimiter"),
+    [("%Y-%m-%dT%H:%M:%S,%f", "Z", ";"), ("%Y-%m-%dT%H:%M:%S.%f", "+02", ","),
+     ("%Y%m%dT%H%M%S.%f", "Z", ","), ("%Y%m%dT%H%M%S,%f", "+0530", ";"),
+     ("%Y-%m-%dt%H:%M:%S.%f", "z", ",")],
+)  # fmt: skip
+def test_forms_of_iso_dates(tmp_path, form, zone, delimiter):
+    recording = dated(tmp_path, [each.strftime(form) + zone for each in MOMENTS], delimiter)
+    assert recording.dt == pytest.approx(0.005, rel=1e-6)
+    assert recording["gyro_x"].values[-1] == 399.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [("2026-03-01T00:00:65.000Z", "is no date that exists"),
+     ("2026-03-01T00:00:60.000Z", "is no date that exists"),
+     ("2026-03-01T00:00:00.500+99:99", "is no date that exists"),
+     ("2026-03-01T00:00:00.500+02:75", "is no date that exists"),
+     ("2026-03-01T00:00:00.500", "has no zone, unlike the dates before it"),
+     ("later", "is no date")],
+)  # fmt: skip
+def test_dates_that_are_none_or_of_another_zone_are_refused(tmp_path, wrong, problem):
+    stamps = [each.isoformat(timespec="milliseconds") + "Z" for each in MOMENTS]
+    stamps[300] = wrong
+    with pytest.raises(InputError, match=f"line 302.*{problem}"):
+        dated(tmp_path, stamps)
+
+
+def test_a_zone_where_the_others_have_none_is_refused(tmp_path):
+    stamps = [each.isoformat(timespec="milliseconds") for each in MOMENTS]
+    stamps[300] += "+01:00"
+    with pytest.raises(InputError, match=r"line 302.*has a zone, unlike"):
+        dated(tmp_path, stamps)
+
+
+def test_a_leap_second_is_read(tmp_path):
+    stamps = [f"2016-12-31T23:59:{i / 10:04.1f}Z" for i in range(500, 610)]
+    assert dated(tmp_path, stamps).dt == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("hour", [1, -1])
+@pytest.mark.parametrize("step", [1.0, 0.01])
+def test_the_change_of_summer_time_is_no_gap(tmp_path, hour, step):
+    moments = [FIRST + timedelta(seconds=step * i + 3600 * hour * (i >= 4000)) for i in range(6000)]
+    recording = dated(tmp_path, [each.isoformat(timespec="milliseconds") for each in moments])
+    assert recording.dt == pytest.approx(step, rel=1e-6)
+    assert recording["gyro_x"].is_complete
+    assert recording.n == 6000
+    (notice,) = [each for each in recording.notices if each.code == "summer-time"]
+    assert (notice.severity, notice.values["row"]) == ("warning", 4000)
+    assert "line 4002" in notice.text
+
+
+def test_an_hour_without_samples_stays_missing_in_utc(tmp_path):
+    moments = [FIRST + timedelta(seconds=i + 3600 * (i >= 4000)) for i in range(6000)]
+    recording = dated(tmp_path, [each.isoformat() + "Z" for each in moments])
+    assert recording["gyro_x"].missing == 3600

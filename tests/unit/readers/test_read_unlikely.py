@@ -141,3 +141,44 @@ def test_samples_are_no_error_codes(kind):
         column = np.where(rng.random(N) < 0.5, -999.0, 999.0) + column
     table = table.drop(columns="gyro_x [rad/s]").assign(**{unit: column})
     assert "sentinel" not in codes(gmwm.read(table))
+
+
+@pytest.mark.parametrize("number", [-99.0, 999.9, -777.0, -8388608.0 * 4.7e-6, -573.44])
+@pytest.mark.parametrize("rows", ["three", "7 %", "a block"])
+def test_a_number_that_comes_again_from_nowhere_is_no_sample(number, rows):
+    table = frame(0.01 * np.arange(N))
+    there = np.zeros(N, dtype=bool)
+    if rows == "three":
+        there[[50, 300, N - 1]] = True
+    elif rows == "7 %":
+        there = np.random.default_rng(3).random(N) < 0.07
+    else:
+        there[100 : 100 + N // 12] = True
+    clean = gmwm.read(table)["gyro_y"].values.copy()
+    table.loc[there, "gyro_y [rad/s]"] = number
+    found = gmwm.read(table)
+    clean[there] = np.nan
+    np.testing.assert_array_equal(found["gyro_y"].values, clean)
+    (notice,) = [each for each in found.notices if each.code == "sentinel"]
+    assert (notice.values["count"], notice.values["value"]) == (there.sum(), number)
+
+
+@pytest.mark.parametrize("kind", ["turn to the end of the scale", "vibration", "rounded", "bursts"])
+def test_what_moves_is_no_error_code(kind):
+    rng = np.random.default_rng(4)
+    n = 20_000
+    values = np.round(2.0 * rng.normal(size=n))  # counts
+    if kind == "turn to the end of the scale":
+        values[5000:7000] = np.clip(
+            np.round(3e4 * np.sin(np.arange(2000) / 300.0)), -20_000, 20_000
+        )
+    elif kind == "vibration":
+        values[::4] += np.round(100.0 * rng.standard_t(3, size=n // 4))
+    elif kind == "bursts":
+        values[12_000:] = np.round(60.0 * rng.normal(size=8000))
+    else:
+        values = np.round(0.3 * rng.normal(size=n))
+        values[::997] += 2.0
+
+    table = pd.DataFrame({"time [s]": 0.01 * np.arange(n), "gyro_x [mdeg/s]": values})
+    assert "sentinel" not in codes(gmwm.read(table))

@@ -199,11 +199,27 @@ def _arm(fault: Explanation) -> tuple[str, str]:
         f"{fault.values[name]:.2f} m {name} ({fault.errors[name]:.1g})"
         for name in ("forward", "right", "down")
     )
-    arm = ",".join(f"{each:.2f}" for each in np.asarray(fault.replay.aiding.lever_arm))
-    return (
-        f"the antenna is off the lever arm by {parts}, standard errors in brackets",
-        f"give the lever arm {arm}, or measure it",
+    # What the motion does not show stays as it was: an estimate of it is mostly error.
+    names = ("forward", "right", "down")
+    usual = tuning.UNSEEN["m"]
+    unseen = [name for name in names if tuning.SEEN * fault.errors[name] > usual]
+    arm = ",".join(
+        f"{each - (fault.values[name] if name in unseen else 0.0):.2f}"
+        for name, each in zip(names, np.asarray(fault.replay.aiding.lever_arm), strict=True)
     )
+    if len(unseen) == len(names):
+        advice = "measure it: this motion shows none of its parts well enough"
+    elif unseen:
+        parts_unseen = " and ".join(unseen)
+        advice = (
+            f"give the lever arm {arm}, and measure it {parts_unseen}, which this motion does not "
+            "show and is left as it was"
+        )
+    else:
+        advice = f"give the lever arm {arm}, or measure it"
+    return (
+        f"the antenna is off the lever arm by {parts}, standard errors in brackets", advice,
+    )  # fmt: skip
 
 
 def _heading(fault: Explanation) -> tuple[str, str]:

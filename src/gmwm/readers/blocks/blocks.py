@@ -89,7 +89,7 @@ def read_blocks(
         raise InputError(
             f"{tables[0].source} cannot be read a block at a time: convert it to Parquet, CSV or "
             "NPY, or read fewer channels",
-            "memory",
+            "not-divisible",
         )
     if len(tables) > 1:
         raise InputError(

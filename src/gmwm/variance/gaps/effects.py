@@ -3,7 +3,8 @@
 A coefficient of averaging time m is made of 2 m samples, so that a few missing ones would take all
 long averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
 coefficients of that level are taken, see `gmwm.variance.gaps.filling`; longer ones split the
-record: coefficients that they take part in are left out.
+record, as do those in which the level changes by what the noise does not explain: coefficients that
+they take part in are left out.
 """
 
 from __future__ import annotations
@@ -80,18 +81,22 @@ class Gaps:
         Runs that are very short beside the gaps around them are parts of a gap.
     octave : (G,) ndarray
         Lengths rounded up to a power of two, as its exponent.
+    apart : (G,) ndarray of bool
+        Gaps with another level on either side, which are never filled.
     """
 
     runs: Runs
     edges: IntArray
     octave: IntArray
+    apart: NDArray[np.bool_]
 
     @classmethod
     def of(cls, runs: Runs) -> Gaps:
         """Those between the first and the last sample that exist."""
         edges = _without_islands(np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1))
         length = edges[:, 1] - edges[:, 0]
-        return cls(runs, edges, np.ceil(np.log2(length)).astype(np.int64))
+        octave = np.ceil(np.log2(length)).astype(np.int64)
+        return cls(runs, edges, octave, np.zeros(octave.size, dtype=bool))
 
     @property
     def span(self) -> int:
@@ -122,7 +127,7 @@ class Gaps:
         ends = self.runs.edges[0, 0], self.runs.edges[-1, 1]
         for octave in np.unique(self.octave):
             own = self.octave == octave
-            others = self.octave > octave - tuning.PASSED_OCTAVES
+            others = (self.octave > octave - tuning.PASSED_OCTAVES) | self.apart
             edges = self.edges[others]
             before = np.concatenate([[ends[0]], edges[:-1, 1]])
             after = np.concatenate([edges[1:, 0], [ends[1]]])
@@ -142,7 +147,8 @@ class Gaps:
 
     def filled(self, m: float) -> NDArray[np.bool_]:
         """Which gaps are filled for averaging times of ``m`` samples, (G,)."""
-        return np.asarray((self.octave <= np.log2(m / tuning.AVERAGES_OF_GAP)) & (self.boxes > 0))
+        short = self.octave <= np.log2(m / tuning.AVERAGES_OF_GAP)
+        return np.asarray(short & (self.boxes > 0) & ~self.apart)
 
     def joined(self, m: float) -> IntArray:
         """Runs of samples that exist or are filled for averaging times of ``m`` samples, (P, 2)."""

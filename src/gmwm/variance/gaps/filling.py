@@ -31,12 +31,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, haar_gain, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import block_density
-from gmwm.variance.gaps.effects import Gaps, window_count
+from gmwm.variance.gaps.effects import Gaps, IntArray, window_count
 from gmwm.variance.gaps.kernels import fill, neighbours
 from gmwm.variance.kernels import cumulative
 
@@ -107,6 +108,77 @@ def _gain(m: float) -> FloatArray:
     panels = np.maximum(_REACH * octave / 8.0, 1.0)
     mean = _MEAN_SIN4 / (m * np.sin(np.pi * f)) ** 2
     return np.where(m * octave <= _LOBES * panels, haar_gain(m, f), mean)
+
+
+def levels_apart(
+    gaps: Gaps, values: FloatArray, slope: float, psd: PSD, dt: float, longest: float
+) -> NDArray[np.bool_]:
+    """Gaps in which the level of a series changes by what its noise does not explain, (G,).
+
+    The difference of the means on both sides, as far as a filling looks, over its standard
+    deviation under the spectrum, which is known from as many windows as there are: Student's t.
+    Noise has one such gap in a series with a chance of `tuning.APART`. Beyond the averaging times
+    that the spectrum is known from, the noise is taken as if it drifted. A change must show in
+    means over wider stretches as well.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    values : (n,) ndarray
+        NaN where samples are missing.
+    slope : float
+        Of the series, per sample.
+    psd : callable
+        Of its noise between the gaps.
+    dt : float
+    longest : float
+        Averaging time that the spectrum is known for, samples.
+    """
+    first, last = gaps.edges.T
+    there = np.concatenate([[0], np.cumsum(~np.isnan(values))])
+    sums = cumulative(values, 0.0)
+
+    def ratio(width: IntArray, deviation: FloatArray) -> FloatArray:
+        """Of the differences of means of ``width`` to what noise has by chance, (G,)."""
+        before, after = (
+            (sums[b] - sums[a]) / np.maximum(there[b] - there[a], 1)
+            for a, b in (
+                (np.maximum(first - width, 0), first),
+                (last, np.minimum(last + width, values.size)),
+            )
+        )
+        windows = np.maximum(gaps.runs.present / (2.0 * np.clip(width, 1, longest)), 1.0)
+        far = student.isf(0.5 * tuning.APART / max(first.size, 1), windows)
+        slow = np.maximum((last - first + width) / longest, 1.0)
+        return np.asarray(
+            np.abs(after - before - slope * (last - first + width)) / (far * slow * deviation)
+        )
+
+    kinds, kind = gaps.kinds
+    width, deviation = kinds[:, 0] * 2 ** np.maximum(kinds[:, 2] - 1, 0), np.zeros(kinds.shape[0])
+    for row, (block, length, _) in enumerate(kinds.tolist()):
+        deviation[row] = _deviation(psd, dt, block, length, width[row] // block)
+    near = ratio(width[kind], deviation[kind])
+    apart = (near > 1.0) & (gaps.boxes > 0)
+    if not np.any(apart):
+        return apart
+    # A change of the level stays; what a narrow peak of the spectrum makes does not.
+    room = np.minimum(first - gaps.runs.edges[0, 0], gaps.runs.edges[-1, 1] - last)
+    wide = np.minimum(tuning.WIDER * width[kind], room)
+    deviations = np.ones(wide.size)
+    for own in np.flatnonzero(apart).tolist():
+        block = int(gaps.block[own]) * tuning.WIDER
+        length = max(int(last[own] - first[own]) // block, 1)
+        deviations[own] = _deviation(psd, dt, block, length, max(int(wide[own]) // block, 1))
+    return np.asarray(apart & (ratio(wide, deviations) > 1.0))
+
+
+def _deviation(psd: PSD, dt: float, block: int, length: int, width: int) -> float:
+    """Of the difference of the means of so many blocks before and after a gap."""
+    f, quadrature_weight = _nodes()
+    power = quadrature_weight * block_density(psd, dt, f, block)
+    total = _sum_response(np.array(width), f) / width
+    return float(2.0 * np.sqrt((np.sin(np.pi * f * (length + width)) * total) ** 2 @ power))
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ def unmasked(
     there = gaps[:, 0] > 0
     samples = gaps[there, 1].astype(float)
     length = np.maximum(samples / gaps[there, 0] * (1.0 - missing), 1.0)
-    variance = np.zeros(square.size)
+    variance, change, usual = np.zeros(square.size), np.zeros(square.size), 0.0
     for j in range(square.size):
         m = 2.0**j
         within = length < tuning.LONGEST_WITHIN * m
@@ -53,9 +53,11 @@ def unmasked(
             spread = np.array([_spread(variance[:j], each) for each in own])
             each = own * spread * m / (m - own)
             added = scarcity[j] * float(np.average(each, weights=samples[within]))
-        variance[j] = max(square[j] - added, square[j] / (1.0 + tuning.LARGEST_CHANGE))
-    with np.errstate(invalid="ignore"):
-        change = np.where(variance > 0.0, square / variance - 1.0, 0.0)
+        variance[j] = max(square[j] - added, square[j] / (1.0 + tuning.STREAMING_LARGEST_CHANGE))
+        # Relative to what is expected: where few windows came out small by chance, they would weigh
+        # least. No level is below half of the one before but by chance, or where steps are rounded.
+        usual = max(variance[j], 0.5 * usual)
+        change[j] = added / usual if usual > 0.0 else 0.0
     return variance, change
 
 

@@ -48,9 +48,10 @@ def stream(path: Any, **reading: Any) -> StreamedRecording:
     Parameters
     ----------
     path : str, path or table
-        Delimited text, NPY, Parquet or Feather; or a table in memory.
+        Delimited text, NPY, Parquet, Feather, a topic of a bag, `IMU` of ArduPilot or a binary
+        layout; or a table in memory.
     **reading
-        ``rate``, ``units``, ``channels``, ``time`` as in `gmwm.read`; ``rows`` of a block.
+        The arguments of `gmwm.read`; ``rows`` of a block.
 
     Returns
     -------

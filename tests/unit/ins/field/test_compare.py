@@ -11,6 +11,7 @@ from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.geometry import ned_difference
+from gmwm.report import write_comparison_report
 from gmwm.study.emulated_logs import emulated_log, sensors
 
 
@@ -52,7 +53,7 @@ def test_at_the_last_fix_the_smoother_is_the_filter(drive):
     assert np.diag(ratio) == pytest.approx(1.0, rel=0.02)
 
 
-def test_models_that_are_much_worse_are_named(drive):
+def test_models_that_are_much_worse_are_named(drive, tmp_path):
     found = compare(drive[0], {"right": sensors(), "loose": sensors(slow=30.0, gyro=20.0)})
     verdict = found.verdict
     assert (verdict.code, verdict.where) in {("better", "right"), ("more-honest", "right")}
@@ -62,6 +63,11 @@ def test_models_that_are_much_worse_are_named(drive):
     assert found.pairs["loose", "right"].ratio == pytest.approx(1.0 / pair.ratio)
     assert max(map(len, str(found).splitlines())) <= 80
     json.dumps(found.to_dict(), allow_nan=False)
+    figure = found.plot()
+    drawn = figure.axes[0].lines[0].get_ydata()
+    assert drawn == pytest.approx(np.hypot(*found.outcomes["right"].error[:, :2].T))
+    assert [each.get_text() for each in figure.axes[2].get_yticklabels()] == ["loose / right"]
+    assert "<svg" in write_comparison_report(found, tmp_path / "comparison.html").read_text()
 
 
 def test_an_overconfident_model_with_the_same_errors_is_less_honest(drive):

@@ -1,11 +1,13 @@
 """Faults put into logs with a known truth: each is named with its values, and no other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gmwm.ins import Fixes, Navigated, Straight, emulate, gnss, perform
-from gmwm.ins.field.explanations import LEVEL, TESTS
-from gmwm.ins.field.faults import Faults, resolution_notice
+from gmwm.ins.field.explanations import LEVEL, TESTS, Explanation
+from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.filter import InitialSd
@@ -57,6 +59,24 @@ def test_a_lever_arm_left_out(vehicle):
     for name, truth in zip(("forward", "right", "down"), LEVER_ARM, strict=True):
         within(fault, name, truth)
     assert fault.values["forward error"] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("down", "advice"),
+    [(0.3, "give the lever arm 1.50,0.30,-2.80"),
+     (2.0, "give the lever arm 1.50,0.30,-1.00, and measure it down, which"),
+     (None, "measure it: this motion shows none")],
+)  # fmt: skip
+def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
+    log, _ = emulated_log(1, duration=DURATION, rate=10.0)
+    aiding = replace(log.aiding, lever_arm=(1.5, 0.3, -2.8))
+    replay = Replay(log.imu, None, InitialSd(), log.sensors, aiding)
+    errors = dict.fromkeys(("forward", "right", "down"), 0.1 if down else 2.0)
+    if down:
+        errors["down"] = down
+    values = {"forward": 1.0, "right": 0.3, "down": -1.8}
+    fault = Explanation("lever-arm", "", lambda r: r, replay, 20.0, 8.0, values, errors)
+    assert fault_notice(fault).action.startswith(advice)
 
 
 def test_coloured_fixes():

@@ -92,3 +92,41 @@ def test_a_log_is_not_divided(tmp_path):
 
     savemat(tmp_path / "a.mat", {"gyro": np.random.default_rng(0).normal(size=(100, 3))})
     assert len(list(read_blocks(tmp_path / "a.mat", rate=100.0, units=UNITS))) == 1
+
+
+def same(path, **options):
+    whole = gmwm.read(path, **options)
+    parts = list(read_blocks(path, rows=4096, **options))
+    assert len(parts) > 1
+    for channel in whole.inertial:
+        found = np.concatenate([part[channel.name].values for part in parts])
+        np.testing.assert_array_equal(found, channel.values)
+
+
+@pytest.mark.parametrize("clock", ["header", "log"])
+def test_a_bag(tmp_path, clock):
+    bags = pytest.importorskip("bags")
+    samples = np.tile(bags.at_rest(1000), (9, 1))
+    warm = [(t, bags.temperature(bags.ROS2, t, 30.0)) for t in bags.stamps(9)]
+    topics = {"/imu": bags.imu_topic(bags.ROS2, samples), "/t": (bags.TEMPERATURE_TYPE, warm)}
+    same(bags.write2(tmp_path / "a", topics), clock=clock)
+
+
+def test_topics_together_are_not_divided(tmp_path):
+    bags = pytest.importorskip("bags")
+    samples, rest = bags.at_rest(300), np.zeros((300, 3))
+    gyro, force = np.hstack([samples[:, :3], rest]), np.hstack([rest, samples[:, 3:]])
+    topics = {"/g": bags.imu_topic(bags.ROS1, gyro), "/a": bags.imu_topic(bags.ROS1, force)}
+    path = bags.write1(tmp_path / "a.bag", topics)
+    with pytest.raises(InputError, match="2 topics cannot be read a block at a time together"):
+        next(read_blocks(path))
+    assert next(read_blocks(path, topic="/g")).names == ("gyro_x", "gyro_y", "gyro_z")
+
+
+def test_records(tmp_path):
+    rng = np.random.default_rng(3)
+    records = np.zeros((9000, 7))
+    records[:, 0], records[:, 1:] = np.arange(9000) / 128.0, 1e-4 * rng.normal(size=(9000, 6))
+    records[:, 6] += 9.8 / 128.0
+    records.tofile(tmp_path / "a.dat")
+    same(tmp_path / "a.dat", layout="KF-GINS")

@@ -1,0 +1,57 @@
+"""Dates without a zone are of a clock that is set by an hour twice a year."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
+from gmwm.readers import tuning
+
+_HOUR = 3600.0
+
+
+def without_summer_time(
+    stamps: FloatArray, where: Callable[[int], str]
+) -> tuple[FloatArray, list[Notice]]:
+    """Take off the hour by which a clock without a zone was set, and report it.
+
+    That is a step of an hour more or less than usual, to two steps, or a quarter of a second if
+    that is more. Losses have hardly ever that length.
+
+    Parameters
+    ----------
+    stamps : (n,) ndarray
+        s, of dates without a zone.
+    where : callable
+        Row -> where that is in the file.
+
+    Returns
+    -------
+    ndarray
+        A copy if the clock was set, else ``stamps``.
+    list of Notice
+        Of code "summer-time".
+    """
+    steps = np.diff(stamps)
+    known = steps[~np.isnan(steps)]
+    if not known.size:
+        return stamps, []
+    usual = float(np.median(known))
+    near = max(tuning.STEPS_OF_HOUR * abs(usual), tuning.NEAR_HOUR)
+    beyond = steps - usual
+    rows = np.flatnonzero(np.abs(np.abs(beyond) - _HOUR) < min(near, 0.1 * _HOUR)) + 1
+    if not rows.size or rows.size > tuning.MOST_HOURS:
+        return stamps, []
+    shift = np.zeros(stamps.size)
+    shift[rows] = np.sign(beyond[rows - 1]) * _HOUR
+    forward = bool(shift[rows[0]] > 0.0)
+    text = (
+        f"dates without a zone {'jump by an hour' if forward else 'go back by an hour'} at "
+        f"{where(int(rows[0]))}: taken as the change of summer time, so that no sample is missing"
+    )
+    action = "write the zone beside the dates, or UTC"
+    values = {"row": int(rows[0]), "changes": int(rows.size), "hour": float(shift[rows[0]])}
+    return stamps - np.cumsum(shift), [Notice("summer-time", "warning", "", text, values, action)]
