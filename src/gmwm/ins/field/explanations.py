@@ -185,6 +185,8 @@ def _fitted(
     gain, deviations = difference(here, base), np.sqrt(np.diag(covariance))
     if start != 0.0:
         theta[0] = (theta[0] + start + np.pi) % (2.0 * np.pi) - np.pi
+    # Of two errors each has to earn its own: what one alone explains names no other.
+    price = sum(cost(len(each.names)) for each in errors)
     found = []
     for each, part in zip(errors, parts, strict=True):
         values = dict(zip(each.names, theta[part].tolist(), strict=True))
@@ -193,9 +195,7 @@ def _fitted(
         def change(replay: Replay, each: Constant = each, x: FloatArray = theta[part]) -> Replay:
             return each.change(replay, x)
 
-        found.append(
-            Explanation(each.code, "", change, here, gain, cost(theta.size), values, spread)
-        )
+        found.append(Explanation(each.code, "", change, here, gain, price, values, spread))
     return tuple(found)
 
 

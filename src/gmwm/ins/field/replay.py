@@ -13,7 +13,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.start import Alignment, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
-from gmwm.ins.geometry import matrix_from_rpy, offset
+from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
 from gmwm.ins.trajectory import NavState
@@ -106,9 +106,23 @@ class Replay:
     # -- other assumptions ------------------------------------------------------------------------
 
     def later(self, seconds: float) -> Replay:
-        """Fixes with stamps as much later."""
+        """Fixes with stamps as much later, the one that made the initial state too."""
         fixes = tuple(replace(each, time=each.time + seconds) for each in self.aiding.fixes)
-        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+        return replace(
+            self, state=self._where_at(-seconds), aiding=replace(self.aiding, fixes=fixes)
+        )
+
+    def _where_at(self, seconds: float) -> NavState:
+        """The initial state some time later; earlier if negative."""
+        state = self.state
+        if self.stood > 0.0:  # it stands there
+            return state
+        samples = max(round(abs(seconds) / self.imu.dt), 1)
+        force = np.mean(self.imu.velocity[:samples], axis=0) / self.imu.dt
+        acceleration = matrix_from_rpy(state.rpy) @ force
+        acceleration[2] += gravity_at(np.sin(state.lla[0]), state.lla[2])
+        lla = offset(state.lla, (state.velocity + 0.5 * acceleration * seconds) * seconds)
+        return replace(state, lla=lla, velocity=state.velocity + acceleration * seconds)
 
     def with_arm_longer(self, by: FloatArray) -> Replay:
         """A lever arm longer by a vector, m."""

@@ -20,8 +20,8 @@ DURATION = 160.0
 def found(seed, *faults, vehicle="car", **options):
     """What is found in a log with faults; the sensor models are right."""
     log, _ = emulated_log(
-        seed, vehicle, duration=options.pop("duration", DURATION), rate=10.0, faults=faults,
-        **options,
+        seed, vehicle, duration=options.pop("duration", DURATION),
+        rate=options.pop("rate", 10.0), faults=faults, **options,
     )  # fmt: skip
     return Navigated.of(log)
 
@@ -52,9 +52,22 @@ def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
     assert faults.resolution["time offset"] > 0.03
 
 
-@pytest.mark.parametrize("vehicle", ["car", "helicopter"])
-def test_a_lever_arm_left_out(vehicle):
-    (fault,) = found(202, "lever arm", vehicle=vehicle, duration=300.0).fault_notices
+def test_stamps_that_are_late_in_a_start_in_motion():
+    """The fix that the filter starts from is late too."""
+    navigated = found(1000, "stamps", vehicle="loiter", duration=300.0)
+    (fault,) = navigated.fault_notices
+    assert fault.code == "time-offset"
+    assert within(fault, "time offset", 0.2) < 0.02
+    assert navigated.faults.alternatives == ("lever-arm",)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "seed", "rate"),
+    [("car", 202, 10.0), ("helicopter", 202, 10.0), ("helicopter", 1000, 20.0)],
+)
+def test_a_lever_arm_left_out(vehicle, seed, rate):
+    """And no time offset beside it, which would explain a part of it too."""
+    (fault,) = found(seed, "lever arm", vehicle=vehicle, duration=300.0, rate=rate).fault_notices
     assert fault.code == "lever-arm"
     for name, truth in zip(("forward", "right", "down"), LEVER_ARM, strict=True):
         within(fault, name, truth)
