@@ -24,9 +24,12 @@ from pathlib import Path
 
 import allantools
 import numpy as np
+import pandas as pd
+import pyins
 from statsmodels.tsa.arima.model import ARIMA
 
 import gmwm
+from gmwm import ins
 from gmwm.calibration import Stopwatch, stage
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
@@ -96,6 +99,54 @@ def of_fits(x, short):
     )
 
 
+def of_navigation(seconds=10.0, dt=0.01, step=0.1):
+    """Nine navigation states and six biases that walk, GNSS position once a second."""
+    truth = ins.helicopter_mapping(duration=80.0 + seconds, dt=dt).segment(80.0, 80.0 + seconds)
+    noise = {"gyro": (5e-5, 2e-6, 5e-5), "accel": (1e-3, 5e-5, 2e-3)}
+    sensors = ins.SensorModels.of(
+        {name: gmwm.WhiteNoise(n) + gmwm.RandomWalk(k) for name, (n, k, _) in noise.items()},
+        bias_sd={name: sd for name, (_, _, sd) in noise.items()},
+    )
+    rng = np.random.default_rng(3)
+    errors = sensors.simulate(truth.n, dt, rng).total
+    imu = ins.emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
+    aiding = ins.gnss(truth, position_sd=1.0).noisy(rng)
+    first, start = truth.state(0), ins.InitialSd(2.0, 0.1, np.radians(0.1), np.radians(0.5))
+    pva = pd.Series(
+        [*np.degrees(first.lla[:2]), first.lla[2], *first.velocity, *np.degrees(first.rpy)],
+        index=pyins.util.TRAJECTORY_COLS, name=0.0,
+    )  # fmt: skip
+    rows = np.hstack([imu.rotation, imu.velocity])
+    readings = pd.DataFrame(
+        np.vstack([rows[:1], rows]), index=dt * np.arange(truth.n + 1),
+        columns=pyins.util.GYRO_COLS + pyins.util.ACCEL_COLS,
+    )  # fmt: skip
+    fixes = aiding.fixes[0]
+    lla = pd.DataFrame(
+        fixes.value * [180.0 / np.pi, 180.0 / np.pi, 1.0], fixes.time, pyins.util.LLA_COLS
+    )
+
+    def peer():
+        models = [
+            pyins.inertial_sensor.EstimationModel(bias_sd=sd, noise=n, bias_walk=k)
+            for n, k, sd in noise.values()
+        ]
+        pyins.filters.run_feedback_filter(
+            pva, start.position, start.velocity, np.degrees(start.tilt), np.degrees(start.heading),
+            pyins.strapdown.compute_increments_from_imu(readings, "increment"),
+            *models, [pyins.measurements.Position(lla, 1.0)], time_step=step,
+        )  # fmt: skip
+
+    def ours():
+        ins.navigate(imu, first, sensors, aiding, initial_sd=start, step=step, second_order=False)
+
+    return table(
+        f"filter of 15 states over {truth.n:,} samples",
+        {"gmwm.ins.navigate": ours, "pyins.filters.run_feedback_filter": peer},
+        "gmwm.ins.navigate",
+    )
+
+
 def of_main_job(recording, folder):
     floor = min(medians({"sum": lambda: [np.sum(c.values) for c in recording.channels]}).values())
     with Stopwatch().running() as watch:
@@ -135,10 +186,10 @@ def main():
     x = TRUTH.simulate(given.samples, DT, seed=1)
     short = TRUTH.simulate(SHORT, 1.0, seed=2)
     lines = [*of_main_job(simulated(given.samples), given.folder), *of_variance(x)]
-    lines += of_fits(x, short)
+    lines += [*of_fits(x, short), *of_navigation()]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "allantools",
-                                                       "statsmodels"))  # fmt: skip
+                                                       "statsmodels", "python-ins"))  # fmt: skip
     lines += [
         f"Seconds of the processor, medians of {ROUNDS} turns, one thread. At most {memory:.0f} MB "
         f"were in memory, with what is compared. gmwm {gmwm.__version__}, {packages}, Python "

@@ -44,7 +44,7 @@ def test_a_fleet_is_calibrated_and_gone_on_with(run, lot, tmp_path):
     assert "- bad: bad.npz is not an NPZ file" in printed
     assert reported.startswith("gmwm: 1 file cannot be used; the first: bad.npz")
     names = [path.name for path in sorted((tmp_path / "out").iterdir())]
-    assert names == [".lock", "calibrations", "fleet.html", "fleet.parquet"]
+    assert names == [".lock", "calibrations", "fleet.html", "fleet.json", "fleet.parquet"]
     table = pq.read_table(tmp_path / "out" / "fleet.parquet")
     assert set(table["device"].to_pylist()) == {"bad", "unit 0", "unit 1"}
 

@@ -24,8 +24,11 @@ FOUND = [
     ("odd", 0, 4),  # alternating values
     ("odd", 0, 13),  # a square wave
     ("odd", 0, 29),  # a spike of 1e100
+    ("records", 2, 30),  # numbers beyond all in the unit of the layout
+    ("datasheet", 2, 46),  # a boolean that is none
     ("records", 1, 1),  # a number beyond 1e150 that is not infinite
     ("sqlite3", 1, 56),  # messages that the index counts and are not there
+    ("odd", 2, 2),  # a term that the others explain
     ("odd", 0, 136),  # half of the record without any error of prediction
 ]
 

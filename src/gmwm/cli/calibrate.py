@@ -222,7 +222,7 @@ def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
     """What `gmwm.calibrate_stream` is given for the options."""
     from gmwm.cli.options import arguments_of_read
 
-    return arguments_of_read(**{k: v for k, v in reading.items() if k not in ("start", "stop")})
+    return arguments_of_read(**{k: v for k, v in reading.items() if k not in _WHOLE})
 
 
 def show(result: Calibration) -> None:

@@ -27,7 +27,7 @@ from gmwm.cli.options import (
 @click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-fleet"),
               show_default=True,
-              help="Folder for calibrations, fleet.parquet, fleet.html.")  # fmt: skip
+              help="Folder for calibrations, fleet.parquet, fleet.html, fleet.json.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
 @click.option("--cluster", metavar="ADDRESS",
               help="Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read "
@@ -93,7 +93,7 @@ def fleet(
         click.echo(json.dumps(found.to_dict(), allow_nan=False))
     elif not quiet:
         click.echo(found)
-        click.echo(f"wrote {output}/: calibrations, fleet.parquet, fleet.html")
+        click.echo(f"wrote {output}/: calibrations, fleet.parquet, fleet.html, fleet.json")
     if found.failed:
         first = next(iter(found.failed.values()))
         reason = with_hint(InputError(first.text, first.code))

@@ -136,7 +136,7 @@ def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> st
     flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
     if not flags:
         return ""
-    text = f"standard deviation of the bias at switch-on: {' and '.join(flags)}"
+    text = f"give the bias at switch-on (1 sigma) by {' and '.join(flags)}"
     return "\n".join(wrapped(text, first="- ", indent=2))
 
 

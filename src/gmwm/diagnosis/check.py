@@ -283,5 +283,8 @@ def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump,
 def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:
     if not errors.level > 0.0:
         return None
-    safe = np.where(errors.scale > 0.0, errors.scale, errors.level)
-    return np.where(usable, errors.values / safe, np.nan)
+    result = np.where(errors.scale > 0.0, errors.scale, errors.level)
+    np.divide(errors.values, result, out=result)
+    np.clip(result, -tuning.CLIP, tuning.CLIP, out=result)
+    result[~usable] = 0.0
+    return result

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from gmwm._core.compiled import compiled
 from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
@@ -187,22 +188,38 @@ def _scores(
         Bins.
     """
     last = ratio.size - 1
-    widest = max(limits)
-    low, high = max(start - widest, 0), min(stop + widest, last)
+    widths = np.array(list(limits))
+    low, high = max(start - int(widths[-1]), 0), min(stop + int(widths[-1]), last)
     total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
-    score, best = np.zeros(stop - start), np.ones(stop - start, dtype=int)
-    for width, limit in limits.items():
-        slowest = int(width / tuning.NARROW) if width > tuning.UNRESOLVED else 0
-        centre = np.arange(max(start, tuning.FIRST_BIN, slowest, low + width // 2), stop)
-        begin = centre - width // 2 - low
-        fits = begin + width < total.size
-        centre, begin = centre[fits], begin[fits]
-        value = (
-            (total[begin + width] - total[begin]) / width / np.interp(freedom[centre], grid, limit)
-        )
-        better = value > score[centre - start]
-        score[centre[better] - start] = value[better]
-        best[centre[better] - start] = width
+    slowest = np.where(widths > tuning.UNRESOLVED, widths / tuning.NARROW, 0).astype(np.int64)
+    slowest = np.maximum(slowest, np.maximum(tuning.FIRST_BIN, low + widths // 2))
+    table = np.stack([limits[width] for width in limits])
+    found: tuple[FloatArray, IntArray] = _largest(
+        total, low, freedom[start:stop], start, grid, widths, slowest, table
+    )
+    return found
+
+
+@compiled()
+def _largest(
+    total: FloatArray, low: int, freedom: FloatArray, start: int, grid: FloatArray,
+    widths: IntArray, slowest: IntArray, table: FloatArray,
+) -> tuple[FloatArray, IntArray]:  # fmt: skip
+    """Hot loop of `_scores`: from sums of ratios; by width, the first bin and the limits."""
+    score, best = np.zeros(freedom.size), np.ones(freedom.size, dtype=np.int64)
+    for i in range(freedom.size):
+        k = start + i
+        cell = min(max(np.searchsorted(grid, freedom[i], side="right") - 1, 0), grid.size - 2)
+        part = (freedom[i] - grid[cell]) / (grid[cell + 1] - grid[cell])
+        part = min(max(part, 0.0), 1.0)
+        for w in range(widths.size):
+            begin = k - widths[w] // 2 - low
+            if k < slowest[w] or begin + widths[w] >= total.size:
+                continue
+            limit = table[w, cell] + part * (table[w, cell + 1] - table[w, cell])
+            value = (total[begin + widths[w]] - total[begin]) / widths[w] / limit
+            if value > score[i]:
+                score[i], best[i] = value, widths[w]
     return score, best
 
 

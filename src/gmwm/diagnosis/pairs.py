@@ -24,17 +24,13 @@ def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
     Parameters
     ----------
     errors : dict
-        Channel name -> prediction errors in units of their standard deviation, NaN where there is
-        none.
+        Channel name -> prediction errors in units of their standard deviation, clipped, zero where
+        there is none, which counts for nothing in a sum of products.
     """
     pairs = list(combinations(errors, 2))
-    # Zero counts for nothing in a sum of products.
-    clipped = {
-        name: np.nan_to_num(np.clip(e, -tuning.CLIP, tuning.CLIP)) for name, e in errors.items()
-    }
     notices = []
     for one, other in pairs:
-        a, b = clipped[one], clipped[other]
+        a, b = errors[one], errors[other]
         n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
         if n < tuning.FEWEST_KNOWN:
             continue

@@ -88,6 +88,9 @@ def interpolation_notice(channel: Channel) -> Notice | None:
         f"{share:.0%} of the samples lie on straight lines between others: it was interpolated "
         f"from about {rate:.3g} Hz, and its noise is not that of the sensor"
     )
-    action = "record the samples of the sensor; the channel is skipped in the calibration"
+    action = (
+        "record what the sensor gives, in a topic of its own or without the driver's interpolation "
+        "(RealSense: unite_imu_method 0); the channel is skipped in the calibration"
+    )
     values_of = {"share": share, "rate": rate}
     return Notice("interpolated", "bad", channel.name, text, values_of, action)

@@ -87,11 +87,16 @@ def spectrum(values: FloatArray, dt: float) -> Spectrum:
     filled = values if np.all(known) else np.interp(place, place[known], values[known])
     centred = place - np.mean(place)
     trend = inner(centred, filled) / inner(centred, centred)
+    centred *= -trend
+    tapered = filled - np.mean(filled)
+    tapered += centred
+    del filled, centred
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (place + 0.5) / n)
-    tapered = window * (filled - np.mean(filled) - trend * centred)
-    power = np.abs(fft.rfft(tapered)) ** 2
+    tapered *= window
     # What is missing has no power of its own.
     weight = float(np.sum(window[known] ** 2))
+    del place, window
+    power = np.abs(fft.rfft(tapered, overwrite_x=True)) ** 2
     return Spectrum(2.0 * dt / weight * power, 1.0 / (n * dt), dt)
 
 

@@ -71,6 +71,11 @@ class Axis:
     fit: Fit | None
 
     @property
+    def unit(self) -> str:
+        """SI; "u" if the quantity is not known."""
+        return SI_UNIT.get(self.quantity, "u")
+
+    @property
     def chain(self) -> Chain:
         """The filter by which its numbers are judged; the gyro of the vertical turns a heading."""
         is_heading = self.quantity == "gyro" and self.name.endswith("_z")

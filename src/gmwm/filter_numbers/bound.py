@@ -103,7 +103,7 @@ def bound_of(
     group: Sequence[Axis], form: str, horizon: float, level: float | None
 ) -> list[FilterNumbers]:
     """The bound of axes that share their numbers; see `bound`."""
-    targets = tuple(Target.of(axis.model, axis.dt, horizon) for axis in group)
+    targets = tuple(Target.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
     region: list[Target] = []
     if level is not None:
         for axis, target in zip(group, targets, strict=True):

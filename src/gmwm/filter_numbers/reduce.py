@@ -107,7 +107,7 @@ def _reduced(
 ) -> list[FilterNumbers]:
     longest = times[-1]
     chains = [axis.between(longest) if is_relative else axis.chain for axis in group]
-    targets = [Target.of(axis.model, axis.dt, longest) for axis in group]
+    targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
     start, sd = _start(group, targets, form, longest)
     names = list(start.params)
     values = np.array([float(start.params[name] or 0.0) for name in names])

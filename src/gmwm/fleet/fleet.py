@@ -28,7 +28,7 @@ from gmwm.errors import InputError, MissingNameError
 from gmwm.fleet import tuning
 from gmwm.fleet.paths import OUTPUTS, Paths, recordings
 from gmwm.fleet.spread import Spread, Structures, spreads_of, structures_of
-from gmwm.fleet.store import Store, opened_store
+from gmwm.fleet.store import Store, opened_store, read_index, write_index
 from gmwm.fleet.table import SCHEMA, Row, arrow, rows_of
 from gmwm.fleet.tolerance import needed_units
 from gmwm.fleet.unit import DERIVED, Task, Unit
@@ -190,12 +190,26 @@ class Fleet(Mapping[str, Calibration | Notice]):
             self._conclude(store)
         return Path(folder)
 
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> Fleet:
+        """The fleet that `gmwm.fleet` or `save` wrote into a folder.
+
+        Raises
+        ------
+        InputError
+            If the folder holds none that was finished, or one of its files is damaged.
+        """
+        units, horizon, options, notices = read_index(Path(folder))
+        return cls({unit.path: unit for unit in units}, horizon, options, tuple(notices))
+
     def _conclude(self, store: Store) -> None:
-        """Write the table and the report, both or none."""
-        _, table, page = OUTPUTS
+        """Write the table, the report and the list of units, all or none."""
+        _, table, page, index = OUTPUTS
         with moved_together(store.folder) as new:
             pq.write_table(arrow(self.rows), new / table)
             self.report(new / page)
+            units = self.units.values()
+            write_index(new / index, units, self.horizon, self.options, self.notices)
 
 
 def _field(spread: Spread) -> tuple[str, float]:
@@ -239,7 +253,7 @@ def fleet(
         Part of each recording, s.
     folder : path, optional
         Where each calibration is kept as soon as it is done, the table (``fleet.parquet``) and the
-        report (``fleet.html``) at the end.
+        report (``fleet.html``) at the end; see `Fleet.load`.
     resume : bool, optional
         Go on with what the folder holds: recordings that have not changed are not calibrated again.
     jobs : int, optional

@@ -77,7 +77,7 @@ def _is_own(path: str, folder: Path | None) -> bool:
     return inside[0] in OUTPUTS
 
 
-OUTPUTS = ("calibrations", "fleet.parquet", "fleet.html")
+OUTPUTS = ("calibrations", "fleet.parquet", "fleet.html", "fleet.json")
 """What a fleet writes into its folder."""
 
 

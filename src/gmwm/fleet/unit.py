@@ -159,18 +159,22 @@ class Task:
                 f"the worker has gmwm {__version__}, and numbers of {self.version} are asked for: "
                 "install the same version on all machines"
             )
-        is_folder = os.path.isdir(item.path)
-        digest = "" if is_folder else digest_of(item.path)
+        before, digest = _state(item.path), digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
         calibration = calibrate(
             recording, self._models(recording), screening=self.screening, still=self.still
         )
+        if _state(item.path) != before:
+            raise InputError(
+                f"{item.path}: changed while it was calibrated: calibrate it again with resume",
+                "recording-changed",
+            )
         return Unit(
             path=item.path,
             name=item.name,
             result=calibration,
             numbers={name: _numbers(fit, self.horizon) for name, fit in calibration.items()},
-            digest=digest or digest_of(item.path),
+            digest=digest,
         )
 
     def _models(self, recording: Recording) -> dict[str, Model] | None:
@@ -187,6 +191,15 @@ class Task:
 
 def _failed(item: Item, code: str, text: str) -> Unit:
     return Unit(item.path, item.name, Notice(code, "bad", item.name, text))
+
+
+def _state(path: str) -> list[tuple[int, int]]:
+    """Size and time of change of a file, or of those of a folder."""
+    try:
+        parts = sorted(Path(path).iterdir()) if os.path.isdir(path) else [Path(path)]
+        return [(each.stat().st_size, each.stat().st_mtime_ns) for each in parts]
+    except (OSError, ValueError):  # hashing it says why
+        return []
 
 
 def digest_of(path: str) -> str:

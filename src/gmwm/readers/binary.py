@@ -98,7 +98,7 @@ def layout_of(text: str) -> BinaryLayout:
             found = replace(found, increments=word == "increments")
         else:
             raise InputError(f"layout {text!r}: {word!r} is unknown: write {_FORM}", "layout")
-    if not (found.gyro > 0.0 and found.accel > 0.0):
+    if not (0.0 < found.gyro < math.inf and 0.0 < found.accel < math.inf):
         raise InputError(f"layout {text!r}: give positive scales: {_FORM}", "layout")
     return found
 
@@ -175,12 +175,11 @@ class BinaryTable:
         memory.require(tuning.BYTES_PER_SAMPLE * self.count * (len(columns) + 1), self.source)
         found = {column: np.empty(self.count) for column in {0, *columns}}
         for start in range(0, self.count, tuning.RECORDS_AT_ONCE):
-            for column, values in self._columns(
-                start, tuning.RECORDS_AT_ONCE, tuple(found)
-            ).items():
+            part = self._columns(start, tuning.RECORDS_AT_ONCE, tuple(found))
+            for column, values in part.items():
                 found[column][start : start + values.size] = values
         interval = self._interval(found[0])
-        return {column: self._scaled(column, found[column], interval) for column in columns}
+        return {column: self._scaled(column, found.pop(column), interval, 0) for column in columns}
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
         """The same, ``rows`` at a time; the interval of increments is that of the first."""
@@ -188,38 +187,38 @@ class BinaryTable:
         for start in range(0, self.count, rows):
             found = self._columns(start, rows, tuple({0, *columns}))
             interval = interval or self._interval(found[0])
-            yield {column: self._scaled(column, found[column], interval) for column in columns}
+            yield {c: self._scaled(c, found[c], interval, start) for c in columns}
 
     def _columns(self, start: int, rows: int, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Numbers of some records as they are."""
         block = self._read(start, rows)[: self.count - start]
         found = {0: block["time"]} | {i: block["values"][:, i - 1] for i in columns if i}
-        result = {column: found[column].astype(float) for column in columns}
-        for values in result.values():
-            if not usable(values):
-                row = int(np.flatnonzero(np.abs(values) >= LARGEST)[0])
-                raise InputError(
-                    f"{self.source}, {self.where(start + row)}: {values[row]} is not a usable "
-                    "number: check the layout"
-                )
-        return result
+        return {column: found[column].astype(float) for column in columns}
 
     def _interval(self, times: FloatArray) -> float:
         """Seconds between records that follow each other; 1 where numbers are rates."""
         if not self.layout.increments:
             return 1.0
-        steps = np.diff(times)
-        usual = float(np.median(steps))
         with np.errstate(all="ignore"):
+            steps = np.diff(times)
+            usual = float(np.median(steps))
             near = steps[np.abs(steps / usual - 1.0) < 0.5]
         if not (near.size and usual > 0.0):
             raise InputError(f"{self.source}: its times do not advance: check the layout", "layout")
         return float(np.mean(near))
 
-    def _scaled(self, column: int, values: FloatArray, interval: float) -> FloatArray:
-        if not column:
-            return values
-        return values * ((self.layout.gyro if column <= 3 else self.layout.accel) / interval)
+    def _scaled(self, column: int, raw: FloatArray, interval: float, start: int) -> FloatArray:
+        """In seconds or SI units; ``start`` is the record of the first."""
+        unit = (1.0, *(self.layout.gyro,) * 3, *(self.layout.accel,) * 3)[column]
+        with np.errstate(all="ignore"):
+            values = raw * (unit / interval if column else unit)
+        if not usable(values):
+            row = int(np.flatnonzero(np.abs(values) >= LARGEST)[0])
+            raise InputError(
+                f"{self.source}, {self.where(start + row)}: {values[row]} is not a usable number: "
+                "check the layout"
+            )
+        return values
 
     def where(self, row: int) -> str:
         """Say which record."""

@@ -103,15 +103,21 @@ class CsvTable:
         allowed = memory.budget()
         self._require(self._estimated_samples(len(columns)))
         held = 0
-        parts: list[list[FloatArray]] = [[] for _ in columns]
+        # They grow where they are: parts to be joined would be in memory twice.
+        series = [np.empty(0) for _ in columns]
         for found in self._parsed(columns):
-            for part, values in zip(parts, found, strict=True):
-                part.append(values)
-                held += values.size
-            if held * tuning.BYTES_PER_SAMPLE > allowed:
-                self._require(max(held, self._estimated_samples(len(columns))))
-        # One column at a time lets the blocks go before the next one is joined.
-        joined = {column: np.concatenate(parts.pop(0)) for column in columns}
+            begin, held = held, held + found[0].size
+            for values, part in zip(series, found, strict=True):
+                if held > values.size:
+                    values.resize(held + values.size // 8, refcheck=False)
+                values[begin:held] = part
+            samples = held * len(columns)
+            if samples * tuning.BYTES_PER_SAMPLE > allowed:
+                self._require(max(samples, self._estimated_samples(len(columns))))
+        for values in series:
+            values.resize(held, refcheck=False)
+        _release_unused()
+        joined = dict(zip(columns, series, strict=True))
         for column, scale in self.layout.scales.items():
             if column in joined:
                 joined[column] *= scale
@@ -227,7 +233,7 @@ def _parse_with_arrow(
     except pyarrow.ArrowInvalid:
         return None
     found: list[FloatArray] = [
-        _since_1970(table.column(name)) if i in layout.dates else _numbers(table.column(name))
+        _since_1970(table.column(name)) if i in layout.dates else _floats(table.column(name))
         for i, name in zip(columns, wanted, strict=True)
     ]
     return found if all(map(usable, found)) else None
@@ -242,18 +248,26 @@ def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:
     return pyarrow.timestamp("ns", tz="UTC" if has_zone else None)
 
 
-def _numbers(column: pyarrow.ChunkedArray) -> FloatArray:
-    """NaN where one is missing; Arrow's own way imports pandas."""
-    parts = []
+def _release_unused() -> None:
+    """Give memory back that Arrow keeps for more columns, where it did any work."""
+    import pyarrow
+
+    pyarrow.default_memory_pool().release_unused()
+
+
+def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
+    """A column of floats, NaN where it has none; what Arrow has for it imports pandas."""
+    result = np.empty(len(column))
+    at = 0
     for chunk in column.chunks:
-        valid, data = chunk.buffers()
-        part = np.frombuffer(data, np.float64)[chunk.offset : chunk.offset + len(chunk)]
+        known, values = chunk.buffers()
+        part = result[at : at + len(chunk)]
+        part[:] = np.frombuffer(values, float, len(chunk), 8 * chunk.offset)
         if chunk.null_count:
-            is_there = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
-            is_there = is_there[chunk.offset : chunk.offset + len(chunk)]
-            part = np.where(is_there, part, np.nan)
-        parts.append(part)
-    return np.concatenate(parts)
+            bits = np.unpackbits(np.frombuffer(known, np.uint8), bitorder="little")
+            part[bits[chunk.offset : chunk.offset + len(chunk)] == 0] = np.nan
+        at += len(chunk)
+    return result
 
 
 def _since_1970(column: pyarrow.ChunkedArray) -> FloatArray:

@@ -180,8 +180,11 @@ def _part(
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
-    recording = Recording.from_arrays(
-        {name: arrays[index] for name, index in roles.channels.items()},
+    further = [_auxiliary(column, arrays[column.index], 1.0 / used_rate) for column in auxiliary]
+    series = {name: arrays[index] for name, index in roles.channels.items()}
+    arrays.clear()
+    recording = Recording.taking(
+        series,
         rate=used_rate,
         units=unit_of,
         source=table.source,
@@ -189,7 +192,6 @@ def _part(
     )
     arrays = {column.index: arrays[column.index] for column in auxiliary}
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
-    further = [_auxiliary(column, arrays[column.index], recording.dt) for column in auxiliary]
     recording = replace(
         recording,
         channels=(*recording.channels, *further),

@@ -167,15 +167,27 @@ class Recording(Mapping[str, Channel]):
             If the rate is not positive, a unit is missing or unknown, or the channels are not
             series of numbers of one length, none infinite.
         """
+        return cls.taking(dict(arrays), rate, units, source, notices)
+
+    @classmethod
+    def taking(
+        cls,
+        arrays: dict[str, FloatArray],
+        rate: float,
+        units: Mapping[str, str],
+        source: str = "",
+        notices: Sequence[Notice] = (),
+    ) -> Recording:
+        """`from_arrays` that empties the dictionary, so that series are in memory once."""
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
             raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
         channels = []
-        for name, values in arrays.items():
+        for name in list(arrays):
             unit = units.get(name) or units.get(name.partition("_")[0])
             if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
-            series, auxiliary = _series(name, values), auxiliary_unit(unit)
+            series, auxiliary = _series(name, arrays.pop(name)), auxiliary_unit(unit)
             if auxiliary is not None:
                 channels.append(auxiliary_channel(name, series, 1.0 / rate, auxiliary))
                 continue

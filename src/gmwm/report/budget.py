@@ -114,6 +114,6 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
     return (
         "A minute without aiding from exact attitude, velocity and position costs "
         f"{lost(known)} (1 sigma) if the slow errors are known when it begins, and "
-        f"{lost(unknown)} if nothing is known of them. After fixes, whose errors are carried on, "
-        "it costs more: gmwm certify."
+        f"{lost(unknown)} if nothing is known of them. After fixes, which leave errors of "
+        "attitude and velocity, it costs more: gmwm certify."
     )

@@ -144,8 +144,8 @@ STREAMING_LEAST = 0.375
 32 of 64, that is four standard deviations less."""
 
 STREAMING_LARGEST_CHANGE = 10.0
-"""Of a variance by what gaps add to it: half of white noise missing singly has 1, so that a level of
-six degrees of freedom comes so low in 15 of 100 records; 1.5 did in 40, with a bias of 20 %."""
+"""Of a variance by what gaps add to it: half of white noise missing singly has 1, so that few
+windows may come out at less; bounded by 1.5, three coarse levels were 11 % too large."""
 
 LONGEST_WITHIN = 0.625
 """Part of half a window that one gap may take, the rest of what must be there."""

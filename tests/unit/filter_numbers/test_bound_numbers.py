@@ -479,3 +479,12 @@ class Drawn(Process):
 def test_what_cannot_be_used(source, options, message):
     with pytest.raises(InputError, match=message):
         gmwm.bound(source, **options)
+
+
+def test_what_is_left_out_is_reported_with_its_unit():
+    model = WhiteNoise(1e-3) + Sinusoid(2e-2, 0.02)
+    for name, shown in (("accel_x", "amplitude 2.04 mg"), ("gyro_x", "amplitude 1.15 deg/s")):
+        found = gmwm.bound({name: model}).notices
+        (notice,) = [each for each in found if each.code == "line-left-out"]
+        assert shown in notice.text
+        assert notice.values["amplitude"] == 2e-2

@@ -11,7 +11,7 @@ import pytest
 
 import gmwm
 from fleets import QUICK
-from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
+from gmwm import Calibration, Fleet, InputError, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
 from gmwm.fleet import DERIVED, SCHEMA, unit as units
 from gmwm.fleet.fleet import _about as notices_of, _task as _task_of
@@ -375,3 +375,52 @@ def test_options_are_checked_before_the_work(lot, worked, change, words):
         gmwm.fleet(lot, **(QUICK | change))
     assert words in str(caught.value)
     assert worked == []
+
+
+def test_a_fleet_is_loaded_from_its_folder(outputs, copied):
+    found = Fleet.load(copied)
+    assert str(found) == str(outputs[1])
+    assert found.to_dict() == outputs[1].to_dict()
+    assert found.failed == outputs[1].failed
+    text = (copied / "fleet.json").read_text()
+    for old, new in (
+        ('"horizon_s": 60.0', '"horizon_s": -1.0'),
+        ('"unit 0"', '"../unit 0"'),
+        ("unit 0", "unit 7"),
+        (text[300:], ""),
+    ):
+        damage = text.replace(old, new)
+        assert damage != text
+        (copied / "fleet.json").write_text(damage)
+        with pytest.raises(InputError, match=r"fleet.json|unit 7"):
+            Fleet.load(copied)
+    (copied / "fleet.json").unlink()
+    with pytest.raises(InputError, match=r"holds no fleet\.json"):
+        Fleet.load(copied)
+
+
+def test_a_unit_that_fails_later_leaves_no_calibration(record, tmp_path):
+    paths = [record(tmp_path / "in" / f"{i}.npz", i) for i in range(2)]
+    first = gmwm.fleet(paths, folder=tmp_path / "out", **QUICK)
+    (tmp_path / "in" / "1.npz").write_text("nothing")
+    found = gmwm.fleet(paths, folder=tmp_path / "out", resume=True, **QUICK)
+    assert list(found.failed) == paths[1:] and len(first.failed) == 0
+    assert [each.name for each in (tmp_path / "out" / "calibrations").iterdir()] == ["0.json"]
+    assert list(Fleet.load(tmp_path / "out").failed) == paths[1:]
+
+
+@pytest.mark.parametrize("is_folder", [False, True])
+def test_a_recording_that_changes_meanwhile_is_not_taken_for_the_other(
+    record, tmp_path, monkeypatch, is_folder
+):
+    path = record(tmp_path / "in" / "a.npz")
+    given = str(tmp_path / "in") if is_folder else path
+    at_rest = gmwm.read(path, 1.0, {"gyro": "rad/s"})
+
+    def changed(*_, **__):
+        record(tmp_path / "in" / "a.npz", seed=9, n=300)
+        return at_rest
+
+    monkeypatch.setattr(units, "read", changed)
+    with pytest.raises(InputError, match="changed while it was calibrated"):
+        gmwm.fleet(given, **QUICK)

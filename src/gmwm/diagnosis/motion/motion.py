@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from weakref import ref
 
 import numpy as np
 from scipy.signal import detrend
@@ -111,6 +112,19 @@ def find_motion(recording: Recording) -> Motion:
     Motion
         Without moves if it is static, or too short to be examined.
     """
+    known = _latest.get(id(recording))
+    if known is None or known[0]() is not recording:
+        known = ref(recording), _found(recording)
+        _latest.clear()
+        _latest[id(recording)] = known
+    return known[1]
+
+
+_latest: dict[int, tuple[ref[Recording], Motion]] = {}
+"""The recording that was examined last, and its motion: what is done about it asks again."""
+
+
+def _found(recording: Recording) -> Motion:
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)
     if recording.n < tuning.FEWEST_BLOCKS * size:

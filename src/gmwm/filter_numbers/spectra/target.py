@@ -8,6 +8,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from gmwm._core.notices import Notice
+from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
@@ -49,8 +50,8 @@ class Target:
     notices: tuple[Notice, ...]
 
     @classmethod
-    def of(cls, model: Model, dt: float, horizon: float) -> Target:
-        """Sort the terms of a model with given parameters.
+    def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> Target:
+        """Sort the terms of a model with given parameters; the unit is for what notices say.
 
         Raises
         ------
@@ -72,9 +73,9 @@ class Target:
                 )
             if term.is_drift:
                 constant = abs(term.drift_rate()) * horizon
-                notices.append(_ramp(label, term.drift_rate(), constant))
+                notices.append(_ramp(label, term.drift_rate(), constant, unit))
             elif term.is_line:
-                notices += [_line(label, f, a, fast) for f, a in term.lines()]
+                notices += [_line(label, f, a, fast, unit) for f, a in term.lines()]
             else:
                 density = evaluated(term.psd, band, dt)
                 high, low = np.max(density[band >= fast]), np.max(density[band < fast])
@@ -186,15 +187,18 @@ def _has_variance(term: Process, dt: float) -> bool:
     return True
 
 
-def _ramp(label: str, rate: float, sd: float) -> Notice:
-    text = f"the {label} counts as a constant of standard deviation {sd:.3g}: |R| times the horizon"
+def _ramp(label: str, rate: float, sd: float, unit: str) -> Notice:
+    text = (
+        f"the {label} counts as a constant of standard deviation {readable(sd, unit)}: |R| times "
+        "the horizon"
+    )
     mend = "a filter that lasts longer needs a state for it"
     return Notice("ramp-as-constant", "warning", "", text, {"R": rate, "sd": sd}, mend)
 
 
-def _line(label: str, frequency: float, amplitude: float, fast: float) -> Notice:
+def _line(label: str, frequency: float, amplitude: float, fast: float, unit: str) -> Notice:
     slow = frequency < fast
-    text = f"the {label} at {frequency:.4g} Hz, amplitude {amplitude:.3g}, is left out"
+    text = f"the {label} at {frequency:.4g} Hz, amplitude {readable(amplitude, unit)}, is left out"
     values = {"frequency": frequency, "amplitude": amplitude}
     if slow:
         text += ": it is slow for this horizon, and errors are larger than the numbers say"

@@ -104,7 +104,7 @@ class _LagSums:
         return found
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=16)  # recordings that are fitted jointly; 3 MB each
 def _lag_sums(n: int) -> _LagSums:
     """Set-up of the sums over lags, on means of blocks of samples."""
     m = dyadic_levels(n)
@@ -116,8 +116,9 @@ def _lag_sums(n: int) -> _LagSums:
     weights[[0, -1]] = 1.0
     counts = np.empty((available.size, available.size, lag.size))
     for j, own in enumerate(available):
-        for k, other in enumerate(available):
-            counts[j, k] = centred_pairs(own, other, lag, block) / (block * min(own, other))
+        for k, other in enumerate(available[: j + 1]):
+            pairs = centred_pairs(own, other, lag, block) / (block * min(own, other))
+            counts[j, k] = counts[k, j] = pairs
     averaging = m[first:] / block
     amplitude = grid.haar_amplitude(averaging)
     return _LagSums(first, grid, averaging.astype(np.intp), amplitude, weights, weights * counts)
