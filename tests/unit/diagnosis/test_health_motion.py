@@ -244,3 +244,12 @@ def test_drifts_and_walks_of_accelerometers_do_not_turn(record):
         series = dict(zip("xyz", (force + slow).T, strict=True))
         rec = record(**{f"accel_{axis}": each for axis, each in series.items()})
         assert not find_motion(rec).turns_steadily
+
+
+def test_motion_of_one_recording_is_not_that_of_the_next(moved):
+    spun = moved(turn(9_000, 30, 60, 60.0, (0, 0, 1)))
+    first = find_motion(spun)
+    assert find_motion(spun) is first
+    flat = moved(np.zeros((9_000, 3)))
+    assert find_motion(flat).moves == ()
+    assert find_motion(spun).moves == first.moves != ()

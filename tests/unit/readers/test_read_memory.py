@@ -11,7 +11,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from gmwm import InputError, read
+from gmwm import InputError, Recording, read
 from gmwm._core import memory
 
 UNITS = {"gyro": "rad/s"}
@@ -110,3 +110,27 @@ def test_no_memory_for_an_entry_is_a_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(np.lib.format, "read_array", fail)
     with pytest.raises(InputError, match=r"a.npz: there is not enough memory: read fewer"):
         read(path, rate=100, units=UNITS)
+
+
+def test_empty_fields_are_missing_in_every_block_and_pandas_is_not_needed(tmp_path, monkeypatch):
+    """Blocks of the text hold gaps of their own; what Arrow has for it would import pandas."""
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    n = 45_000
+    values = np.random.default_rng(1).normal(size=(n, 3)).round(9)
+    values[::977, 1] = np.nan
+    values[:, 2] += 9.81
+    rows = (",".join("" if np.isnan(v) else repr(v) for v in row) for row in values.tolist())
+    file = tmp_path / "gaps.csv"
+    file.write_text("\n".join(["gyro_x,gyro_y,accel_z", *rows]) + "\n")
+    rec = read(file, rate=100, units={"gyro": "rad/s", "accel": "m/s^2"})
+    for name, column in zip(("gyro_x", "gyro_y", "accel_z"), values.T, strict=True):
+        np.testing.assert_array_equal(rec[name].values, column)
+
+
+def test_series_that_are_taken_leave_the_dictionary_and_those_that_are_given_stay():
+    given = {"gyro_x": np.arange(64.0)}
+    rec = Recording.from_arrays(given, 100.0, {"gyro": "rad/s"})
+    assert list(given) == ["gyro_x"]
+    taken = Recording.taking(given, 100.0, {"gyro": "rad/s"})
+    assert not given
+    np.testing.assert_array_equal(taken["gyro_x"].values, rec["gyro_x"].values)
