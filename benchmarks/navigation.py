@@ -83,7 +83,7 @@ def _peer(imu: Imu, truth: Trajectory, aiding: Aiding) -> None:
         )  # fmt: skip
         times.append(process_time() - start)
     best = min(times)
-    print(f"{15:6} {0.1:9g} {10:8} {best:9.3f} {n / best / 1e6:10.3f}  pyins, {PEER:g} s")
+    print(f"{15:6} {0.1:9g} {10:8} {best:9.3f} {n / best / 1e6:10.4f}  pyins, {PEER:g} s")
 
 
 def main() -> None:

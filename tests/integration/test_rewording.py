@@ -32,7 +32,7 @@ def numbers(content):
 
 
 def results():
-    drifting = (TRUTH + RateRamp(1e-3)).simulate(2000, 1.0, 4)
+    drifting = (TRUTH + RateRamp(3e-3)).simulate(800, 1.0, 4)
     fits = [
         gmwm.fit(model, drifting, 1.0, method=method)
         for model in (WhiteNoise() + 2 * GaussMarkov(), WhiteNoise() + RandomWalk() + RateRamp())

@@ -85,7 +85,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     Returns
     -------
     tuple of Departure
-        Most evident first, each beside those before it; the last one may be one that noise explains
+        Most evident first, each beside the others; the last one may be one that noise explains
         about as well (`Departure.is_evident`).
     """
     noise = tuple(term for term in fitted.model.terms if not term.is_drift)
@@ -103,7 +103,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
         known = means.differences(means.step * np.arange(float(means.blocks.size))[None, :])
-    found: list[Departure] = []
+    basic, found = known, list[tuple[float, _Test]]()
     for _ in range(tuning.MOST_DEPARTURES):
         beside = [noise.beside(known) for noise in noises]
         tests = [_Test.of(family, means, beside) for family in kinds]
@@ -116,12 +116,28 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
         known = _basis(np.vstack([known, means.differences(best.neighbours)]))
         # A drift of the whole record has a test of its own (slope_p_value): here it competes only.
         if best.family.kind != "drift":
-            share = _share(best.curve, means.step, fitted)
-            kind, time, size = best.family.kind, best.time, best.size
-            found.append(Departure(kind, time, size, evidence, share, best.phase))
+            found.append((evidence, best))
             if evidence < tuning.EVIDENT:
                 break
-    return tuple(found)
+        else:
+            basic = _basis(np.vstack([basic, means.differences(best.neighbours)]))
+    # The first were found with those after them in the data.
+    tests = [test for _, test in found]
+    for i, test in enumerate(tests[:-1]):
+        others = [means.differences(each.neighbours) for each in tests if each is not test]
+        known = _basis(np.vstack([basic, *others]))
+        tests[i] = _Test.of(test.family, means, [noise.beside(known) for noise in noises])
+    return tuple(
+        Departure(
+            test.family.kind,
+            test.time,
+            test.size,
+            evidence,
+            _share(test.curve, means.step, fitted),
+            test.phase,
+        )
+        for test, (evidence, _) in zip(tests, found, strict=True)
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,22 +76,37 @@ def variance_without(
 
     An estimated curve has followed the noise: what is subtracted with it has, on average, the
     square of the standard error of its size times the wavelet variance of the curve at unit size,
-    where the size is estimated by generalized least squares. So much is added again.
+    where the size is estimated by generalized least squares. So much is added again. Errors of
+    several sizes are correlated as under white noise: of two opposite steps the level after both is
+    known better than that between.
     """
     left = _without(channel, found)
     wv = wavelet_variance(left, robust=robust)
     if not found:
         return wv
-    missing = np.isnan(left.values)
-    taken = np.zeros_like(wv.variance)
+    curves, errors = [], []
     for each in found:
-        error = (each.size[2] - each.size[1]) / (2.0 * WIDE)
-        phases = (0.0, 0.5 * np.pi) if each.kind == "slow-period" else (0.0,)
-        for phase in phases:
-            curve = _curve(replace(each, phase=each.phase + phase), _times(channel))
-            unit = wavelet_variance(np.where(missing, np.nan, curve), dt=channel.dt)
-            taken += error**2 * unit.variance[: taken.size]
+        for phase in (0.0, 0.5 * np.pi) if each.kind == "slow-period" else (0.0,):
+            curves.append(_curve(replace(each, phase=each.phase + phase), _times(channel)))
+            errors.append((each.size[2] - each.size[1]) / (2.0 * WIDE))
+    there = ~np.isnan(left.values)
+    taken = np.zeros_like(wv.variance)
+    for error in _independent(np.array(curves)[:, there], np.array(errors)):
+        size = float(np.linalg.norm(error))
+        # Of the whole curve: a gap that it steps in is filled in what is left.
+        unit = wavelet_variance((error / size) @ np.array(curves), dt=channel.dt)
+        taken += size**2 * unit.variance[: taken.size]
     return replace(wv, variance=wv.variance + taken)
+
+
+def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
+    """Combinations of curves whose sizes have independent errors, in standard errors, (k, k)."""
+    centred = curves - np.mean(curves, axis=1)[:, None]
+    covariance = np.linalg.pinv(centred @ centred.T)
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    found = (vectors * np.sqrt(np.maximum(values, 0.0))).T * errors
+    return np.asarray(found[values > tuning.NO_INFORMATION])
 
 
 def _is_evident(notice: Notice) -> bool:

@@ -150,7 +150,9 @@ def sentence(fitted: Fit) -> str:
             return f"{value * known[0].per_si:.3g} {known[0].unit}"
         return f"{value:.3g} {unit.replace('u', fitted.wv.unit, 1)}"
 
-    noise = f"White noise of {shown(density, 'u/sqrt(Hz)')}" if density > 0.0 else "No white noise"
+    noise = "No white noise"
+    if density > 0.0:
+        noise = f"Total white noise of {shown(density, 'u/sqrt(Hz)')}"
     end = "" if low.tau < fitted.wv.tau[-1] else " (still falling at the end of the record)"
     return (
         f"{noise}; averaging helps up to {low.tau:.4g} s, down to {shown(low.deviation, 'u')}{end}."

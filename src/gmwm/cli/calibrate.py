@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
-from gmwm.cli.hints import with_option
+from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
     estimating_options,
     models_of_channels,
@@ -313,7 +313,8 @@ def write_files(
     lines = []
     with moved_together(folder) as new:
         with stage("report"):
-            result.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+            shown = in_options(result)
+            shown.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
         with stage("exports"):
             result.save(new / names[0])
         if {"gyro", "accel"} <= quantities:

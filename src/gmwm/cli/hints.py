@@ -9,6 +9,7 @@ from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     from gmwm._core.notices import Notice
+    from gmwm.calibration import Calibration
 
 HINTS = {
     "accel-unit-missing": "--accel-unit g",
@@ -45,6 +46,16 @@ def with_hint(error: InputError) -> str:
     if error.mend:
         return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
     return f"{error} (on the command line: {hint})"
+
+
+def in_options(calibration: Calibration) -> Calibration:
+    """A calibration whose notices advise in options, for a report of the command line."""
+    fits = {
+        name: replace(fit, notices=tuple(map(with_option, fit.notices)))
+        for name, fit in calibration.items()
+    }
+    notices = tuple(map(with_option, calibration.notices))
+    return replace(calibration, fits=fits, notices=notices)
 
 
 def with_option(notice: Notice) -> Notice:

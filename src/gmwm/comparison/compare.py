@@ -30,7 +30,8 @@ from gmwm.estimate import Fit, JointFit
 from gmwm.readers import Recording, is_frame
 
 _NOT_NOISE = (
-    "not-static", "tilt", "rate-changes", "step", "transient", "drift-at-start", "slow-period",
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
+    "variance", "step", "transient", "drift-at-start", "slow-period",
 )  # fmt: skip
 """Codes of notices of a fit whose curve is not that of noise."""
 

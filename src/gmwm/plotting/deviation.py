@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195")
-"""Okabe & Ito's palette, distinct to colour-blind people too; black is the sum."""
+COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#c06a9a", "#b87a00", "#2f8fc8", "#8c5fa8")
+"""After Okabe & Ito, distinct to colour-blind people too, darkened to what thin lines need on white
+(3:1, WCAG 2.1, 1.4.11); black is the sum."""
 
 DATA_COLOUR = "#444444"
 SUM_COLOUR = "#000000"

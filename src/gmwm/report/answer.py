@@ -12,6 +12,7 @@ from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.estimate import Fit
 from gmwm.export import Triad
+from gmwm.report.health import is_departure
 from gmwm.report.numbers import SHOWN, Certified
 from gmwm.report.text import duration_text, short
 
@@ -52,10 +53,12 @@ _AIM = 0.1  # relative standard error of the deviation that is well enough known
 def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict[str, Any]:
     """Content of the first screen."""
     certified = numbers[SHOWN]
+    rows = [_row(name, fit, calibration, certified) for name, fit in calibration.items()]
     return {
         "health": verdict(calibration),
         "horizon": f"{SHOWN:g} s",
-        "rows": [_row(name, fit, calibration, certified) for name, fit in calibration.items()],
+        "rows": rows,
+        "bounds": {letter: any(_is_bound(row[letter]) for row in rows) for letter in "NKB"},
         "length": length_sentence(calibration, SHOWN),
         "boxes": [_box(each, calibration) for each in numbers.values()],
     }
@@ -96,8 +99,11 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     for notice in fit.notices:
         if notice.severity == "bad":
             return False, _WHY.get(notice.code, notice.code.replace("-", " "))
-    worst = fit.goodness.worst
-    fits = f"fits within {100.0 * abs(worst[0]):.2g} %" if worst else "fits the data"
+    at = fit.goodness
+    fits = "fits the data"
+    if at.worst is not None:
+        share = f"{100.0 * abs(at.worst[0]):.2g} %"
+        fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
     return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
 
@@ -150,8 +156,19 @@ def _row(name: str, fit: Fit, calibration: Calibration, certified: Certified) ->
         "slow": slow_terms(fit),
         "valid": is_valid,
         "why": why,
+        "reason": "health" if _is_finding(name, fit, calibration) else name,
         "known": known_at(fit, SHOWN),
     }
+
+
+def _is_finding(name: str, fit: Fit, calibration: Calibration) -> bool:
+    """Whether the section of findings has what makes a fit not valid."""
+    known = {n.code for n in calibration.notices if (n.where, n.severity) == (name, "bad")}
+    return any(is_departure(notice) or notice.code in known for notice in fit.notices)
+
+
+def _is_bound(text: Mapping[str, str] | None) -> bool:
+    return text is not None and text["si"].startswith("≤")
 
 
 def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str, str] | None:
@@ -171,7 +188,8 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
             row = {letter: _number(certified, name, letter, fit) for letter in "NK"}
             start = quantity_text(each.initial_sd, "u", fit)
             nees = _consistency([each.nees], certified.horizon)
-            rows.append({"name": name, **row, "start": start, "nees": nees})
+            invalid = [] if fit.valid else [name]
+            rows.append({"name": name, **row, "start": start, "nees": nees, "invalid": invalid})
     return {
         "horizon": f"{certified.horizon:g}",
         "shown": certified.horizon == SHOWN,
@@ -186,7 +204,8 @@ def _shared(triad: Triad, horizon: float, calibration: Calibration) -> dict[str,
     """A row of what files hold that have one value for the axes of a sensor."""
     fit = calibration[triad.axes[0].name]
     values = {"N": (triad.N, "u/sqrt(Hz)"), "K": (triad.K, "u/s/sqrt(Hz)")}
-    row: dict[str, Any] = {"name": f"{triad.quantity}, shared"}
+    invalid = [axis.name for axis in triad.axes if not calibration[axis.name].valid]
+    row: dict[str, Any] = {"name": f"{triad.quantity}, shared", "invalid": invalid}
     for letter, (value, unit) in values.items():
         sign = "≤ " if triad.is_upper(letter) else ""
         row[letter] = {key: sign + each for key, each in quantity_text(value, unit, fit).items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import Any
 
 from gmwm.budget import (
@@ -43,21 +44,25 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
         return {"problem": str(error)}
     of = known.groups[-1]
     figure = growth_figure(known, unknown, of, known.quantities(of)[-1])
+    invalid = {name for name in known.channels if not calibration[name].valid}
     return {
         "problem": "",
         "times": [f"{t:g} s" for t in times],
         "sentence": _sentence(known, unknown),
         "starts": [
-            ("The slow errors are known at the start, as after a filter with aiding", _rows(known)),
-            ("Nothing is known of the errors at the start", _rows(unknown)),
+            (
+                "The slow errors are known at the start, as after a filter with aiding",
+                _rows(known, invalid),
+            ),
+            ("Nothing is known of the errors at the start", _rows(unknown, invalid)),
         ],
-        "parts": _parts(known),
+        "parts": _parts(known, invalid),
         "notes": known.notes,
         "figure": figure,
     }
 
 
-def _rows(budget: ErrorBudget) -> list[dict[str, Any]]:
+def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
     """The totals of the platform: tilt and horizontal errors, then what else there is."""
     together = [HORIZONTAL] if HORIZONTAL in budget.groups else []
     apart = [name for name in budget.channels if axis(name) not in ("x", "y")]
@@ -73,6 +78,7 @@ def _rows(budget: ErrorBudget) -> list[dict[str, Any]]:
                     "unit": FIELD_UNITS[quantity],
                     "values": [short(value) for value in values * per_si(quantity)],
                     "mostly": mostly if share > 0.0 else "",
+                    "invalid": bool(invalid & {of, *budget.curves(of, quantity)}),
                 }
             )
     # By quantity, the horizontal before the others; the sort keeps that order within each.
@@ -83,7 +89,7 @@ def _name(of: str, quantity: str) -> str:
     return _NAMES.get((axis(of) or of, quantity), f"{of} {quantity}")
 
 
-def _parts(budget: ErrorBudget) -> list[dict[str, Any]]:
+def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
     return [
         {
             "channel": row.channel,
@@ -91,6 +97,7 @@ def _parts(budget: ErrorBudget) -> list[dict[str, Any]]:
             "quantity": row.quantity,
             "unit": FIELD_UNITS[row.quantity],
             "values": [short(value * per_si(row.quantity)) for value in row.values],
+            "invalid": row.channel in invalid,
         }
         for row in budget.rows
         if any(row.values)

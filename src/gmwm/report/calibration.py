@@ -110,7 +110,8 @@ def page(
 def fragment(calibration: Calibration) -> str:
     """The answer axis by axis as a table for a notebook, without what a filter should believe."""
     found = verdict(calibration)
-    head = "<tr><th>channel</th><th>model</th><th>N</th><th>B</th><th>slow terms</th><th></th></tr>"
+    heads = ("channel", "model", "total white noise", "B", "slow terms", "")
+    head = f"<tr>{''.join(f'<th>{each}</th>' for each in heads)}</tr>"
     rows = []
     for name, fit in calibration.items():
         is_valid, why = trust(name, fit, calibration)
@@ -159,7 +160,8 @@ def _channel(
     is_valid, why = trust(name, fit, calibration)
     return {
         "name": name,
-        "fit": fit,
+        # A misfit that the intervals allow for is in the line below the title, and not twice.
+        "notices": [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")],
         "model": fit.model.title(),
         "valid": is_valid,
         "why": why,
@@ -223,9 +225,7 @@ def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
 def _fitness(fit: Fit) -> str:
     text = f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom"
     if fit.p_value == fit.p_value:
-        text += f", p = {fit.p_value:.2g}"
-        if fit.discrepancy > 0.0:
-            text += f" ({fit.p_value_allowed:.2g} with the discrepancy)"
+        text += f", p = {fit.p_value_allowed:.2g}"
     if fit.discrepancy > 0.0:
         text += f", with a discrepancy of {100.0 * fit.discrepancy:.2g} % of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)

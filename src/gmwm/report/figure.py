@@ -33,7 +33,9 @@ _GRID = "#dddddd"  # the page's style sheet gives it another shade on dark scree
 _BESIDE = 1.7  # ratio of averaging times that is left free at both ends
 _SHEET = "#9a5b00"
 _BELOW = 8.0  # how far below the curves a mark may lie that the axis is stretched for
-_SHARE = 60.0  # per cent: residuals beyond are drawn at the edge
+_SHARE = 100.0  # per cent: residuals beyond are drawn at the edge, with their size
+_FILTER = "#c2185b"
+_TICK = 0.93  # of the height: what was left out is marked above, and no sample is painted over
 _LAYOUT: Figure = {
     "margin": {"l": 62, "r": 12, "t": 12, "b": 44},
     "height": 360,
@@ -98,8 +100,8 @@ def deviation_figure(
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
     traces = [
-        {**_line(*_deviation_of(fitted, rival, factor), "models that tie", "#999999", "solid", 1.0),
-         "opacity": 0.6, "legendgroup": "ties"}
+        {**_line(*_deviation_of(fitted, rival, factor), "models that tie", "#777777", "solid", 1.0),
+         "opacity": 0.85, "legendgroup": "ties"}
         for rival in rivals
     ]  # fmt: skip
     toggles = [0] if traces else []
@@ -149,7 +151,7 @@ def _deviation_of(fitted: Fit, model: Model, factor: float) -> tuple[FloatArray,
 def _whatif(tau: FloatArray, numbers: tuple[float, float], factor: float) -> Figure:
     N, K = numbers
     value = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
-    return _line(tau, value, WHATIF, "#b8860b", "dot", 2.4)
+    return _line(tau, value, WHATIF, _FILTER, "dot", 2.4)
 
 
 def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
@@ -168,7 +170,8 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
         "text": [each[0] for each in shown],
         "textposition": ["top right" if each[0] != "K" else "top left" for each in shown],
         "textfont": {"size": 14, "color": SUM_COLOUR},
-        "marker": {"symbol": "diamond", "size": 10, "color": "#b8860b"},
+        # Open, so that a point of the data beneath is seen.
+        "marker": {"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
         "hovertemplate": "%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
     }
 
@@ -182,7 +185,7 @@ def residual_figure(fitted: Fit) -> Figure:
     share = np.sqrt(np.stack([wv.lower, wv.upper]) / np.maximum(wv.variance, np.finfo(float).tiny))
     low, high = (100.0 + misfit) * share[:, shown] - 100.0
     well = np.maximum(np.abs(low), np.abs(high))[at.dof[shown] > 30.0]
-    reach = float(np.clip(1.3 * np.max([5.0, *well]), 5.0, _SHARE))
+    reach = float(min(1.15 * np.max([5.0, *well, *np.abs(misfit)]), _SHARE))
     inside = np.abs(misfit) <= reach
     points = {
         **_points(at.tau[shown], np.clip(misfit, -0.96 * reach, 0.96 * reach), "data over model",
@@ -196,6 +199,11 @@ def residual_figure(fitted: Fit) -> Figure:
         "%{customdata[1]:+.2f} standard errors, %{customdata[2]:.3g} degrees of freedom"
         "<extra></extra>",
     }  # fmt: skip
+    points["mode"] = "markers+text"
+    points["text"] = [
+        "" if ok else f"{value:+.0f} %" for ok, value in zip(inside, misfit, strict=True)
+    ]
+    points["textposition"] = "middle left"
     points["marker"]["symbol"] = [
         "circle" if ok else "triangle-up" if value > 0.0 else "triangle-down"
         for ok, value in zip(inside, misfit, strict=True)
@@ -272,8 +280,8 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
         "xaxis": _linear(f"time [{unit}]"),
         "yaxis": _linear(units[0][0]),
         "shapes": [
-            {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": first / scale,
-             "x1": last / scale, "fillcolor": "rgba(213,94,0,0.55)", "line": {"width": 0}}
+            {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "x0": first / scale,
+             "x1": last / scale, "fillcolor": "#d55e00", "line": {"width": 0}}
             for first, last in found.left_out[:500]
         ],
     }  # fmt: skip

@@ -2,31 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gmwm._core.notices import Notice, worst_first
 from gmwm.calibration import AMBIGUITY, Calibration
 
 _COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
+_DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
-    """Content of the section: notices, worst first, and the good ones apart."""
+    """Content of the section: notices, worst first, and the good ones apart.
+
+    Departures from the model that make a fit not valid are among them: they are found in what the
+    fit leaves, and are of the recording.
+    """
     examined = calibration.is_examined
+    severe = [
+        replace(notice, where=" ".join(part for part in (name, notice.where) if part))
+        for name, fit in calibration.items()
+        for notice in fit.notices
+        if is_departure(notice)
+    ]
     notices = [
         notice
         for notice in calibration.notices
         if notice.code != AMBIGUITY and not (examined and notice.code in _COUNTED_ELSEWHERE)
     ]
+    found = severe + [notice for notice in notices if notice.severity != "good"]
     return {
         "examined": examined,
         "unexamined": () if examined else list(map(str, notices)),
-        "summary": _summary(notices),
-        "rows": _rows([notice for notice in notices if notice.severity != "good"]),
+        "summary": _summary(found),
+        "severe": any(notice.severity == "bad" for notice in found),
+        "rows": _rows(found),
         "good": _rows([notice for notice in notices if notice.severity == "good"]),
     }
+
+
+def is_departure(notice: Notice) -> bool:
+    """Whether it is a change of the bias that makes a fit not valid."""
+    return notice.severity == "bad" and notice.code in _DEPARTURES
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,8 @@ SHOWN = 60.0
 
 _LANGUAGES = {"kalibr": "YAML", "gtsam": "Python", "gtsam-cpp": "C++", "matlab": "MATLAB"}
 """Program -> language of its file."""
+
+_NOT_VALID = "not valid: the fit is not, nor are numbers from it"
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,9 @@ def _at(
             problem = f"{name}: {error}"
     if imu is None and problem:  # without the channels that have none
         imu, why = _imu(calibration, tuple(axes), horizon, before)
-    texts = _by_axis({name: axes[name] for name in calibration if name in axes}, horizon)
+    shown = {name: axes[name] for name in calibration if name in axes}
+    invalid = {name for name in shown if not calibration[name].valid}
+    texts = _by_axis(shown, invalid, horizon)
     if imu is None:
         notes.append(why)
     else:
@@ -111,8 +115,8 @@ def _files(imu: Imu) -> dict[str, str]:
     return texts
 
 
-def _by_axis(axes: Mapping[str, Axis], horizon: float) -> dict[str, str]:
-    """Plain numbers of each axis, for a filter of one's own."""
+def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dict[str, str]:
+    """Plain numbers of each axis, for a filter of one's own; a comment where they are not valid."""
     if not axes:
         return {}
     values = {
@@ -123,12 +127,17 @@ def _by_axis(axes: Mapping[str, Axis], horizon: float) -> dict[str, str]:
         for name, each in axes.items()
     }
     about = (
-        "the numbers of each axis: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], bias at the start [u]; u: "
-        f"rad/s, m/s^2; for {horizon:g} s without aiding"
+        "the numbers of each axis: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], sd of the bias state at the "
+        "start without that of\n# switching on [u]; u: rad/s, m/s^2; for "
+        f"{horizon:g} s without aiding"
     )
-    lines = [f"    {name!r}: {each!r}," for name, each in values.items()]
+    marks = {name: f"  # {_NOT_VALID}" if name in invalid else "" for name in values}
+    lines = [f"    {name!r}: {each!r},{marks[name]}" for name, each in values.items()]
+    blocks = [
+        _yaml({name: each}).replace("\n", f"{marks[name]}\n", 1) for name, each in values.items()
+    ]
     return {
-        "YAML, axis by axis": f"# {about}\n{_yaml(values)}",
+        "YAML, axis by axis": f"# {about}\n{''.join(blocks)}",
         "Python, axis by axis": "\n".join([f"# {about}", "imu_noise = {", *lines, "}", ""]),
     }
 

@@ -13,6 +13,7 @@
   function colour(trace) {
     return (trace.line && trace.line.color) || (trace.marker && trace.marker.color) || "#888";
   }
+  var STYLES = { dash: "dashed", longdashdot: "dashed", dot: "dotted" };
   function scaled(values, factor) {
     return values.map(function (v) { return v === null ? null : v * factor; });
   }
@@ -46,8 +47,12 @@
       var node = document.getElementById(place);
       layout.width = node.parentNode.dataset.width === "half" ? 335 : 690;
       layout.height = Math.round(layout.height * (layout.width === 335 ? 0.55 : 0.57));
-      layout.margin = { l: 55, r: 8, t: 6, b: 34 };
       layout.font.size = 10;
+      // The title of the y axis is longer than the axis is high: it goes above.
+      layout.margin = { l: 42, r: 8, t: 17, b: 34 };
+      layout.annotations = [{ text: layout.yaxis.title.text, showarrow: false, xref: "paper",
+        yref: "paper", x: 0, y: 1, xanchor: "left", yanchor: "bottom", xshift: -40 }];
+      layout.yaxis.title.text = "";
     }
     return layout;
   }
@@ -64,8 +69,8 @@
       var box = element("input", "", label);
       box.type = "checkbox"; box.checked = true; box.dataset.trace = index;
       var swatch = element("span", "", label);
-      swatch.className = "swatch";
-      swatch.style.background = /^#(000000|444444)$/.test(colour(first))
+      swatch.className = "swatch " + (first.line ? STYLES[first.line.dash] || "" : "points");
+      swatch.style.color = /^#(000000|444444)$/.test(colour(first))
         ? "var(--" + (colour(first) === "#000000" ? "ink" : "data") + ")" : colour(first);
       element("span", first.name, label);
       box.addEventListener("change", function () {
@@ -90,7 +95,8 @@
     figure.data.forEach(function (original) {
       var t = trace(figure, original);
       t.x.forEach(function (x, i) {
-        var y = t.y[i], bars = t.error_y, show = function (v) { return v === null ? "" : +v.toPrecision(6); };
+        // A residual beyond the axis is drawn at its edge.
+        var y = t.customdata ? t.customdata[i][0] : t.y[i], bars = t.error_y, show = function (v) { return v === null ? "" : +v.toPrecision(6); };
         if (y === null) { return; }
         // A name that begins a formula in a spreadsheet is kept as text.
         var name = '"' + original.name.replace(/"/g, '""').replace(/^([=+\-@])/, "'$1") + '"';

@@ -250,3 +250,16 @@ def test_a_recording_of_another_kind_is_refused():
     fits = gmwm.calibrate(rec, WhiteNoise() + RandomWalk())
     with pytest.raises(InputError, match="is not the one that was calibrated"):
         gmwm.without_departures(recording(np.zeros(100) + np.arange(100.0)), fits)
+
+
+def test_a_pulse_is_two_steps_of_one_size_and_both_are_removed():
+    n, dt = 36_000, 0.1
+    place = np.arange(n)
+    x = WhiteNoise(1e-4).simulate(n, dt, seed=0) + 3e-4 * ((place > 18_000) & (place < 19_000))
+    rec = gmwm.Recording.from_arrays({"gyro_x": x}, 1.0 / dt, {"gyro": "rad/s"})
+    fit = gmwm.calibrate(rec, WhiteNoise(), screening=(), remove_departures=True)["gyro_x"]
+    gone = [notice.values for notice in fit.notices if notice.code == "step"]
+    assert [each["removed"] for each in gone] == [True, True]
+    assert sorted(each["size"] for each in gone) == pytest.approx([-3e-4, 3e-4], abs=3e-5)
+    assert fit.valid
+    assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)

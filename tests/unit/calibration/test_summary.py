@@ -141,7 +141,7 @@ def test_sentence_for_a_gyro():
     fit = fitted(WhiteNoise(3e-4) + RandomWalk(3e-4), scale=1e-12)
     low = floor(fit)
     text = sentence(fit)
-    assert text.startswith("White noise of 1.03 deg/sqrt(h); ")
+    assert text.startswith("Total white noise of 1.03 deg/sqrt(h); ")
     assert f"up to {low.tau:.3g} s" in text
     assert f"down to {np.degrees(low.deviation) * 3600.0:.3g} deg/h." in text
     assert "still falling" not in text
@@ -150,7 +150,7 @@ def test_sentence_for_a_gyro():
 def test_sentence_for_an_accelerometer():
     fit = fitted(WhiteNoise(1e-3), "accel")
     text = sentence(fit)
-    assert text.startswith("White noise of 102 ug/sqrt(Hz); ")
+    assert text.startswith("Total white noise of 102 ug/sqrt(Hz); ")
     assert f"{floor(fit).deviation / 9.80665e-6:.3g} ug" in text
     assert text.endswith("(still falling at the end of the record).")
     assert sentence(fitted(RandomWalk(1e-3))).startswith("No white noise; ")
@@ -158,7 +158,7 @@ def test_sentence_for_an_accelerometer():
 
 def test_sentence_for_anything_else_keeps_its_unit():
     text = sentence(fitted(WhiteNoise(2e-3), None))
-    assert "White noise of 0.002 V/sqrt(Hz)" in text
+    assert "Total white noise of 0.002 V/sqrt(Hz)" in text
     assert "deg" not in text
     assert " V (still falling" in text
 

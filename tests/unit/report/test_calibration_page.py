@@ -10,12 +10,15 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+import yaml
 
 import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
 from gmwm._core.notices import Notice
+from gmwm.cli.hints import in_options
+from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import write_report
-from gmwm.report.answer import answer
+from gmwm.report.answer import answer, trust
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import page
 from gmwm.report.datasheet import read_datasheet
@@ -25,10 +28,11 @@ from gmwm.report.figure import (
     residual_figure,
     series_figure,
 )
+from gmwm.report.health import health
 from gmwm.report.numbers import certified
 from gmwm.report.text import duration_text, needed, number
 
-VOID = {"meta", "link", "br", "img", "input", "hr"}
+VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
 RESIDUALS = "plot-residuals-"
 
@@ -167,7 +171,10 @@ def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
     assert headings == [None, "health", "navigation", *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
-    assert links == [f"#{name}" for name in calibration]
+    # The name, and the reason where it is not valid.
+    assert links == [
+        f"#{name}" for name, fit in calibration.items() for _ in range(1 if fit.valid else 2)
+    ]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
     overviews = 3  # gyros, accelerometers, others
     assert len(plots) == len(parsed.scripts) - 2 == overviews + 2 * len(calibration) + 1
@@ -203,6 +210,48 @@ def test_valid_and_not_valid(calibration):
         assert set(verdicts) == set(fits)
         start = "valid: fits" if valid else "not valid: the model misses the data"
         assert all(text.startswith(start) for text in verdicts.values())
+
+
+def test_numbers_that_are_not_valid_are_marked(calibration):
+    assert not calibration["accel_x"].valid
+    found = certified(calibration)
+    (box,) = answer(calibration, found)["boxes"]
+    marked = {row["name"]: row["invalid"] for row in box["rows"]}
+    assert marked["gyro_x"] == marked["gyro, shared"] == []
+    assert marked["accel_x"] == marked["accel, shared"] == ["accel_x"]
+    as_yaml, as_python = (found[60.0].texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
+    for text in (as_yaml, as_python):
+        (line,) = [line for line in text.splitlines() if "# not valid" in line]
+        assert "accel_x" in line
+    spaces = {}
+    exec(compile(as_python, "text", "exec"), spaces)
+    assert yaml.safe_load(as_yaml) == spaces["imu_noise"]
+
+
+def test_how_well_a_curve_fits_is_said_of_the_levels_that_tell(calibration):
+    fit = calibration["gyro_x"]
+    at = fit.goodness
+    known = at.tau[at.dof > 30.0]
+    assert at.known_to == known[-1] < fit.wv.tau[-1]
+    share = 100.0 * np.max(np.abs(at.misfit[at.dof > 30.0]))
+    assert trust("gyro_x", fit, calibration)[1] == (
+        f"fits within {share:.2g} % up to {known[-1]:.3g} s"
+    )
+
+
+def test_a_sign_is_explained_where_a_row_has_it(parsed, calibration):
+    assert "≤ before filter N or K" in parsed.text
+    one = replace(calibration, fits={"gyro_x": calibration["gyro_x"]})
+    assert "before filter N or K" not in Page(page(one)).text
+
+
+def test_one_p_value_and_one_misfit(calibration):
+    misfit = Notice("misfit", "note", "", "describes the Allan deviation to 7 %")
+    fit = replace(calibration["gyro_x"], discrepancy=0.01, notices=(misfit,))
+    shown = Page(page(replace(calibration, fits={"gyro_x": fit})))
+    assert shown.text.count("p = ") == 1
+    assert f"p = {fit.p_value_allowed:.2g}, with a discrepancy of 1 %" in shown.text
+    assert "to 7 %" not in shown.text
 
 
 def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
@@ -252,7 +301,9 @@ def test_fitness_is_told(parsed, calibration):
 
 def test_the_error_budget_is_in_the_report(parsed, calibration):
     times = [1.0, 10.0, 60.0, 600.0]
-    rows = [row for row in parsed.cells if row[:1] == ["horizontal position"]]
+    assert not calibration["accel_x"].valid
+    rows = [row for row in parsed.cells if row[:1] == ["horizontal position not valid"]]
+    assert [row[0] for row in parsed.cells if row[:1] and "tilt" in row[0]] == ["tilt"] * 2
     for row, calibrated in zip(rows, (True, False), strict=True):
         total = gmwm.error_budget(calibration, times, calibrated=calibrated).total()["position"]
         shown = [float(cell.replace(",", "")) for cell in row[1:5]]
@@ -265,8 +316,15 @@ def test_the_error_budget_is_in_the_report(parsed, calibration):
 
 def test_every_term_of_the_error_budget_is_listed(parsed, calibration):
     budget = gmwm.error_budget(calibration)
-    shown = [tuple(row[:3]) for row in parsed.cells if len(row) == 8 and row[0] in calibration]
-    assert shown == [(r.channel, r.component, r.quantity) for r in budget.rows if any(r.values)]
+    shown = [
+        tuple(row[:3]) for row in parsed.cells if len(row) == 8 and row[0].split()[0] in calibration
+    ]
+    marks = {name: "" if fit.valid else " not valid" for name, fit in calibration.items()}
+    assert shown == [
+        (r.channel + marks[r.channel], r.component, r.quantity)
+        for r in budget.rows
+        if any(r.values)
+    ]
 
 
 def test_the_notes_of_the_error_budget(parsed, calibration):
@@ -274,6 +332,11 @@ def test_the_notes_of_the_error_budget(parsed, calibration):
     assert notes, "the fixture must have some"
     for note in notes:
         assert f"{note[0].upper()}{note[1:]}." in parsed.text
+
+
+def test_what_is_not_valid_is_said_before_the_headline(parsed):
+    warned = parsed.text.index("The model is not valid, read its notices first: accel_x.")
+    assert warned < parsed.text.index("A minute without aiding")
 
 
 def test_the_headline_of_a_minute(parsed, calibration):
@@ -491,6 +554,28 @@ def test_a_residual_beyond_the_axis_is_a_triangle_at_its_edge(calibration):
     (points,) = residual_figure(replace(fit, wv=wv))["data"]
     assert points["marker"]["symbol"][-1] == "triangle-up"
     assert points["marker"]["symbol"][0] == "circle"
+    assert points["text"][0] == ""
+    assert points["text"][-1] == f"{points['customdata'][-1][0]:+.0f} %"
+
+
+def test_the_axis_of_residuals_reaches_what_is_missed(calibration):
+    fit = calibration["gyro_x"]
+    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), 0.09])
+    figure = residual_figure(replace(fit, wv=wv))
+    misfit = figure["data"][0]["customdata"][-1][0]
+    assert misfit < -60.0
+    assert figure["layout"]["yaxis"]["range"][0] < misfit
+    assert set(figure["data"][0]["marker"]["symbol"]) == {"circle"}
+
+
+def test_lines_are_seen_on_white():
+    def light(colour):
+        parts = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+        parts = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+        return parts @ [0.2126, 0.7152, 0.0722]
+
+    for colour in COMPONENT_COLOURS:
+        assert 1.05 / (light(colour) + 0.05) >= 3.0, colour
 
 
 # -- health and length ----------------------------------------------------------------------------
@@ -501,6 +586,22 @@ LENGTH = Notice("length", "good", "", "an hour")  # which every examined recordi
 
 def issue(severity, text, where="gyro_x", **more):
     return Notice("drift", severity, where, text, action=f"done about {text}", **more)
+
+
+def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
+    values = {"evidence": 1e5, "time_lower": 283.6, "time_upper": 303.2}
+    mend = "calibrate the part before it or after it, or take it off (remove_departures=True)"
+    step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, mend)
+    fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}
+    crosstalk = issue("warning", "correlated noise", "")
+    spoilt = in_options(replace(calibration, fits=fits, notices=(LENGTH, crosstalk)))
+    first, second = health(spoilt)["rows"]
+    assert (first["severity"], first["where"]) == ("bad", "accel_x")
+    assert first["text"] == "A step of +2.7 mg at 293 s"
+    assert first["action"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
+    assert second["severity"] == "warning"
+    reasons = {row["name"]: row["reason"] for row in answer(spoilt, certified(spoilt))["rows"]}
+    assert reasons["accel_x"] == "health"
 
 
 def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
@@ -604,7 +705,7 @@ def test_names_are_text_not_markup(calibration):
         assert f"{words} {HOSTILE}" in shown.text
     headings = [attributes.get("id") for tag, attributes in shown.elements if tag == "h2"]
     assert headings == [None, "health", "navigation", HOSTILE]
-    assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == HOSTILE
+    assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == f"{HOSTILE} not valid"
 
 
 def test_provenance_is_printable_text(calibration):

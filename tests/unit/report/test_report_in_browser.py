@@ -29,7 +29,12 @@ def shown(calibration, recording):
 def path(shown, recording, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "sheet.yaml").write_text("gyro: {N: 1.2 deg/sqrt(h), B: 40 deg/h}\n")
-    return write_report(shown, folder / "report.html", recording, datasheet=folder / "sheet.yaml")
+    origin = {
+        "command": f"gmwm calibrate {'folder/' * 12}bench.csv",
+        "sha256": 8 * "0123456789abcdef",
+    }
+    return write_report(shown, folder / "report.html", recording, datasheet=folder / "sheet.yaml",
+                        provenance=origin)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -249,6 +254,34 @@ def test_a_narrow_screen_from_the_start(tab, path):
         assert max(plots) <= 420
     finally:
         tab.size(1300)
+
+
+def test_words_of_figures_are_whole_on_paper(tab):
+    cut = """Array.from(document.querySelectorAll('.plot')).filter(function (p) {
+      var box = p.querySelector('svg.main-svg').getBoundingClientRect();
+      return Array.from(p.querySelectorAll('svg text')).some(function (t) {
+        var r = t.getBoundingClientRect();
+        return t.textContent && (r.top < box.top - 1 || r.bottom > box.bottom + 1 ||
+          r.left < box.left - 1 || r.right > box.right + 1); });
+    }).map(function (p) { return p.id; })"""
+    try:
+        tab.run("dispatchEvent(new Event('beforeprint'))")
+        assert tab.run(cut) == []
+        closed = "Array.from(document.querySelectorAll('details.printed:not([open])')).length"
+        assert tab.run(closed) == 0
+    finally:
+        tab.run("dispatchEvent(new Event('afterprint'))")
+
+
+def test_dashed_lines_have_dashed_marks(tab):
+    kinds = tab.run(
+        "Array.from(document.querySelectorAll('[data-legend=plot-1] .swatch')).map("
+        "function (s) { return [s.nextSibling.textContent, s.className]; })"
+    )
+    marks = dict(kinds)
+    assert "dashed" in marks["white noise"]
+    assert marks["model"].strip() == "swatch"
+    assert "dotted" in marks["filter: N and K"]
 
 
 def test_paper(tab):

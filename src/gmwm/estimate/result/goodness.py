@@ -102,6 +102,12 @@ class Goodness:
         return float(self.misfit[worst]), float(self.tau[worst])
 
     @property
+    def known_to(self) -> float:
+        """The longest averaging time (s) of those levels; NaN if there is none."""
+        known = np.flatnonzero(self.dof > tuning.WELL_KNOWN_DOF)
+        return float(self.tau[known[-1]]) if known.size else float("nan")
+
+    @property
     def beyond_chance(self) -> tuple[float, float, float] | None:
         """Largest misfit that is no chance, its averaging time (s) and residual; None if none is.
 

@@ -332,8 +332,9 @@ def test_a_gap_of_half_the_record_ends_the_curve_and_is_reported():
     assert not gmwm.wavelet_variance(with_gaps(x, [(2500, 2600)]), dt=1.0).notices
 
 
-def test_steps_pass_through_short_gaps():
-    x = WhiteNoise(1.0).simulate(20_000, 1.0, 1) + 30.0 * (np.arange(20_000) > 9_000)
+def test_recorded_steps_pass_through_short_gaps():
+    """Those within a gap do not: see test_levels_apart.py."""
+    x = WhiteNoise(1.0).simulate(20_000, 1.0, 1) + 30.0 * (np.arange(20_000) > 9_100)
     gappy = with_gaps(x, [(8_995, 9_005), (400, 401)])
     whole, found = (gmwm.wavelet_variance(series, dt=1.0) for series in (x, gappy))
     np.testing.assert_allclose(found.variance[7:], whole.variance[7:], rtol=0.02)
