@@ -190,7 +190,6 @@ def _part(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
-    arrays = {column.index: arrays[column.index] for column in auxiliary}
     at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
     recording = replace(
         recording,
