@@ -46,7 +46,7 @@
     if (printing) {
       var node = document.getElementById(place);
       layout.width = node.parentNode.dataset.width === "half" ? 335 : 690;
-      layout.height = Math.round(layout.height * (layout.width === 335 ? 0.55 : 0.57));
+      layout.height = Math.round(0.5 * layout.height);
       layout.font.size = 10;
       // The title of the y axis is longer than the axis is high: it goes above.
       layout.margin = { l: 42, r: 8, t: 17, b: 34 };
