@@ -66,7 +66,8 @@ def wavelet_variance(
     Raises
     ------
     InputError
-        For data that is not one series of numbers, too short or constant, or an unknown wavelet.
+        For data that is not one series of numbers, too short or constant, also between gaps, or an
+        unknown wavelet.
 
     Notes
     -----
@@ -97,9 +98,15 @@ def wavelet_variance(
         factor = 1.0 / (1.0 + levels.change)
         found = covariance_of_data(levels.coefficients(), data_covariance)
         found = found * np.outer(factor, factor)
+    variance = levels.unfilled(moments)
+    if not np.any(variance > 0.0):
+        raise InputError(
+            f"{where_of(channel)} changes only where samples are missing: a dead channel has no "
+            "noise model"
+        )
     return WaveletVariance(
         tau=levels.averaging * channel.dt,
-        variance=levels.unfilled(moments),
+        variance=variance,
         mean=moments[:, 0],
         blocks=blocks,
         block=block,

@@ -135,3 +135,11 @@ def test_data_weights_need_the_covariance():
         gmwm.fit(WhiteNoise(), wv, omega="data")
     with pytest.raises(gmwm.InputError, match="known are model, data, diagonal, identity"):
         gmwm.fit(WhiteNoise(), wv, omega="best")
+
+
+def test_a_series_that_changes_within_its_gaps_only_has_no_noise():
+    x = np.repeat([1.0, -2.0, 0.5], 300)
+    x[295:305] = x[595:605] = np.nan
+
+    with pytest.raises(gmwm.InputError, match="changes only where samples are missing"):
+        gmwm.wavelet_variance(x, dt=0.01)
