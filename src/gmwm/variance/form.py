@@ -12,7 +12,6 @@ from gmwm._core.forms import (
     Form,
     Fraction,
     Interval,
-    NotNegative,
     Positive,
     Samples,
     Text,
@@ -24,6 +23,9 @@ from gmwm.variance import tuning
 _DYADIC = 1e-6  # relative; averaging times are exact but for rounding
 
 Levels = Annotated[Sequence[float], Field(min_length=1, max_length=64)]
+
+
+_Variance = Annotated[float, Field(ge=0.0, le=tuning.LARGEST_VARIANCE)]
 
 
 class GapsForm(Form):
@@ -45,7 +47,7 @@ class WaveletVarianceForm(Form):
     unit: Text
     confidence: Fraction
     tau: Levels
-    variance: Annotated[Sequence[NotNegative], Field(min_length=1, max_length=64)]
+    variance: Annotated[Sequence[_Variance], Field(min_length=1, max_length=64)]
     mean: Levels
     block: Samples
     blocks: Annotated[Sequence[float | None], Field(min_length=1, max_length=tuning.MOST_BLOCKS)]

@@ -161,3 +161,6 @@ LEAST_OF_BLOCK = 0.5
 
 SAMPLES_PER_THREAD = 1 << 20
 """Fewer take less time than threads need to begin."""
+
+LARGEST_VARIANCE = 1e120
+"""In a saved result, u^2: a channel whose spread is beyond 1e60 is not analysed."""

@@ -211,5 +211,7 @@ def detrended_covariance(
     common = np.outer(response, response) * slope.variance
     taken = 4.0 * common * means - 2.0 * common**2
     # c is a mean over the record; at the coarsest levels it can take more than there is.
-    excess = np.maximum(np.diag(taken) / np.diag(covariance) / tuning.LARGEST_TAKEN, 1.0)
+    there = np.diag(covariance)
+    share = np.divide(np.diag(taken), there, out=np.zeros_like(there), where=there > 0.0)
+    excess = np.maximum(share / tuning.LARGEST_TAKEN, 1.0)
     return np.asarray(covariance - taken / np.sqrt(np.outer(excess, excess)))

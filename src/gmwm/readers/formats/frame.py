@@ -200,7 +200,9 @@ def open_feather(path: Path) -> FrameTable:
 
     with damage_named(path.name):
         table = feather.read_table(path, memory_map=True)
-    return _table(path.name, table.schema, table.num_rows, table.column, partial(_slices, table))
+        return _table(
+            path.name, table.schema, table.num_rows, table.column, partial(_slices, table)
+        )
 
 
 def _table(

@@ -129,7 +129,9 @@ def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     _, square, whole = sums.of(block_spectrum(psd, dt, sums.grid))
     ratio = np.ones_like(square)
     above = np.triu_indices_from(ratio)
-    ratio[above] = ratio.T[above] = square[above] / whole[above]
+    own, of_all = square[above], whole[above]
+    own = np.divide(own, of_all, out=np.ones_like(own), where=of_all > 0.0)  # 1 without any noise
+    ratio[above] = ratio.T[above] = own
     return ratio
 
 
