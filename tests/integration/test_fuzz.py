@@ -30,6 +30,7 @@ FOUND = [
     ("sqlite3", 1, 56),  # messages that the index counts and are not there
     ("odd", 2, 2),  # a term that the others explain
     ("feather", 1, 268),  # a name that is no text
+    ("fleet", 1, 50),  # a list in place of a mapping
     ("odd", 1, 12),  # a ramp without any noise
     ("document", 1, 3381),  # a variance of 1e308
     ("odd", 0, 136),  # half of the record without any error of prediction

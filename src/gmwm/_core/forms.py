@@ -34,6 +34,8 @@ class Form(BaseModel):
         InputError
             With the place of the first thing that cannot be used.
         """
+        if not isinstance(content, Mapping):
+            raise InputError(f"{checks.shown(content)} has no keys")
         try:
             return cls.model_validate(dict(content)).model_dump()
         except ValidationError as error:
