@@ -2,7 +2,7 @@
 
 from gmwm.calibration.calibration import Calibration, load
 from gmwm.calibration.channel import AMBIGUITY
-from gmwm.calibration.departures import Departure, departures
+from gmwm.calibration.departures import KINDS as DEPARTURES, Departure, departures
 from gmwm.calibration.entrance import calibrate
 from gmwm.calibration.removal import without_departures
 from gmwm.calibration.screening import SCREENING
@@ -19,6 +19,7 @@ from gmwm.calibration.summary import (
 
 __all__ = [
     "AMBIGUITY",
+    "DEPARTURES",
     "SCREENING",
     "Calibration",
     "Departure",

@@ -10,13 +10,11 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import WIDE, Departure
+from gmwm.calibration.departures import KINDS, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.readers import Channel, Recording
 from gmwm.variance import WaveletVariance, wavelet_variance
-
-_KINDS = ("step", "transient", "drift-at-start", "slow-period")
 
 
 def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recording:
@@ -110,7 +108,7 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def _is_evident(notice: Notice) -> bool:
-    return notice.code in _KINDS and notice.values["evidence"] >= tuning.EVIDENT
+    return notice.code in KINDS and notice.values["evidence"] >= tuning.EVIDENT
 
 
 def _departure(notice: Notice) -> Departure:

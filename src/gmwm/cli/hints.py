@@ -35,8 +35,6 @@ HINTS = {
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
 }
 
-_DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
-
 
 def with_hint(error: InputError) -> str:
     """The message of an error, its mend in the words of the command line."""
@@ -64,7 +62,7 @@ def with_option(notice: Notice) -> Notice:
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
-    if notice.code not in _DEPARTURES or notice.severity == "note" or "evidence" not in values:
+    if notice.severity == "note" or "evidence" not in values:
         return notice
     first, last = values["time_lower"], values["time_upper"]
     cut = {

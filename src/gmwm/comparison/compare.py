@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
-from gmwm.calibration import Calibration, calibrate
+from gmwm.calibration import DEPARTURES, Calibration, calibrate
 from gmwm.comparison import tuning
 from gmwm.comparison.clock import suspected_clocks
 from gmwm.comparison.curves import Equality
@@ -31,7 +31,7 @@ from gmwm.readers import Recording, is_frame
 
 _NOT_NOISE = (
     "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
-    "variance", "step", "transient", "drift-at-start", "slow-period",
+    "variance", *DEPARTURES,
 )  # fmt: skip
 """Codes of notices of a fit whose curve is not that of noise."""
 

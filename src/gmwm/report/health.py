@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from gmwm._core.notices import Notice, worst_first
-from gmwm.calibration import AMBIGUITY, Calibration
+from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration
 
 _COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
-_DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
 
@@ -45,7 +44,7 @@ def health(calibration: Calibration) -> dict[str, Any]:
 
 def is_departure(notice: Notice) -> bool:
     """Whether it is a change of the bias that makes a fit not valid."""
-    return notice.severity == "bad" and notice.code in _DEPARTURES
+    return notice.severity == "bad" and notice.code in DEPARTURES
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:
