@@ -1,5 +1,7 @@
 """Steps, transients and slow periods: found, with their sizes, and not in noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -178,6 +180,19 @@ def test_a_calibration_takes_it_off_on_request_and_reports_that():
     assert fit.valid, fit.message
     low, high = fit.interval(0.99)["K"]
     assert low < 2e-6 < high
+
+
+def test_what_stays_is_not_to_be_taken_off_again():
+    rec = recording(noise(10) + SAMPLE * STEP)
+    (there,) = departures(gmwm.calibrate(rec, WhiteNoise() + RandomWalk())["gyro_x"])
+    before, after = (departure_notice(there, "rad/s", stays=stays) for stays in (False, True))
+    assert "remove" in before.action and before.values["removable"]
+    assert not after.values["removable"]
+    for notice in (after, with_option(after)):
+        assert "remove" not in notice.action and notice.action.startswith("calibrate the part")
+    assert "or --start" in with_option(after).action
+    unsure = departure_notice(replace(there, evidence=EVIDENT / 2.0), "rad/s")
+    assert with_option(unsure).action == unsure.action == "a longer record does"
 
 
 def test_the_noise_that_an_estimated_step_takes_is_given_back():

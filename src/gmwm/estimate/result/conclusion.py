@@ -181,7 +181,7 @@ def conclude(
         error_growth=growth,
     )
     shown = missed_level_notices(fit.goodness)
-    if misfits:
+    if misfits or fit.goodness.is_poor:
         shown += misfit_notices(fit.goodness, discrepancy)
     return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
 
