@@ -175,7 +175,7 @@ def _fit(axis: Axis) -> Fit:
 
 
 def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
-    """Standard deviation of the walk at the start, or of a constant where there is no walk."""
+    """Standard deviation of the bias at the start: the walk, or a constant where there is none."""
     variance = max(axis.bias_sd for axis in group) ** 2 + target.constant_sd**2
     stationary = [term for term in model.terms if not term.is_walk]
     if len(stationary) < len(model.terms):

@@ -64,7 +64,7 @@ SAFETY = 1.0 + 1e-9
 """Times every variance of a bound: arithmetic of the linear program."""
 
 INITIAL_SHARE = 2.0
-"""Times the variance of the slow terms, for that of the walk at the start. For one Gauss-Markov
+"""Times the variance of the slow terms, for that of the bias at the start. For one Gauss-Markov
 process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a half-line takes:
 (1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
 (NEES 1.07); see docs/filter-numbers.md."""
