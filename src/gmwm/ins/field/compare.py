@@ -76,9 +76,9 @@ class Paired:
     ratio, lower, upper : float
         Ratio of the root mean squares and its interval.
     p_value : float
-        Of equal errors.
+        Of errors that differ by no more than `gmwm.ins.tuning.TIE_RATIO`.
     score, score_p_value : float
-        Mean difference of the scores, and the p-value of none.
+        Mean difference, and the p-value of no more than `gmwm.ins.tuning.TIE_SCORE`.
     error : float
         Standard error of the logarithm of the ratio.
     """
@@ -158,13 +158,10 @@ class Comparison:
 
         def beats(a: str, b: str) -> str:
             pair = self.pairs[a, b]
-            size = abs(np.log(pair.ratio))
-            if pair.p_value < tuning.ACCURACY_LEVEL / share and size > tuning.TIE_RATIO:
+            if pair.p_value < tuning.ACCURACY_LEVEL / share:
                 return "better" if pair.ratio < 1.0 else ""
-            honest = pair.score < -tuning.TIE_SCORE
-            if honest and pair.score_p_value < tuning.SCORE_LEVEL / share:
-                return "more-honest"
-            return ""
+            honest = pair.score_p_value < tuning.SCORE_LEVEL / share
+            return "more-honest" if honest and pair.score < 0.0 else ""
 
         unbeaten = [a for a in names if not any(beats(b, a) for b in names if b != a)]
         values: dict[str, Any] = {"models": ", ".join(unbeaten), "resolved": self.resolved,
@@ -193,17 +190,18 @@ class Comparison:
     @property
     def resolved(self) -> float:
         """Ratio of errors that is found with a probability of 95 %; the best of all pairs."""
-        return float(np.exp(-self._factor * max(pair.error for pair in self.pairs.values())))
+        return float(np.exp(-tuning.TIE_RATIO - self._beyond))
 
     @property
     def length_needed(self) -> float:
         """Length of such a log in which a ratio of 0.9 is found with 95 %, s."""
-        error = max(pair.error for pair in self.pairs.values())
-        return self.duration * float((self._factor * error / np.log(tuning.WORTH)) ** 2)
+        return self.duration * (self._beyond / (-np.log(tuning.WORTH) - tuning.TIE_RATIO)) ** 2
 
     @property
-    def _factor(self) -> float:
-        return float(norm.isf(0.5 * tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
+    def _beyond(self) -> float:
+        """How much more than what matters the logarithm of a ratio must be to be found."""
+        error = max(pair.error for pair in self.pairs.values())
+        return error * float(norm.isf(tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types."""
@@ -332,7 +330,7 @@ def compare(
     }
     scale = np.mean([_true_squares(each) for each in outcomes.values()], axis=(0, 1))
     pairs = {
-        (a, b): _paired(outcomes[a], outcomes[b], scale)
+        (a, b): paired(outcomes[a], outcomes[b], scale)
         for a in outcomes for b in outcomes if a != b
     }  # fmt: skip
     return Comparison(measured.title, every, outcomes, pairs, duration, measured.notices)
@@ -422,7 +420,7 @@ def _true_squares(outcome: Outcome) -> FloatArray:
     return np.asarray(outcome.error**2 + outcome.reference_variance)
 
 
-def _paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
+def paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
     """Ratio of the errors, each component in units of its usual size, by the delta method."""
     a = np.sum(_true_squares(first) / scale, axis=1)
     b = np.sum(_true_squares(second) / scale, axis=1)
@@ -438,14 +436,15 @@ def _paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
         ratio=float(np.exp(log)),
         lower=float(np.exp(log - width)),
         upper=float(np.exp(log + width)),
-        p_value=_two_sided(log, error, count),
+        p_value=_p_value(tuning.TIE_RATIO, log, error, count),
         score=mean,
-        score_p_value=_two_sided(mean, score_error, count),
+        score_p_value=_p_value(tuning.TIE_SCORE, mean, score_error, count),
         error=error,
     )
 
 
-def _two_sided(value: float, error: float, count: int) -> float:
+def _p_value(within: float, value: float, error: float, count: int) -> float:
+    """Of a mean that is ``within`` from zero (Hodges & Lehmann 1954, *J. R. Stat. Soc. B* 16)."""
     if error == 0.0:
-        return 1.0 if value == 0.0 else 0.0
-    return float(2.0 * t.sf(abs(value) / error, count - 1))
+        return float(abs(value) <= within)
+    return float(np.sum(t.sf((abs(value) + np.array([-within, within])) / error, count - 1)))
