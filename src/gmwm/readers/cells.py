@@ -114,7 +114,8 @@ def seconds_of(found: re.Match[str]) -> float:
         If there is no such day, minute, second or zone.
     """
     *parts, second = (part for part in found.groups()[:12] if part is not None)
-    start = datetime(*map(int, parts), tzinfo=UTC)  # type: ignore[arg-type, misc]
+    year, month, day, hour, minute = map(int, parts)
+    start = datetime(year, month, day, hour, minute, tzinfo=UTC)
     zone = found[13]
     if zone and zone not in "Zz":
         away = timedelta(hours=int(zone[1:3]), minutes=int(zone[3:].lstrip(":") or 0))

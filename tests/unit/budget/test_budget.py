@@ -2,7 +2,7 @@
 
 import json
 import re
-import sys
+from functools import partial
 
 import matplotlib
 
@@ -22,7 +22,6 @@ from gmwm import (
     RandomWalk,
     RateRamp,
     WhiteNoise,
-    cli,
     error_budget,
 )
 from gmwm.budget.budget import short
@@ -341,17 +340,8 @@ def test_bad_input(what):
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", "budget", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        return code, *capsys.readouterr()
-
-    return _run
+def run(run):
+    return partial(run, "budget")
 
 
 def test_the_command_prints_the_table(run, calibration, tmp_path):

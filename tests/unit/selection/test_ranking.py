@@ -28,8 +28,3 @@ def test_each_parameter_costs_three_times_the_logarithm_of_the_logarithm(n):
         if not any(isinstance(term, RateRamp) for term in item.model.terms):
             price = (item.criterion - item.chi_square) / item.n_parameters
             assert price == pytest.approx(3.0 * np.log(np.log(n)))
-
-
-def test_the_information_criterion_adds_two_for_each_parameter():
-    # Expected optimism of a least-squares fit: twice the number of parameters.
-    assert candidate(PLAIN, 20.0).wic == pytest.approx(24.0)
