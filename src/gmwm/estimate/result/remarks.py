@@ -43,6 +43,7 @@ REASONS = {
     "transient": "stationary",
     "drift-at-start": "stationary",
     "slow-period": "stationary",
+    "departures-many": "stationary",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
