@@ -39,9 +39,22 @@ def with_departures(
         for notice in (
             *(departure_notice(each, unit, stays=removing) for each in there),
             *(_removed_notice(each, unit) for each in gone),
+            *_many_notices(gone),
         )
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+
+
+def _many_notices(removed: Sequence[Departure]) -> list[Notice]:
+    """That too much was taken off to be accidents."""
+    if len(removed) <= tuning.MOST_REMOVED:
+        return []
+    text = (
+        f"{len(removed)} departures were taken off: a level that changes so often is noise of the "
+        "sensor, which the model lacks now"
+    )
+    action = "fit a slow term in place of it, such as a Gauss-Markov process"
+    return [Notice("departures-many", "bad", "", text, {"removed": len(removed)}, action)]
 
 
 def _removed_notice(found: Departure, unit: str) -> Notice:

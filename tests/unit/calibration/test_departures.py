@@ -278,3 +278,16 @@ def test_a_pulse_is_two_steps_of_one_size_and_both_are_removed():
     assert sorted(each["size"] for each in gone) == pytest.approx([-3e-4, 3e-4], abs=3e-5)
     assert fit.valid
     assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)
+
+
+def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
+    n, dt = 54_000, 0.1
+    level = np.cumsum(np.random.default_rng(2).random(n) < 1.0 / 9000.0) % 2
+    x = WhiteNoise(1e-4).simulate(n, dt, 2) + 1e-4 * level
+    rec = recording(x, 1.0 / dt)
+    fit = gmwm.calibrate(rec, WhiteNoise(), screening=(), remove_departures=True)["gyro_x"]
+    (notice,) = [one for one in fit.notices if one.code == "departures-many"]
+    assert notice.values["removed"] == len([n for n in fit.notices if n.values.get("evident")])
+    assert [name for name, holds in fit.reasons.items() if not holds] == ["stationary"]
+    # A slow term describes it, and nothing needs to be taken off.
+    assert gmwm.calibrate(rec, WhiteNoise() + RandomWalk(), screening=())["gyro_x"].valid

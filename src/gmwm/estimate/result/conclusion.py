@@ -182,7 +182,7 @@ def conclude(
     )
     shown = missed_level_notices(fit.goodness)
     if misfits or fit.goodness.is_poor:
-        shown += misfit_notices(fit.goodness, discrepancy)
+        shown += misfit_notices(fit.goodness, discrepancy, failed=misfits)
     return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
 
 
