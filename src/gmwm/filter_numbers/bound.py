@@ -237,7 +237,7 @@ def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
     if axis.bias_sd == 0.0:
         text = (
             "the bias at the start leaves out that of switching on, which no recording at rest "
-            "shows: add the square of its standard deviation to that of initial_sd"
+            "shows: add its variance"
         )
         found.append(Notice("turn-on-left-out", "note", "", text))
     if level is None:
