@@ -73,6 +73,9 @@ OPTIMISTIC = 1.05
 """NEES per degree of freedom, above which a bound is called too optimistic for what it leaves out
 (ramps, slow lines, quantization without white noise above it)."""
 
+SUSPECT = (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Horizons without aiding at which that is looked for: a slow line returns to where it was."""
+
 LOOSE = 1.2
 """Predicted over true standard deviation at the horizon, above which a bound is called loose."""
 
