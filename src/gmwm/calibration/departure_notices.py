@@ -97,4 +97,5 @@ def departure_notice(found: Departure, unit: str) -> Notice:
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
+    values["evident"] = found.is_evident
     return Notice(found.kind, severity, "", text, values, action)

@@ -62,7 +62,7 @@ def with_option(notice: Notice) -> Notice:
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
-    if notice.severity == "note" or "evidence" not in values:
+    if values.get("removed") or not values.get("evident"):
         return notice
     first, last = values["time_lower"], values["time_upper"]
     cut = {
