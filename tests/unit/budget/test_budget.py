@@ -212,7 +212,7 @@ def test_models_that_are_not_valid_are_named():
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
     assert not fit.valid
     notes = error_budget(fit, (1.0,)).notes
-    assert "the model is not valid, read its notices first: gyro_x" in notes
+    assert "the model of gyro_x is not valid: read the notices first" in notes
 
 
 # -- looks ----------------------------------------------------------------------------------------
