@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm
 
 from gmwm._core import checks
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.replay import Replay

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
 
+from gmwm._core.distributions import student
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.montecarlo import InnovationTest, Ratio
@@ -91,7 +91,7 @@ def paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
     part = 0.5 * (a / np.mean(a) - b / np.mean(b))
     count = part.size
     error = float(np.std(part, ddof=1) / np.sqrt(count))
-    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
+    width = float(student.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
     difference = first.score - second.score
     score_error = float(np.std(difference, ddof=1) / np.sqrt(count))
     mean = float(np.mean(difference))
@@ -110,4 +110,4 @@ def _p_value(within: float, value: float, error: float, count: int) -> float:
     """Of a mean that is ``within`` from zero (Hodges & Lehmann 1954, *J. R. Stat. Soc. B* 16)."""
     if error == 0.0:
         return float(abs(value) <= within)
-    return float(np.sum(t.sf((abs(value) + np.array([-within, within])) / error, count - 1)))
+    return float(np.sum(student.sf((abs(value) + np.array([-within, within])) / error, count - 1)))
