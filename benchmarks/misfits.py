@@ -2,8 +2,8 @@
 
     python benchmarks/misfits.py [--samples 200000] [--runs 100]
 
-The true kinds of terms are fitted to series at 100 Hz. "poor": a level is missed by more than 10 % of
-the deviation and 2.5 standard errors; "not valid": fits that the notice "misfit" makes so.
+The true kinds of terms are fitted to series at 100 Hz. "poor": a level is missed by more than 10 %
+of the deviation and 2.5 standard errors; "not valid": fits that the notice "misfit" makes so.
 """
 
 from __future__ import annotations

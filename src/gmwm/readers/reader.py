@@ -196,8 +196,8 @@ def _part(
     further = [_auxiliary(column, arrays[column.index], 1.0 / used_rate) for column in auxiliary]
     series = {name: arrays[index] for name, index in roles.channels.items()}
     arrays.clear()
-    recording = Recording.taking(
-        series,
+    recording = Recording.from_arrays(
+        ((name, series.pop(name)) for name in list(series)),
         rate=used_rate,
         units=unit_of,
         source=table.source,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
