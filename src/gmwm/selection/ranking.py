@@ -8,9 +8,9 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.moments import Design, Point, Profile, Reference, dictionary_fit, search
@@ -150,15 +150,6 @@ class Candidate:
     def from_dict(cls, content: Mapping[str, Any]) -> Candidate:
         """Inverse of `to_dict`."""
         return cls(**{**content, "model": model_from_list(content["model"])})
-
-    @property
-    def wic(self) -> float:
-        """Wavelet information criterion, chi-square + 2 tr{cov(nu_hat, nu) Omega}.
-
-        Under the inverse covariance as weights, the trace is the number of parameters. It is an
-        estimate of the error of prediction, and chooses more terms than ``criterion``.
-        """
-        return self.chi_square + 2.0 * self.n_parameters
 
     @property
     def p_value(self) -> float:

@@ -8,88 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm, t
 
 from gmwm._core import checks
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured, MeasuredSpec
+from gmwm.ins.field.outcome import PARTS, Outcome, Paired, by_part, paired, true_squares
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import Smoothed, smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
-from gmwm.ins.montecarlo import InnovationTest, Ratio, mean_ratio
+from gmwm.ins.montecarlo import mean_ratio
 from gmwm.ins.spec import read_models
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_PARTS = {"horizontal": (0, 1), "vertical": (2,)}
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """How the filter with one sensor model came through the outages.
-
-    Attributes
-    ----------
-    error : (K, 3) ndarray
-        Estimate at the end of each outage less the smoothed position: north, east, down, m.
-    variance : (K, 3, 3) ndarray
-        Of these, as predicted, m^2: by as much as the covariance of the smoothed position less
-        than that of the filter, since what both have in common cancels.
-    reference_variance : (3,) ndarray
-        Mean of the variances of the smoothed positions, m^2.
-    rms : dict
-        Root mean square of the true errors by part, m: the uncertainty of the reference included.
-    predicted : dict
-        The same as the filter predicted.
-    nees : Ratio
-        Per degree of freedom.
-    score : (K,) ndarray
-        Negative logarithm of the predicted density at the reference; less is better.
-    nis : InnovationTest
-        Of the whole log.
-    """
-
-    error: FloatArray
-    variance: FloatArray
-    reference_variance: FloatArray
-    rms: dict[str, float]
-    predicted: dict[str, float]
-    nees: Ratio
-    score: FloatArray
-    nis: InnovationTest
-
-
-@dataclass(frozen=True)
-class Paired:
-    """Errors of one model over those of another, outage by outage.
-
-    Attributes
-    ----------
-    ratio, lower, upper : float
-        Ratio of the root mean squares and its interval.
-    p_value : float
-        Of errors that differ by no more than `gmwm.ins.tuning.TIE_RATIO`.
-    score, score_p_value : float
-        Mean difference, and the p-value of no more than `gmwm.ins.tuning.TIE_SCORE`.
-    error : float
-        Standard error of the logarithm of the ratio.
-    """
-
-    ratio: float
-    lower: float
-    upper: float
-    p_value: float
-    score: float
-    score_p_value: float
-    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +175,7 @@ class Comparison:
                 name: (np.linalg.norm(each.error[:, axes], axis=1), each.predicted[part])
                 for name, each in self.outcomes.items()
             }
-            for part, axes in _PARTS.items()
+            for part, axes in PARTS.items()
         }
         pairs = {f"{name} / {first}": self.pairs[name, first] for name in others}
         ratios = {what: (pair.ratio, pair.lower, pair.upper) for what, pair in pairs.items()}
@@ -259,7 +198,7 @@ class Comparison:
         ]  # fmt: skip
         for name, each in self.outcomes.items():
             parts = "  ".join(
-                f"{each.rms[part]:>8.4g} ({each.predicted[part]:>7.4g})" for part in _PARTS
+                f"{each.rms[part]:>8.4g} ({each.predicted[part]:>7.4g})" for part in PARTS
             )
             mark = " " if each.nees.within else "*"
             nis = each.nis.nis.value
@@ -328,7 +267,7 @@ def compare(
         name: _outcome(name, replay, smoothed[name], lla, passes, every)
         for name, replay in replays.items()
     }
-    scale = np.mean([_true_squares(each) for each in outcomes.values()], axis=(0, 1))
+    scale = np.mean([true_squares(each) for each in outcomes.values()], axis=(0, 1))
     pairs = {
         (a, b): paired(outcomes[a], outcomes[b], scale)
         for a in outcomes for b in outcomes if a != b
@@ -393,58 +332,21 @@ def _outcome(
     covariance = np.array([found[each.end][1] for each in every])
     error = ned_difference(estimate, lla)
     variance = covariance - smoothed.covariance
+    predicted = np.einsum("kii->ki", covariance)
     # Rounding, and a filter that is no better with all fixes than without, must not make it zero.
-    floor = tuning.LEAST_SHARE * np.einsum("kii->ki", covariance)
+    floor = tuning.LEAST_SHARE * predicted
     variance = variance + np.einsum(
         "ki,ij->kij", np.maximum(floor - np.einsum("kii->ki", variance), 0.0), np.eye(3)
     )
     squares = np.einsum("ki,ki->k", error, np.linalg.solve(variance, error[..., None])[..., 0])
     reference = np.mean(np.einsum("kii->ki", smoothed.covariance), axis=0)
-    total = error**2 + reference
-    predicted = np.einsum("kii->ki", covariance)
     return Outcome(
         error=error,
         variance=variance,
         reference_variance=reference,
-        rms={p: float(np.sqrt(np.mean(np.sum(total[:, i], axis=1)))) for p, i in _PARTS.items()},
-        predicted={
-            p: float(np.sqrt(np.mean(np.sum(predicted[:, i], axis=1)))) for p, i in _PARTS.items()
-        },
+        rms=by_part(error**2 + reference),
+        predicted=by_part(predicted),
         nees=mean_ratio(squares / 3.0),
         score=0.5 * (squares + np.linalg.slogdet(variance)[1]),
         nis=replay.test(),
     )
-
-
-def _true_squares(outcome: Outcome) -> FloatArray:
-    return np.asarray(outcome.error**2 + outcome.reference_variance)
-
-
-def paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
-    """Ratio of the errors, each component in units of its usual size, by the delta method."""
-    a = np.sum(_true_squares(first) / scale, axis=1)
-    b = np.sum(_true_squares(second) / scale, axis=1)
-    log = 0.5 * float(np.log(np.mean(a) / np.mean(b)))
-    part = 0.5 * (a / np.mean(a) - b / np.mean(b))
-    count = part.size
-    error = float(np.std(part, ddof=1) / np.sqrt(count))
-    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
-    difference = first.score - second.score
-    score_error = float(np.std(difference, ddof=1) / np.sqrt(count))
-    mean = float(np.mean(difference))
-    return Paired(
-        ratio=float(np.exp(log)),
-        lower=float(np.exp(log - width)),
-        upper=float(np.exp(log + width)),
-        p_value=_p_value(tuning.TIE_RATIO, log, error, count),
-        score=mean,
-        score_p_value=_p_value(tuning.TIE_SCORE, mean, score_error, count),
-        error=error,
-    )
-
-
-def _p_value(within: float, value: float, error: float, count: int) -> float:
-    """Of a mean that is ``within`` from zero (Hodges & Lehmann 1954, *J. R. Stat. Soc. B* 16)."""
-    if error == 0.0:
-        return float(abs(value) <= within)
-    return float(np.sum(t.sf((abs(value) + np.array([-within, within])) / error, count - 1)))

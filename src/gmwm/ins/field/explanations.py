@@ -14,8 +14,8 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.replay import Replay

@@ -29,10 +29,8 @@ def outliers(base: Replay) -> Candidate | None:
     if gated.kind.size and not gated.used[np.argmax(gated.kind == KINDS["position"])]:
         start = base.anywhere()
         found.append(_left_out(base, start, _gated(start)))
-    seen = sorted((each for each in found if each), key=lambda each: each.excess)
-    if not seen:
-        return None
-    return Candidate(frozenset({"outliers"}), seen[-1].gain, lambda: (seen[-1],))
+    best = max((each for each in found if each), key=lambda each: each.excess, default=None)
+    return Candidate(frozenset({"outliers"}), best.gain, lambda: (best,)) if best else None
 
 
 def _gated(start: Replay) -> FilterInnovations:

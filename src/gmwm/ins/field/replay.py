@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured

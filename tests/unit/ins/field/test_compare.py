@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from gmwm.errors import InputError
 from gmwm.ins import compare, tuning
-from gmwm.ins.field.compare import paired
+from gmwm.ins.field.outcome import paired
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
