@@ -24,8 +24,8 @@ from scipy.linalg import cholesky, toeplitz
 from scipy.linalg.lapack import dpotri
 from scipy.sparse import csr_array
 from scipy.special import logsumexp
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.calibration import tuning
 from gmwm.calibration.shapes import Family, families

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
@@ -149,8 +150,8 @@ def calibrate(
         finished.append(name)
         return found
 
-    workers = Parallel(n_jobs=jobs, prefer="threads")
-    found = dict(zip(alive, workers(delayed(one)(name) for name in alive), strict=True))
+    with ThreadPoolExecutor(jobs if jobs > 0 else os.cpu_count()) as threads:
+        found = dict(zip(alive, (map if jobs == 1 else threads.map)(one, alive), strict=True))
     report("")
     source = ", ".join(each.source for each in given)
     issues = [

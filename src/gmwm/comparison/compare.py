@@ -9,9 +9,9 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
 from gmwm.calibration import DEPARTURES, Calibration, calibrate

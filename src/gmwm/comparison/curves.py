@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
+from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.comparison import tuning
 from gmwm.estimate import Fit

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import noise_density, random_walk

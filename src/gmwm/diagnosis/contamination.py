@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq, minimize
-from scipy.stats import binom, gennorm, norm, t as student
 
+from gmwm._core.distributions import binom, gennorm, norm, student
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import chi2, f as f_distribution, kurtosis, norm
 
+from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
@@ -65,7 +65,7 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
     change = slope * tuning.PARTS
     ratio = wander / white
     ramp = abs(change) > tuning.RAMP * wander
-    wanders = ratio**2 > f_distribution.isf(tuning.FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
+    wanders = ratio**2 > fisher.isf(tuning.FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
     if not (wanders or ramp):
         return None
     numbers = {"wander": wander, "white": white, "change": change}
@@ -210,7 +210,8 @@ def _unsteadiness(
     # What is far beyond the noise around it is clipped: a shock is no change of the noise.
     squares = np.minimum(size, tuning.CLIP * errors.scale[usable]) ** 2
     squares /= np.mean(squares)
-    kurt = float(kurtosis(bounded))
+    square = (bounded - np.mean(bounded)) ** 2
+    kurt = float(np.mean(square**2) / np.mean(square) ** 2) - 3.0
     by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
     if min(by_chance) <= 0.0:
         return None

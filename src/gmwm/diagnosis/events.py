@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray

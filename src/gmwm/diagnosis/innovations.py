@@ -12,7 +12,6 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from gmwm._core.typing import BoolArray, FloatArray, inner
 from gmwm.diagnosis import tuning
@@ -74,9 +73,9 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     clipped = np.where(known, np.clip(filled, *_limits(filled, known, floor)), 0.0)
     coefficients = _autoregression(clipped, int(np.count_nonzero(known)))
     order = coefficients.size - 1
-    forward = lfilter(coefficients, [1.0], filled)
+    forward = np.convolve(coefficients, filled)[: n - 1]
     # Differences of the reversed series have the other sign.
-    backward = lfilter(coefficients, [1.0], -filled[::-1])[::-1]
+    backward = np.convolve(coefficients, -filled[::-1])[: n - 1][::-1]
     has_past = _complete(known, order)
     has_future = _complete(known[::-1], order)[::-1]
     errors, present = np.zeros(n), np.zeros(n, dtype=bool)

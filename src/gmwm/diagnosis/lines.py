@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from gmwm._core.compiled import compiled
+from gmwm._core.distributions import fisher
 from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
@@ -162,7 +162,7 @@ def _limits(bins: int, freedom: FloatArray) -> tuple[FloatArray, dict[int, Float
     limits = {}
     for width in widths:
         eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
-        limits[width] = f_distribution.isf(chance, 2.0 * width / eigenvalue, grid)
+        limits[width] = fisher.isf(chance, 2.0 * width / eigenvalue, grid)
     return grid, limits
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import norm, t as t_distribution
 
+from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
@@ -94,6 +94,6 @@ def _correlation(
         return []
     r = float(np.corrcoef(warmer[known], step[known])[0, 1])
     size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-    if size <= t_distribution.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
+    if size <= student.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
         return []
     return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

@@ -8,8 +8,8 @@ from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 import numpy as np
+import scipy
 from scipy.linalg import solve_discrete_lyapunov
-from scipy.signal import lfilter, lfiltic
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -194,7 +194,7 @@ class ARIMA(Process):
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         if not self.ar:
             noise = np.sqrt(self.sigma2) * rng.standard_normal(n + len(self.ma))
-            series = lfilter([1.0, *self.ma], [1.0], noise)[len(self.ma) :]
+            series = np.convolve(noise, [1.0, *self.ma], "valid")
             for _ in range(self.d):
                 series = np.cumsum(series)
             return np.asarray(series)
@@ -315,7 +315,7 @@ def _unit_autocovariance(ar: tuple[float, ...], ma: tuple[float, ...], lags: int
     p, q = len(ar), len(ma)
     theta = np.array([1.0, *ma])
     phi = np.array([1.0, *(-c for c in ar)])
-    psi = lfilter(theta, phi, np.eye(q + 1)[0])
+    psi = scipy.signal.lfilter(theta, phi, np.eye(q + 1)[0])
     right = np.array([theta[k:] @ psi[: q + 1 - k] for k in range(q + 1)])
     size = max(p, q) + 1
     system, constant = np.zeros((size, size)), np.zeros(size)
@@ -329,8 +329,8 @@ def _unit_autocovariance(ar: tuple[float, ...], ma: tuple[float, ...], lags: int
     if p == 0:
         return np.pad(start, (0, lags - size))
     # Beyond lag max(p, q) the autocovariance obeys the autoregression alone.
-    state = lfiltic([1.0], phi, start[::-1][:p])
-    rest, _ = lfilter([1.0], phi, np.zeros(lags - size), zi=state)
+    state = scipy.signal.lfiltic([1.0], phi, start[::-1][:p])
+    rest, _ = scipy.signal.lfilter([1.0], phi, np.zeros(lags - size), zi=state)
     return np.concatenate([start, rest])
 
 

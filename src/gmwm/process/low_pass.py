@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from scipy import fft
-from scipy.signal import lfilter
 
 from gmwm._core.compiled import compiled
 from gmwm._core.frozen import frozen
@@ -183,7 +182,7 @@ class AveragedNoise(_Filtered):
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         weights = _weights(self.window / dt)
         noise = self.N / np.sqrt(dt) * rng.standard_normal(n + weights.size - 1)
-        return np.asarray(lfilter(weights, [1.0], noise)[weights.size - 1 :])
+        return np.convolve(noise, weights, "valid")
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         longest = int(min(0.5 / _LOWEST, max(n / 8, 2)))
@@ -259,6 +258,7 @@ def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
     return panel_weights(rounded, WIDER), panel_weights(rounded)
 
 
+@lru_cache(maxsize=8)
 def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
 

@@ -8,9 +8,9 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.moments import Design, Point, Profile, Reference, dictionary_fit, search

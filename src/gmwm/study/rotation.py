@@ -12,8 +12,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray

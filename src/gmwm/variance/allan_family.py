@@ -14,9 +14,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
@@ -93,7 +93,7 @@ class Deviations:
     upper: dict[str, FloatArray]
     n: int
     dt: float
-    confidence: float = 0.95
+    confidence: float
     name: str = ""
     quantity: str | None = None
     unit: str = "u"

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.text import Printed

@@ -598,7 +598,7 @@ def issue(severity, text, where="gyro_x", **more):
 
 
 def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
-    values = {"evident": True, "time_lower": 283.6, "time_upper": 303.2}
+    values = {"evident": True, "removable": True, "time_lower": 283.6, "time_upper": 303.2}
     mend = "calibrate the part before it or after it, or take it off (remove_departures=True)"
     step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, mend)
     fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}

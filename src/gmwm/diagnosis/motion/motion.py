@@ -8,9 +8,8 @@ from itertools import pairwise
 from weakref import ref
 
 import numpy as np
-from scipy.signal import detrend
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
@@ -275,7 +274,8 @@ def _tilts_slowly(force: FloatArray) -> bool:
 def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
     """Whether gravity turns all the time, as the gyros say, or rates are not those of a bias."""
     # A straight drift is none of them, however steep.
-    rest = detrend(rate, axis=0) if rate.size else rate
+    straight = np.vander(np.linspace(-1.0, 1.0, rate.shape[0]), 2)
+    rest = rate - straight @ np.linalg.lstsq(straight, rate, rcond=None)[0]
     spread = np.ptp(np.quantile(rest, [tuning.QUIET, 1.0 - tuning.QUIET], axis=0), axis=0)
     noise = [_white(channel.values, size) for channel in _channels(recording, "gyro")]
     if np.any((spread > tuning.WILD) & (spread > tuning.BEYOND_WHITE * np.array(noise))):

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.stats import norm
+import scipy
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 
@@ -87,9 +87,9 @@ def _loud_blocks(logs: FloatArray) -> tuple[BoolArray, float]:
     if not harms:
         return np.zeros(logs.size, dtype=bool), 0.0
     # A change that was missed leaves something at rest in a loud stretch.
-    smooth = median_filter(logs, tuning.BLOCKS_OF_FLOOR + 1, mode="nearest") - np.min(levels[long])
+    smooth = scipy.ndimage.median_filter(logs, tuning.BLOCKS_OF_FLOOR + 1, mode="nearest")
     half = np.repeat(np.where(loud, 0.5 * above, np.inf), lengths)
-    return smooth > half, float(np.max(above[loud]))
+    return smooth - np.min(levels[long]) > half, float(np.max(above[loud]))
 
 
 def _changes(logs: FloatArray) -> list[int]:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import welch
+import scipy
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
@@ -239,7 +239,7 @@ def _has_band(values: FloatArray, dt: float) -> bool:
     """Whether the spectrum has a band far above what is around it, with much of the variance."""
     known = values[~np.isnan(values)]
     points = min(tuning.POINTS_OF_BAND, known.size // 4)
-    frequency, density = welch(known, 1.0 / dt, nperseg=points, detrend="linear")
+    frequency, density = scipy.signal.welch(known, 1.0 / dt, nperseg=points, detrend="linear")
     frequency, density = frequency[3:], density[3:]
     total = float(np.sum(density))
     for i in np.argsort(density)[-5:]:

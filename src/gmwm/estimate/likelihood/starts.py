@@ -9,7 +9,7 @@ Physics* 7, 86-112), each with amplitudes near the wavelet variances, cost one l
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood.series import Series
@@ -37,7 +37,7 @@ def candidates(series: Series) -> list[tuple[Process, ...]]:
     target = np.maximum(moments.target, _LEAST_LEFT * series.wv.variance)
     if not design.shaped:
         return [_with_amplitudes(design, _at(design, np.zeros(0)), target)]
-    points = qmc.Sobol(len(design.shaped), scramble=False).random_base2(_LOG2_COUNT)
+    points = scipy.stats.qmc.Sobol(len(design.shaped), scramble=False).random_base2(_LOG2_COUNT)
     centred = points + 0.5 / 2**_LOG2_COUNT
     return [_with_amplitudes(design, _at(design, point), target) for point in centred]
 

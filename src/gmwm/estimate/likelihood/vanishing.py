@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
@@ -102,5 +102,6 @@ def upper_bound(process: Process, coordinates: Coordinates, top: Top, columns: C
     scale = np.linspace(0.0, far, _INTERVALS + 1)
     heights = np.array([max(profile(float(k)), low - _FALL) for k in scale])
     fine = np.linspace(0.0, far, _FINE)
-    share = np.cumsum(np.exp(PchipInterpolator(scale, heights)(fine) - np.max(heights)))
+    smooth = scipy.interpolate.PchipInterpolator(scale, heights)(fine)
+    share = np.cumsum(np.exp(smooth - np.max(heights)))
     return float(np.interp(tuning.UPPER_LEVEL, share / share[-1], fine))

@@ -7,8 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 
-from scipy.stats import chi2
-
+from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.linalg import cho_factor, cho_solve, solve, solve_toeplitz, toeplitz
-from scipy.stats import norm
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning

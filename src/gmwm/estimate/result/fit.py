@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.special import lambertw
-from scipy.stats import t
 
+from gmwm._core.distributions import student as t
 from gmwm.estimate import tuning
 from gmwm.process import Parameter
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import chi2, norm
 
+from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import Fit

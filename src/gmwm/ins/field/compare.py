@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm
 
 from gmwm._core import checks
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
@@ -97,13 +97,10 @@ class Comparison:
 
         def beats(a: str, b: str) -> str:
             pair = self.pairs[a, b]
-            size = abs(np.log(pair.ratio))
-            if pair.p_value < tuning.ACCURACY_LEVEL / share and size > tuning.TIE_RATIO:
+            if pair.p_value < tuning.ACCURACY_LEVEL / share:
                 return "better" if pair.ratio < 1.0 else ""
-            honest = pair.score < -tuning.TIE_SCORE
-            if honest and pair.score_p_value < tuning.SCORE_LEVEL / share:
-                return "more-honest"
-            return ""
+            honest = pair.score_p_value < tuning.SCORE_LEVEL / share
+            return "more-honest" if honest and pair.score < 0.0 else ""
 
         unbeaten = [a for a in names if not any(beats(b, a) for b in names if b != a)]
         values: dict[str, Any] = {"models": ", ".join(unbeaten), "resolved": self.resolved,
@@ -132,17 +129,18 @@ class Comparison:
     @property
     def resolved(self) -> float:
         """Ratio of errors that is found with a probability of 95 %; the best of all pairs."""
-        return float(np.exp(-self._factor * max(pair.error for pair in self.pairs.values())))
+        return float(np.exp(-tuning.TIE_RATIO - self._beyond))
 
     @property
     def length_needed(self) -> float:
         """Length of such a log in which a ratio of 0.9 is found with 95 %, s."""
-        error = max(pair.error for pair in self.pairs.values())
-        return self.duration * float((self._factor * error / np.log(tuning.WORTH)) ** 2)
+        return self.duration * (self._beyond / (-np.log(tuning.WORTH) - tuning.TIE_RATIO)) ** 2
 
     @property
-    def _factor(self) -> float:
-        return float(norm.isf(0.5 * tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
+    def _beyond(self) -> float:
+        """How much more than what matters the logarithm of a ratio must be to be found."""
+        error = max(pair.error for pair in self.pairs.values())
+        return error * float(norm.isf(tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
+from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
@@ -143,7 +143,7 @@ class Navigated:
     def _usual_size(self) -> float:
         """NIS per degree of freedom by the median, which a few far ones do not move."""
         squares = self.solution.innovations.standard**2
-        return float(np.nanmedian(squares) / chi2.median(1))
+        return float(np.nanmedian(squares) / chi2.ppf(0.5, 1))
 
     @property
     def rejections(self) -> tuple[Notice, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
 
+from gmwm._core.distributions import student
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.montecarlo import InnovationTest, Ratio
@@ -58,9 +58,9 @@ class Paired:
     ratio, lower, upper : float
         Ratio of the root mean squares and its interval.
     p_value : float
-        Of equal errors.
+        Of errors that differ by no more than `gmwm.ins.tuning.TIE_RATIO`.
     score, score_p_value : float
-        Mean difference of the scores, and the p-value of none.
+        Mean difference, and the p-value of no more than `gmwm.ins.tuning.TIE_SCORE`.
     error : float
         Standard error of the logarithm of the ratio.
     """
@@ -91,7 +91,7 @@ def paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
     part = 0.5 * (a / np.mean(a) - b / np.mean(b))
     count = part.size
     error = float(np.std(part, ddof=1) / np.sqrt(count))
-    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
+    width = float(student.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
     difference = first.score - second.score
     score_error = float(np.std(difference, ddof=1) / np.sqrt(count))
     mean = float(np.mean(difference))
@@ -99,14 +99,15 @@ def paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
         ratio=float(np.exp(log)),
         lower=float(np.exp(log - width)),
         upper=float(np.exp(log + width)),
-        p_value=_two_sided(log, error, count),
+        p_value=_p_value(tuning.TIE_RATIO, log, error, count),
         score=mean,
-        score_p_value=_two_sided(mean, score_error, count),
+        score_p_value=_p_value(tuning.TIE_SCORE, mean, score_error, count),
         error=error,
     )
 
 
-def _two_sided(value: float, error: float, count: int) -> float:
+def _p_value(within: float, value: float, error: float, count: int) -> float:
+    """Of a mean that is ``within`` from zero (Hodges & Lehmann 1954, *J. R. Stat. Soc. B* 16)."""
     if error == 0.0:
-        return 1.0 if value == 0.0 else 0.0
-    return float(2.0 * t.sf(abs(value) / error, count - 1))
+        return float(abs(value) <= within)
+    return float(np.sum(student.sf((abs(value) + np.array([-within, within])) / error, count - 1)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import median_filter, uniform_filter1d
+import scipy
 from scipy.special import ndtri
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
@@ -177,6 +177,10 @@ def _smooth(late: FloatArray, is_set: BoolArray) -> FloatArray:
     for start, stop in pairwise(edges):
         part = late[start:stop]
         # The median drops what a stall delays, the mean the noise of the median.
-        calm = median_filter(part, min(tuning.ROWS_OF_TREND, part.size) | 1, mode="nearest")
-        smooth[start:stop] = uniform_filter1d(calm, tuning.ROWS_OF_TREND, mode="nearest")
+        calm = scipy.ndimage.median_filter(
+            part, min(tuning.ROWS_OF_TREND, part.size) | 1, mode="nearest"
+        )
+        smooth[start:stop] = scipy.ndimage.uniform_filter1d(
+            calm, tuning.ROWS_OF_TREND, mode="nearest"
+        )
     return smooth

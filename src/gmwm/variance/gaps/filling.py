@@ -31,8 +31,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
+from gmwm._core.distributions import student
 from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, haar_gain, quadrature
 from gmwm.variance import tuning
