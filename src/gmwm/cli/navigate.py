@@ -120,7 +120,7 @@ def navigate(
     taken from real static recordings, are added to the error-free signals of a trajectory; every
     filter navigates on the same errors. Printed are the errors at the end of the outages and
     whether each filter is consistent. A YAML file can hold more than the options, which
-    override it; see docs/navigation.md.
+    override it; see docs/navigation.md and docs/own-log.md.
 
     With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
     written; whether the innovations agree with the sensor models is printed, and which fault of
