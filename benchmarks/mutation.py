@@ -22,6 +22,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from cosmic_ray.ast import ast_nodes, get_ast
@@ -83,14 +84,17 @@ def drawn(tree: Path, count: int, seed: int) -> list[Mutant]:
     return chosen
 
 
-def pytest(tree: Path, *arguments: str, **options: float) -> subprocess.CompletedProcess[str]:
+def pytest(
+    tree: Path, *arguments: str, timeout: float | None = None, **variables: str
+) -> subprocess.CompletedProcess[str]:
     """Run pytest in the copy, in one process."""
     environment = {**os.environ, "PYTHONPATH": str(tree / "src"), "PYTHONDONTWRITEBYTECODE": ""}
     command = [sys.executable, *arguments, "-q", "-p", "no:cacheprovider", "-o",
                "addopts=-m 'not slow'"]  # fmt: skip
     return subprocess.run(
-        command, cwd=tree, env=environment, capture_output=True, text=True, check=False, **options
-    )
+        command, cwd=tree, env=environment | variables, timeout=timeout,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
 
 
 def traced(tree: Path, folder: Path) -> CoverageData:
@@ -129,17 +133,20 @@ def tests_of(mutant: Mutant, tree: Path, data: CoverageData) -> list[str]:
 def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> bool:
     """Whether no test fails."""
     file = tree / mutant.path
-    source, stat = file.read_text(), file.stat()
+    source = file.read_text()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
+    tests = ("-m", "pytest", "-x", *tests_of(mutant, tree, data))
     try:
         file.write_text(changed)
-        result = pytest(tree, "-m", "pytest", "-x", *tests_of(mutant, tree, data), timeout=longest)
+        if "@compiled" in source:  # what is compiled of the change is not kept
+            with TemporaryDirectory() as folder:
+                result = pytest(tree, *tests, timeout=longest, NUMBA_CACHE_DIR=folder)
+        else:
+            result = pytest(tree, *tests, timeout=longest)
     except subprocess.TimeoutExpired:
         return False
     finally:
         file.write_text(source)
-        # Compiled loops are cached by the time of their file.
-        os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     return result.returncode == 0
 
 

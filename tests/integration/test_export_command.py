@@ -1,34 +1,15 @@
 """``gmwm export``: files from calibrations, and how it refuses what it cannot use."""
 
-import sys
-
 import numpy as np
 import pytest
 import yaml
 
 import gmwm
-from gmwm import Channel, GaussMarkov, Recording, WhiteNoise, cli
+from gmwm import Channel, GaussMarkov, Recording, WhiteNoise
 from gmwm.export import TARGETS
 from imu_numbers import numbers
 
 DT = 0.01
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was reported."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        return code, *capsys.readouterr()
-
-    return _run
 
 
 @pytest.fixture(scope="module")

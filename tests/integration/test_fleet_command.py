@@ -1,29 +1,14 @@
 """``gmwm fleet``: what it prints and writes, how it ends, and how it refuses."""
 
 import json
-import sys
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from gmwm import WhiteNoise, cli
+from gmwm import WhiteNoise
 
 READING = ("--rate", "1", "--gyro-unit", "rad/s", "--model", "N", "--leave", "all", "--jobs", "1")
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was reported."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, *capsys.readouterr()
-
-    return _run
 
 
 @pytest.fixture

@@ -1,30 +1,11 @@
 """Bags on the command line: to Kalibr in one command, and how they are refused."""
 
-import sys
-
 import numpy as np
 import pytest
 import yaml
 
-from gmwm import cli
-
 pytest.importorskip("rosbags")  # where the lowest versions are tested, the extras are absent
 from bags import ROS1, at_rest, imu_topic, write1
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        printed = capsys.readouterr()
-        return stop.value.code, printed.out, printed.err
-
-    return _run
-
 
 X = at_rest(2000)
 

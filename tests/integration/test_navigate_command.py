@@ -1,7 +1,7 @@
 """``gmwm navigate``: what it prints and writes, and how it refuses what it cannot use."""
 
 import re
-import sys
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gmwm import WhiteNoise, cli
+from gmwm import WhiteNoise
 from gmwm.calibration.calibration import Calibration
 from gmwm.estimate.entrance import fit
 from gmwm.ins.imu.sensors import AXES
@@ -29,23 +29,8 @@ STUDY = {
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run ``gmwm navigate ARGUMENTS`` in a folder of its own."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", "navigate", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        printed, told = capsys.readouterr()
-        return code, printed, told
-
-    return _run
+def run(run):
+    return partial(run, "navigate")
 
 
 def written(path="study.yaml", **changes):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 from collections.abc import Callable
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -24,12 +26,35 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def compile_it(function: Callable[..., Any]) -> Any:
         try:
-            return numba.njit(cache=True, nogil=True, **options)(function)
+            return _stamped(numba.njit(cache=True, nogil=True, **options)(function))
         except RuntimeError:  # numba's "cannot cache function: no locator available"
             _warn()
             return numba.njit(nogil=True, **options)(function)
 
     return compile_it
+
+
+def _stamped(loop: Any) -> Any:
+    """Let what is kept on disk count as long as no compiled file changes.
+
+    Numba looks at the file of the function only. A loop holds the code and the constants of what it
+    calls, so after an upgrade that changed another file it would go on with the old ones.
+    """
+    kept = getattr(getattr(loop, "_cache", None), "_cache_file", None)
+    if kept is not None:
+        kept._source_stamp = digest_of(Path(__file__).parents[1])
+    return loop
+
+
+@lru_cache(maxsize=1)
+def digest_of(package: Path) -> bytes:
+    """Of the version, of the constants and of each file with a compiled function."""
+    digest = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        text = file.read_bytes()
+        if b"@compiled" in text or file.name == "tuning.py" or file == package / "__init__.py":
+            digest.update(text)
+    return digest.digest()
 
 
 @lru_cache(maxsize=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from html import escape
 
 from gmwm._core.units import factor
 
@@ -10,6 +11,13 @@ WIDTH = 80
 
 _UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}
 _LARGE = 1000.0
+
+
+class Printed:
+    """A result that a notebook shows as `print` does."""
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
 
 
 def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:

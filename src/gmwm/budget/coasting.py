@@ -168,10 +168,9 @@ def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -
         if name in budget.channels and isinstance(item, Fit) and not item.valid
     ]
     if doubtful:
-        what = (
-            "models are not valid, read their" if doubtful[1:] else "model is not valid, read its"
-        )
-        notes.append(f"the {what} notices first: {', '.join(doubtful)}")
+        model, are = ("models", "are") if doubtful[1:] else ("model", "is")
+        of = ", ".join(doubtful)
+        notes.append(f"the {model} of {of} {are} not valid: read the notices first")
     lengths = [item.wv.n * item.wv.dt for item in channels.values() if isinstance(item, Fit)]
     if lengths and budget.times[-1] > _RECORD_SHARE * min(lengths):
         notes.append(

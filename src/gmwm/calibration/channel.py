@@ -98,7 +98,8 @@ def channel_model(
             removed = [gone + more for gone, more in zip(removed, evident, strict=True)]
     except InputError as error:
         return Notice(error.code or "not-estimable", "bad", name, str(error))
-    return replace(found, fit=with_departures(found.fit, sources, there, removed))
+    fit = with_departures(found.fit, sources, there, removed, removing=removals > 0)
+    return replace(found, fit=fit)
 
 
 def _fitted(

@@ -17,6 +17,8 @@ def with_departures(
     sources: Sequence[str],
     found: Sequence[Sequence[Departure]],
     removed: Sequence[Sequence[Departure]],
+    *,
+    removing: bool = False,
 ) -> Fit:
     """A fit with a notice of each departure; not valid if one accounts for much of the noise.
 
@@ -27,17 +29,32 @@ def with_departures(
         Of its recordings; named where there are several.
     found, removed : sequence of sequence of Departure
         What each recording has, and what was taken off before the fit.
+    removing : bool, optional
+        Whether departures were to be taken off: those that are left are no more.
     """
     unit = fitted.wv.unit
     notices = [
         replace(notice, source=source if len(sources) > 1 else "")
         for source, there, gone in zip(sources, found, removed, strict=True)
         for notice in (
-            *(departure_notice(each, unit) for each in there),
+            *(departure_notice(each, unit, stays=removing) for each in there),
             *(_removed_notice(each, unit) for each in gone),
+            *_many_notices(gone),
         )
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+
+
+def _many_notices(removed: Sequence[Departure]) -> list[Notice]:
+    """That too much was taken off to be accidents."""
+    if len(removed) <= tuning.MOST_REMOVED:
+        return []
+    text = (
+        f"{len(removed)} departures were taken off: a level that changes so often is noise of the "
+        "sensor, which the model lacks now"
+    )
+    action = "fit a slow term in place of it, such as a Gauss-Markov process"
+    return [Notice("departures-many", "bad", "", text, {"removed": len(removed)}, action)]
 
 
 def _removed_notice(found: Departure, unit: str) -> Notice:
@@ -48,7 +65,7 @@ def _removed_notice(found: Departure, unit: str) -> Notice:
     return replace(notice, severity="note", text=text, values=values, action="taken off")
 
 
-def departure_notice(found: Departure, unit: str) -> Notice:
+def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Notice:
     """What it is, and whether a fit beside it is valid.
 
     Parameters
@@ -56,6 +73,8 @@ def departure_notice(found: Departure, unit: str) -> Notice:
     found : Departure
     unit : str
         Of the channel, SI.
+    stays : bool, optional
+        Whether taking it off was tried, so that it is no advice.
     """
     size, low, high = (readable(each, unit, sign=True) for each in found.size)
     size = f"{size} ({low} .. {high})"
@@ -89,7 +108,7 @@ def departure_notice(found: Departure, unit: str) -> Notice:
             f"{what}; it accounts for up to {part} of the model's wavelet variance, so that slow "
             "terms of the model are too large"
         )
-        action = f"{remedy}, or take it off (remove_departures=True)"
+        action = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"
     else:
         severity = "warning" if harmful else "note"
         text = f"{what}, or slow noise: this record does not distinguish them"
@@ -97,4 +116,5 @@ def departure_notice(found: Departure, unit: str) -> Notice:
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
+    values |= {"evident": found.is_evident, "removable": found.is_evident and not stays}
     return Notice(found.kind, severity, "", text, values, action)

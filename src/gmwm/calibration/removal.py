@@ -108,7 +108,7 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def _is_evident(notice: Notice) -> bool:
-    return notice.code in KINDS and notice.values["evidence"] >= tuning.EVIDENT
+    return notice.code in KINDS and bool(notice.values["evident"])
 
 
 def _departure(notice: Notice) -> Departure:

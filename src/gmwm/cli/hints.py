@@ -62,7 +62,7 @@ def with_option(notice: Notice) -> Notice:
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
-    if notice.severity == "note" or "evidence" not in values:
+    if notice.severity == "note" or not values.get("evident"):
         return notice
     first, last = values["time_lower"], values["time_upper"]
     cut = {
@@ -71,5 +71,6 @@ def with_option(notice: Notice) -> Notice:
         "drift-at-start": f"--start {last:.6g}",
         "slow-period": "",
     }[notice.code]
-    options = f"{cut}, or --remove-departures" if cut else "--remove-departures"
-    return replace(notice, action=f"{notice.action.partition(',')[0]}: {options}")
+    options = [each for each in (cut, "--remove-departures" * values["removable"]) if each]
+    advice = ": ".join([notice.action.partition(",")[0], *filter(None, [", or ".join(options)])])
+    return replace(notice, action=advice)

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import reading_options, roles, time_reference
+from gmwm.cli.options import arguments_of_read, reading_options
 from gmwm.errors import InputError
 
 _NEEDED = (
@@ -112,13 +112,7 @@ def navigate(
     gyro_bias: str | None,
     accel_bias: str | None,
     as_json: bool,
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    form: str | None,
-    layout: str | None,
+    **options_of_reading: Any,
 ) -> None:
     """Prove sensor models by navigating; or filter your own IMU and GNSS.
 
@@ -156,7 +150,11 @@ def navigate(
     folder = Path() if file is None else file.parent
     # Where options were given too, what is wrong may be theirs.
     place = None if options or data else file
-    reading = _reading(rate, gyro_unit, accel_unit, channels, time_column, form, layout)
+    reading = {
+        name: each
+        for name, each in arguments_of_read(**options_of_reading).items()
+        if name not in ("topic", "clock") and each not in (None, {})
+    }
     if imu_start is not None:
         reading["start"] = imu_start
     if _OF_DATA.isdisjoint(content):
@@ -315,28 +313,6 @@ def _three(name: str, text: str, form: str = "X,Y,Z in metres, e.g. 0.5,0,-1.2")
     except ValueError:
         raise InputError(f"{name} {text}: write {form}") from None
     return [x, y, z]
-
-
-def _reading(
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    form: str | None,
-    layout: str | None,
-) -> dict[str, Any]:
-    """How the IMU's record is to be read, as the file would have it."""
-    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
-    found = {
-        "rate": rate,
-        "units": units or None,
-        "channels": roles(channels),
-        "time": time_reference(time_column),
-        "format": form,
-        "layout": layout,
-    }
-    return {name: each for name, each in found.items() if each is not None}
 
 
 def _with_reading(imu: Any, reading: dict[str, Any]) -> Any:

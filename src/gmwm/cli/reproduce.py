@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -61,13 +61,7 @@ def reproduce(
     cluster: str | None,
     recordings: tuple[Path, ...],
     rotate: bool,
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    form: str | None,
-    layout: str | None,
+    **reading: Any,
 ) -> None:
     """Repeat an experiment of Stebler et al. (2012), or our own harder one.
 
@@ -94,19 +88,7 @@ def reproduce(
         _check_alone(experiment, {"--method": methods, "--cluster": cluster,
                                   "--resume": resume and not rotate,
                                   "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
-        given = [
-            read_recording(
-                file,
-                rate=rate,
-                gyro_unit=gyro_unit,
-                accel_unit=accel_unit,
-                channels=channels,
-                time_column=time_column,
-                form=form,
-                layout=layout,
-            )
-            for file in recordings
-        ]
+        given = [read_recording(file, **reading) for file in recordings]
         with folder_to_fill(output) as folder:
             if rotate:
                 _rotation(experiment, folder, runs, seed, processes, given, resume)

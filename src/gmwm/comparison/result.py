@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,7 +15,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -189,7 +188,7 @@ class AxisComparison:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SensorComparison(Mapping[str, AxisComparison]):
+class SensorComparison(Mapping[str, AxisComparison], Printed):
     """Several recordings or units of a sensor compared: a mapping of channels to `AxisComparison`.
 
     Attributes
@@ -237,9 +236,6 @@ class SensorComparison(Mapping[str, AxisComparison]):
 
     def __repr__(self) -> str:
         return f"<SensorComparison of {self.summary}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         """Verdicts, what was found, and the numbers for a filter; 80 columns."""

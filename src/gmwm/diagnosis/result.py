@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
-from html import escape
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -15,7 +14,7 @@ from gmwm._core.forms import Form, Notices, NotNegative, Positive, Rate, Samples
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError, MissingNameError
 from gmwm.readers import Recording
 
@@ -88,7 +87,7 @@ class ChannelHealth:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Health(Document):
+class Health(Document, Printed):
     """What was found in a recording.
 
     Attributes
@@ -211,9 +210,6 @@ class Health(Document):
             if (count := sum(notice.severity == severity for notice in self.notices))
         ]
         return f"<Health of {self.source or 'a recording'}: {', '.join(counts)}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         rows = [f"{self.source or 'recording'}: {self.rate:g} Hz, {self.n:,} samples a channel"]

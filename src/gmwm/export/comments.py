@@ -65,10 +65,17 @@ def about(imu: Imu, title: str, convention: str) -> list[str]:
                 "where an axis has more of N or K than all share it has less of the other: a "
                 "larger K pays for a smaller N, and neither pair is too optimistic"
             )
-    if any(axis.nees for triad in imu.triads for axis in triad.axes):
+    shown = [axis.nees for triad in imu.triads for axis in triad.axes]
+    shown += [nees for triad in imu.triads for nees in (triad.shared_nees or {}).values()]
+    if any(shown):
         lines += wrapped(
             "NEES: predicted error squared over what a filter with these numbers believes, after "
             "that time without aiding; 1 is consistent, below 1 cautious, above 1 too optimistic"
+        )
+    if imu.method != "given" and not all(shown):
+        lines += wrapped(
+            "NEES is not known where the file holds other numbers than were found for an axis, "
+            "without its error model: export the calibration"
         )
     for triad in imu.triads:
         by_horizon = imu.outlook.get(triad.quantity, {})

@@ -16,7 +16,7 @@ from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export import tuning
 from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound, judged, reduce
-from gmwm.process import RandomWalk, WhiteNoise
+from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
@@ -59,6 +59,12 @@ class Axis:
     nees: Mapping[float, float] = field(default_factory=dict)
     rate: float = float("nan")
     upper: frozenset[str] = frozenset()
+
+    @property
+    def model(self) -> Model:
+        """What a filter believes that has these numbers."""
+        slow = GaussMarkov(self.sigma, self.tau) if self.tau > 0.0 else RandomWalk(self.K)
+        return WhiteNoise(self.N) + slow
 
     def moved(self, tau: float) -> Axis:
         """With a Gauss-Markov process of another correlation time that bounds its own.
@@ -209,6 +215,7 @@ def imu_of(
     usual: float,
     shared: bool,
     outlook: Outlook | None = None,
+    one_tau: bool = False,
 ) -> Imu:
     """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
 
@@ -224,6 +231,8 @@ def imu_of(
         Whether the axes of a sensor have one value in the file.
     outlook : dict, optional
         That of `Imu`, where it is known.
+    one_tau : bool, optional
+        Whether there is one correlation time in the file: each axis is moved to it.
 
     Raises
     ------
@@ -250,10 +259,21 @@ def imu_of(
         else None
         for each in given
     ]
-    triads = {
-        quantity: _triad(quantity, list(zip(given, numbers, together, strict=True)), form, shared)
-        for quantity in SENSORS
+    sources = list(zip(given, numbers, together, strict=True))
+    fits = {
+        name: fit for each in given if isinstance(each, Calibration) for name, fit in each.items()
     }
+    triads = {each: _triad(each, sources, fits, form, shared) for each in SENSORS}
+    if one_tau:
+        own = {name: one for each in numbers for name, one in each.items()}
+        tau = common_tau([axis for triad in triads.values() for axis in triad.axes])
+        for each, triad in triads.items():
+            moved = [(axis, axis.moved(tau)) for axis in triad.axes]
+            axes = (
+                replace(to, nees=_nees(axis, replace(own[axis.name], model=to.model), fits))
+                for axis, to in moved
+            )
+            triads[each] = replace(triad, axes=tuple(axes))
     return Imu(
         triads["gyro"], triads["accel"], form, horizons[0],
         next(one.method for each in numbers for one in each.values()),
@@ -267,16 +287,15 @@ def imu_of(
 def _triad(
     quantity: str,
     sources: Sequence[tuple[Any, SensorNumbers, SensorNumbers | None]],
+    fits: Mapping[str, Fit],
     form: str,
     shared: bool,
 ) -> Triad:
     """The axes of a quantity, of what was given, its numbers and those that its axes share."""
     axes: list[Axis] = []
     common = None
-    fits: dict[str, Fit] = {}
     holding = [each for each in sources if each[1].of(quantity)]
     for source, numbers, together in holding:
-        fits |= source.fits if isinstance(source, Calibration) else {}
         for name, one in numbers.of(quantity).items():
             rate = numbers.rate
             if isinstance(source, Calibration) and not source.has_one_rate:
@@ -306,24 +325,17 @@ def _triad(
     if not shared:
         return triad
     alike = next(iter(holding[0][1].of(quantity).values()))
-    return replace(triad, shared_nees=_shared_nees(triad, alike, fits))
-
-
-def _shared_nees(
-    triad: Triad, alike: FilterNumbers, fits: Mapping[str, Fit]
-) -> dict[str, Mapping[float, float]]:
-    """Consistency of each axis with the numbers that all share; see `Triad`."""
     model = WhiteNoise(triad.N) + RandomWalk(triad.K)
-    shared = replace(alike, model=model, initial_sd=triad.initial_sd)
-    values = (triad.N, triad.K, triad.initial_sd)
-    found: dict[str, Mapping[float, float]] = {}
-    for axis in triad.axes:
-        if axis.name in fits:
-            found[axis.name] = judged({axis.name: fits[axis.name]}, shared).nees
-        else:
-            is_own = (axis.N, axis.K, axis.initial_sd) == values
-            found[axis.name] = axis.nees if is_own else {}
-    return found
+    alike = replace(alike, model=model, initial_sd=triad.initial_sd)
+    return replace(triad, shared_nees={axis.name: _nees(axis, alike, fits) for axis in axes})
+
+
+def _nees(axis: Axis, numbers: FilterNumbers, fits: Mapping[str, Fit]) -> Mapping[float, float]:
+    """Consistency of an axis with numbers in place of its own; empty if that is not known."""
+    if axis.name in fits:
+        return judged({axis.name: fits[axis.name]}, numbers).nees
+    own = (axis.model.params, axis.initial_sd)
+    return axis.nees if own == (numbers.model.params, numbers.initial_sd) else {}
 
 
 def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:
@@ -371,14 +383,14 @@ def axis_of(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) 
         axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
     if "K" in numbers.form and axis.K <= 0.0:
         axis = replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
-    if axis.upper and numbers.form == "N+K":
-        filled = replace(numbers, model=WhiteNoise(axis.N) + RandomWalk(axis.K))
-        return replace(axis, nees=dict(judged({name: fitted}, filled).nees))
     if "GM" in numbers.form and not axis.sigma > 0.0:
         tau = numbers.horizon
         # The random walk of this K rises at high frequencies as this process does.
         sigma = random_walk(fitted).value * float(np.sqrt(tau / 2.0))
-        return replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
+        axis = replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
+    if axis.upper:
+        filled = replace(numbers, model=axis.model)
+        axis = replace(axis, nees=dict(_nees(axis, filled, {name: fitted})))
     return axis
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from math import sqrt
 
 from gmwm._core.units import factor
-from gmwm.export.imu import Axis, Imu, common_tau
+from gmwm.export.imu import Axis, Imu
 from gmwm.export.target import ImuFile
 
 _MGAL = 1e-5  # m/s^2
@@ -19,8 +19,7 @@ _HOUR = 3600.0
 
 
 def _body(imu: Imu) -> list[str]:
-    tau = common_tau([axis for triad in imu.triads for axis in triad.axes])
-    gyro, accel = ([axis.moved(tau) for axis in triad.xyz()] for triad in imu.triads)
+    gyro, accel = (triad.xyz() for triad in imu.triads)
     per_root_hour, per_hour = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s")
     return [
         "imunoise:",
@@ -28,7 +27,7 @@ def _body(imu: Imu) -> list[str]:
         f"  vrw: {_list(accel, lambda axis: axis.N * sqrt(_HOUR))}  # m/s/sqrt(h)",
         f"  gbstd: {_list(gyro, lambda axis: axis.sigma / per_hour)}  # deg/h",
         f"  abstd: {_list(accel, lambda axis: axis.sigma / _MGAL)}  # mGal",
-        f"  corrtime: {tau / _HOUR:.6e}  # h",
+        f"  corrtime: {gyro[0].tau / _HOUR:.6e}  # h",
         f"initbgstd: {_list(gyro, lambda axis: _start(axis) / per_hour)}  # deg/h",
         f"initbastd: {_list(accel, lambda axis: _start(axis) / _MGAL)}  # mGal",
     ]
@@ -47,6 +46,6 @@ KFGINS = ImuFile(
     "N, sigma and tau of each axis; there is one tau for all six, and each axis has the sigma "
     "with which it bounds its own process",
     "src/kf-gins/gi_engine.cpp: GIEngine::GIEngine, insPropagation; src/kf_gins.cpp: loadConfig",
-    _body, form="N+GM",
+    _body, form="N+GM", one_tau=True,
     warnings=("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",),
 )  # fmt: skip

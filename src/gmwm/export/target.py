@@ -85,6 +85,8 @@ class ImuFile(Target):
         Lines below the comments, of an `Imu`; of files in JSON, the object.
     shared : bool
         Whether the axes of a sensor have one value.
+    one_tau : bool
+        Whether all axes have one correlation time.
     mark : str
         What a comment begins with.
     head : tuple of str
@@ -94,6 +96,7 @@ class ImuFile(Target):
     body: Callable[[Imu], Any]
     _: KW_ONLY
     shared: bool = False
+    one_tau: bool = False
     mark: str = "#"
     head: tuple[str, ...] = ()
 
@@ -111,7 +114,7 @@ class ImuFile(Target):
         if form is not None and checks.choice("form", form, FORMS) != self.form:
             raise InputError(f"form {form}: {self.title} holds {self.form} only")
         try:
-            imu = imu_of(given, self.form, horizon, self.horizon, self.shared)
+            imu = imu_of(given, self.form, horizon, self.horizon, self.shared, one_tau=self.one_tau)
         except InputError as error:
             raise InputError(f"{self.title}: {error}", error.code) from None
         return self.text(imu)

@@ -138,7 +138,12 @@ def bound_of(
             initial_sd=sd,
             method="bound",
             predicted=found,
-            notices=(*target.notices, *_optimistic(found), *loose, *about(axis, level)),
+            notices=(
+                *target.notices,
+                *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
+                *loose,
+                *about(axis, level),
+            ),
             quantity=axis.quantity,
             stderr=stderr,
         )
@@ -146,8 +151,10 @@ def bound_of(
     )
 
 
-def _optimistic(found: Sequence[Predicted]) -> tuple[Notice, ...]:
+def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:
     """Where what the numbers leave out is too large for that."""
+    times = [share * horizon for share in tuning.SUSPECT]
+    found = predicted(axis, axis.chain, model, sd, times)
     worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
     if not worst.nees > tuning.OPTIMISTIC:
         return ()
@@ -180,7 +187,7 @@ def _fit(axis: Axis) -> Fit:
 
 
 def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
-    """Standard deviation of the walk at the start, or of a constant where there is no walk."""
+    """Standard deviation of the bias at the start: the walk, or a constant where there is none."""
     variance = max(axis.bias_sd for axis in group) ** 2 + target.constant_sd**2
     stationary = [term for term in model.terms if not term.is_walk]
     if len(stationary) < len(model.terms):
@@ -235,7 +242,7 @@ def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
     if axis.bias_sd == 0.0:
         text = (
             "the bias at the start leaves out that of switching on, which no recording at rest "
-            "shows: add the square of its standard deviation to that of initial_sd"
+            "shows: add its variance"
         )
         found.append(Notice("turn-on-left-out", "note", "", text))
     if level is None:

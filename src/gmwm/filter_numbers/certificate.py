@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from html import escape
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import Field
@@ -13,7 +12,7 @@ from gmwm._core.documents import Document
 from gmwm._core.forms import Form, Notices, NotNegative, Text
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm.estimate.result import plain
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.result import SensorNumbers
@@ -119,7 +118,7 @@ class Cause:
 
 
 @dataclass(frozen=True, repr=False)
-class Certificate(Document):
+class Certificate(Document, Printed):
     """How consistent a filter will be with given numbers, and why.
 
     Attributes
@@ -156,9 +155,6 @@ class Certificate(Document):
             f"<Certificate of {self.numbers.source or 'numbers'}: NEES up to {worst.nees:.3g}, "
             f"{worst.where} after {worst.time:g} s>"
         )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         return self.text()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from html import escape
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import Field
@@ -15,7 +14,7 @@ from gmwm._core.forms import Form, Model as ModelForm, Notices, NotNegative, Pos
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import MissingNameError
 from gmwm.estimate.result import plain
@@ -88,7 +87,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, repr=False)
-class FilterNumbers(Document):
+class FilterNumbers(Document, Printed):
     """What a small filter should believe of one axis.
 
     Attributes
@@ -171,9 +170,6 @@ class FilterNumbers(Document):
 
     def __repr__(self) -> str:
         return f"<FilterNumbers {self.model!r}, {self.method} for {self.horizon:g} s>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         return self.text()
@@ -267,7 +263,7 @@ class FilterNumbers(Document):
 
 
 @dataclass(frozen=True, repr=False)
-class SensorNumbers(Mapping[str, FilterNumbers], Document):
+class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
     """What a small filter should believe of a sensor: a mapping of channels to `FilterNumbers`.
 
     Attributes
@@ -332,9 +328,6 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document):
     def __repr__(self) -> str:
         where = self.source or "a sensor"
         return f"<SensorNumbers of {where}: {self.form} for {self.horizon:g} s, {', '.join(self)}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         return self.text()

@@ -64,7 +64,7 @@ SAFETY = 1.0 + 1e-9
 """Times every variance of a bound: arithmetic of the linear program."""
 
 INITIAL_SHARE = 2.0
-"""Times the variance of the slow terms, for that of the walk at the start. For one Gauss-Markov
+"""Times the variance of the slow terms, for that of the bias at the start. For one Gauss-Markov
 process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a half-line takes:
 (1/2 sigma^2) f(0)^2 is the boundary term of the inverse of its covariance. Once the variance fails
 (NEES 1.07); see docs/filter-numbers.md."""
@@ -72,6 +72,9 @@ process below a walk of K^2 = 2 sigma^2/tau it is exactly what dominance on a ha
 OPTIMISTIC = 1.05
 """NEES per degree of freedom, above which a bound is called too optimistic for what it leaves out
 (ramps, slow lines, quantization without white noise above it)."""
+
+SUSPECT = (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Horizons without aiding at which that is looked for: a slow line returns to where it was."""
 
 LOOSE = 1.2
 """Predicted over true standard deviation at the horizon, above which a bound is called loose."""

@@ -4,16 +4,12 @@ from .covariance.reduction import (
     loiter_with_outages as loiter_with_outages,
     reduce as reduce,
 )
-from .field.compare import (
-    Comparison as Comparison,
-    Outcome as Outcome,
-    Paired as Paired,
-    compare as compare,
-)
+from .field.compare import Comparison as Comparison, compare as compare
 from .field.fix_file import read_fixes as read_fixes
 from .field.imu_file import read_imu as read_imu
 from .field.measured import Measured as Measured
 from .field.navigated import Navigated as Navigated
+from .field.outcome import Outcome as Outcome, Paired as Paired
 from .filter.aiding import (
     Aiding as Aiding,
     Fixes as Fixes,
@@ -44,7 +40,7 @@ from .montecarlo.outage_errors import difference as difference, spread as spread
 from .montecarlo.scenario import Scenario as Scenario, Simulated as Simulated
 from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
 from .montecarlo.validation import Validation as Validation
-from .spec.experiment import experiment_from as experiment_from, read_experiment as read_experiment
+from .spec.experiment import experiment_from as experiment_from
 from .trajectory.manoeuvres import (
     Accelerate as Accelerate,
     Climb as Climb,

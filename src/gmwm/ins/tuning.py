@@ -159,6 +159,10 @@ MOST_OUTLIERS = 0.1
 """Fraction of the fixes beyond which those that a gate rejects are no outliers: it is the filter
 that is wrong."""
 
+ANYWHERE = 100.0
+"""m, 1 sigma of a start whose fix is an outlier: farther ones count as such too, and more would
+make the filter allow for products of errors."""
+
 SEEN = 5.0
 """Standard errors that a constant error must have to be found at the level of the tests."""
 
@@ -192,8 +196,8 @@ ACCURACY_LEVEL, SCORE_LEVEL = 0.04, 0.01
 all."""
 
 TIE_RATIO, TIE_SCORE = 0.02, 0.05
-"""Logarithm of a ratio of errors, and difference of scores, below which models are as good as each
-other however surely they differ: nearly equal models differ surely by nothing that matters."""
+"""Logarithm of a ratio of errors, and difference of scores, up to which models are as good as each
+other, however surely they differ: of the scores, standard deviations that are 13 % off."""
 
 POWER, WORTH = 0.95, 0.9
 """Probability with which a difference is found, and the ratio of errors that is worth it."""

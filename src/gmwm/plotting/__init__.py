@@ -12,7 +12,6 @@ from gmwm.plotting.deviation import (
     deviations,
     residuals,
     straight_lines,
-    trace,
 )
 from gmwm.plotting.intervals import intervals
 from gmwm.plotting.navigation import (
@@ -46,6 +45,5 @@ __all__ = [
     "outages_compared",
     "residuals",
     "straight_lines",
-    "trace",
     "track",
 ]

@@ -197,32 +197,6 @@ def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, floa
     ax.legend(fontsize="small", framealpha=0.9)
 
 
-def trace(values: FloatArray, ax: Axes | None = None) -> Axes:
-    """Log-likelihood that is still to be gained, against the iteration; returns the axes.
-
-    The axis is logarithmic and points down, so that the curve climbs as the likelihood does.
-
-    Parameters
-    ----------
-    values : (k,) ndarray
-        Log-likelihood after each iteration.
-    ax : matplotlib.axes.Axes, optional
-    """
-    import matplotlib.pyplot as plt
-
-    if ax is None:
-        _, ax = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
-    missing = np.max(values) - values
-    shown = missing > 0.0
-    ax.plot(np.arange(1, values.size + 1)[shown], missing[shown], color=SUM_COLOUR, linewidth=1.3)
-    ax.set_yscale("log")
-    ax.yaxis.set_inverted(True)
-    ax.set_xlabel("iteration")
-    ax.set_ylabel(f"log-likelihood missing to {np.max(values):.8g}")
-    ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
-    return ax
-
-
 def residuals(
     tau: FloatArray,
     residual: FloatArray,

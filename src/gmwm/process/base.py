@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from inspect import Signature, signature
 from typing import Any, ClassVar, Self
@@ -132,24 +131,7 @@ class Process:
         for parameter in self.parameters:
             value = values[parameter.name]
             if value is not None:
-                self.__dict__[parameter.name] = self._checked(parameter, value)
-
-    def _checked(self, parameter: Parameter, value: Any) -> float:
-        where = f"{type(self).__name__}: {parameter.name}"
-        try:
-            if isinstance(value, str):
-                raise TypeError
-            number = float(value)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(
-                f"{where} is {checks.shown(value)}: give a number, or None to estimate"
-            ) from None
-        if not math.isfinite(number) or not parameter.admits(number):
-            raise InputError(
-                f"{where} = {number:g} is out of range: it must lie in "
-                f"({parameter.lower:g}, {parameter.upper:g})"
-            )
-        return number
+                self.__dict__[parameter.name] = parameter.checked(value, type(self).__name__)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} does not change: make a new one")
@@ -178,10 +160,8 @@ class Process:
 
     def at_unit(self, shape: Shape) -> Self:
         """A copy at another shape and unit amplitude."""
-        values: dict[str, float | None] = {
-            parameter.name: value
-            for parameter, value in zip(self.shape_parameters, shape, strict=True)
-        }
+        names = [parameter.name for parameter in self.shape_parameters]
+        values: dict[str, float | None] = dict(zip(names, shape, strict=True))
         if self.linear_parameter is not None:
             values[self.linear_parameter.name] = 1.0
         return self.with_values(**values)
@@ -400,7 +380,7 @@ class Process:
         The default is a logarithmic grid over each parameter's range where that is finite, with
         times taken between ``dt`` and the length of the record and frequencies up to 1/(2 dt).
         """
-        axes = [_grid_axis(parameter, dt, n) for parameter in self.shape_parameters]
+        axes = [parameter.grid(dt, n) for parameter in self.shape_parameters]
         mesh = np.meshgrid(*axes, indexing="ij")
         return [
             tuple(float(v) for v in point) for point in np.stack(mesh, -1).reshape(-1, len(axes))
@@ -408,19 +388,11 @@ class Process:
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
         """Map shape parameters to the whole real line."""
-        return np.array(
-            [
-                _to_free(parameter, value)
-                for parameter, value in zip(self.shape_parameters, shape, strict=True)
-            ]
-        )
+        return np.array([p.to_free(v) for p, v in zip(self.shape_parameters, shape, strict=True)])
 
     def shape_from_free(self, free: FloatArray) -> Shape:
         """Inverse of `shape_to_free`."""
-        return tuple(
-            _from_free(parameter, value)
-            for parameter, value in zip(self.shape_parameters, free, strict=True)
-        )
+        return tuple(p.from_free(z) for p, z in zip(self.shape_parameters, free, strict=True))
 
     @classmethod
     def examples(cls) -> tuple[Process, ...]:
@@ -458,12 +430,10 @@ class Process:
     def __hash__(self) -> int:
         return hash((type(self), *self.values.items()))
 
-    @classmethod
-    def is_repeatable(cls, instance: Process) -> bool:
+    @property
+    def is_repeatable(self) -> bool:
         """Whether two of this kind in one model can be distinguished."""
-        if cls.repeatable is not None:
-            return cls.repeatable
-        return bool(instance.shape_parameters)
+        return bool(self.shape_parameters) if self.repeatable is None else self.repeatable
 
     def named(self) -> str:
         """The term as a reader finds it in a model: ``Gauss-Markov term of tau = 0.52 s``."""
@@ -478,36 +448,3 @@ class Process:
     def title(cls) -> str:
         """Name for tables and legends."""
         return cls.label or cls.__name__
-
-
-def _grid_axis(parameter: Parameter, dt: float, n: int, points: int = 16) -> FloatArray:
-    lower, upper = parameter.lower, parameter.upper
-    if parameter.unit == "s":
-        lower, upper = max(lower, 0.5 * dt), min(upper, n * dt)
-    elif parameter.unit == "Hz":
-        lower, upper = max(lower, 1.0 / (n * dt)), min(upper, 0.5 / dt)
-    if not np.isfinite(upper):
-        upper = max(1e3 * lower, 1e3)
-    if lower < 0.0:
-        return np.linspace(lower, upper, points + 2)[1:-1]
-    if lower == 0.0:
-        lower = 1e-3 * upper
-    return np.geomspace(lower, upper, points + 2)[1:-1]
-
-
-def _to_free(parameter: Parameter, value: float) -> float:
-    lower, upper = parameter.lower, parameter.upper
-    if np.isfinite(lower) and np.isfinite(upper):
-        return float(np.log((value - lower) / (upper - value)))
-    if np.isfinite(lower):
-        return float(np.log(value - lower))
-    return float(value)
-
-
-def _from_free(parameter: Parameter, free: float) -> float:
-    lower, upper = parameter.lower, parameter.upper
-    if np.isfinite(lower) and np.isfinite(upper):
-        return float(lower + (upper - lower) / (1.0 + np.exp(-free)))
-    if np.isfinite(lower):
-        return float(lower + np.exp(free))
-    return float(free)

@@ -277,7 +277,7 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
             if type(term) is not type(other):
                 continue
             name = type(term).__name__
-            if not term.is_repeatable(term):
+            if not term.is_repeatable:
                 raise InputError(
                     f"two {name} in one model cannot be distinguished: keep one (variances add up)"
                 )

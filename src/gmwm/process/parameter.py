@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 
 Role = Literal["scale", "variance", "shape", "slope"]
@@ -52,6 +57,55 @@ class Parameter:
         if self.linear and value == 0.0:
             return True
         return self.lower < value < self.upper
+
+    def checked(self, value: Any, owner: str) -> float:
+        """The value as a number in the parameter's range.
+
+        Raises
+        ------
+        InputError
+            If it is none; ``owner`` is the name of the process.
+        """
+        where = f"{owner}: {self.name}"
+        try:
+            if isinstance(value, str):
+                raise TypeError
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(
+                f"{where} is {checks.shown(value)}: give a number, or None to estimate"
+            ) from None
+        if not math.isfinite(number) or not self.admits(number):
+            raise InputError(
+                f"{where} = {number:g} is out of range: it must lie in "
+                f"({self.lower:g}, {self.upper:g})"
+            )
+        return number
+
+    def to_free(self, value: float) -> float:
+        """Map a value to the whole real line."""
+        if math.isfinite(self.lower) and math.isfinite(self.upper):
+            return float(np.log((value - self.lower) / (self.upper - value)))
+        return float(np.log(value - self.lower)) if math.isfinite(self.lower) else float(value)
+
+    def from_free(self, free: float) -> float:
+        """Inverse of `to_free`."""
+        if math.isfinite(self.lower) and math.isfinite(self.upper):
+            return float(self.lower + (self.upper - self.lower) / (1.0 + np.exp(-free)))
+        return float(self.lower + np.exp(free)) if math.isfinite(self.lower) else float(free)
+
+    def grid(self, dt: float, n: int, points: int = 16) -> FloatArray:
+        """Values all over the range, for a record of ``n`` samples ``dt`` s apart."""
+        lower, upper = self.lower, self.upper
+        if self.unit == "s":
+            lower, upper = max(lower, 0.5 * dt), min(upper, n * dt)
+        elif self.unit == "Hz":
+            lower, upper = max(lower, 1.0 / (n * dt)), min(upper, 0.5 / dt)
+        if not math.isfinite(upper):
+            upper = max(1e3 * lower, 1e3)
+        if lower < 0.0:
+            return np.linspace(lower, upper, points + 2)[1:-1]
+        return np.geomspace(lower or 1e-3 * upper, upper, points + 2)[1:-1]
 
 
 class _Declared(Parameter):

@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, time, timedelta
 
 from gmwm.readers.table import LARGEST
 
@@ -29,11 +29,12 @@ _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 
 
 def _date(fraction: str, zone: str) -> re.Pattern[str]:
-    """Year to second in groups 1 to 6 or, without marks between, 7 to 12, and the zone in 13."""
+    """Day, hour, minute and second in groups 1 to 4 or, without marks, 5 to 8; the zone in 9."""
     second = rf"(\d{{2}}(?:{fraction}\d*)?)"
     return re.compile(
-        rf"(?:(\d{{4}})[-/](\d{{1,2}})[-/](\d{{1,2}})[Tt ]\s*(\d{{1,2}}):(\d{{2}}):{second}"
-        rf"|(\d{{4}})(\d{{2}})(\d{{2}})[Tt](\d{{2}})(\d{{2}}){second})\s?([Zz]|{zone})?"
+        rf"(?:(\d{{4}}(?:[-/]\d{{1,2}}[-/]\d{{1,2}}|-\d{{3}}|-W\d\d-\d))[Tt ]\s*"
+        rf"(\d{{1,2}}):(\d{{2}}):{second}"
+        rf"|(\d{{7,8}}|\d{{4}}W\d{{3}})[Tt](\d{{2}})(\d{{2}}){second})\s?([Zz]|UTC|GMT|{zone})?"
     )
 
 
@@ -113,10 +114,10 @@ def seconds_of(found: re.Match[str]) -> float:
     ValueError
         If there is no such day, minute, second or zone.
     """
-    *parts, second = (part for part in found.groups()[:12] if part is not None)
-    start = datetime(*map(int, parts), tzinfo=UTC)  # type: ignore[arg-type, misc]
-    zone = found[13]
-    if zone and zone not in "Zz":
+    day, hour, minute, second = (part for part in found.groups()[:8] if part is not None)
+    start = datetime.combine(_day(day), time(int(hour), int(minute)), tzinfo=UTC)
+    zone = found[9]
+    if zone and zone[0] in "+-":
         away = timedelta(hours=int(zone[1:3]), minutes=int(zone[3:].lstrip(":") or 0))
         if away > _LARGEST_ZONE or int(zone[3:].lstrip(":") or 0) > 59:
             raise ValueError("no zone")
@@ -128,9 +129,20 @@ def seconds_of(found: re.Match[str]) -> float:
     return start.timestamp() + seconds
 
 
+def _day(text: str) -> date:
+    """Of the month, of the year (2026-123) or of the week (2026-W12-3), with marks or without."""
+    if "W" in text:
+        return date.fromisoformat(text)
+    plain = re.sub("[-/]", "", text)
+    if len(plain) == 7 and len(text) <= 8:
+        return datetime.strptime(plain, "%Y%j").date()
+    parts = re.split("[-/]", text) if text != plain else (text[:4], text[4:6], text[6:])
+    return date(*map(int, parts))
+
+
 def has_zone(found: re.Match[str]) -> bool:
     """Whether the zone of a date is written."""
-    return found[13] is not None
+    return found[9] is not None
 
 
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:

@@ -20,7 +20,14 @@ from gmwm.readers import tuning
 from gmwm.readers.at_rest import rest_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
-from gmwm.readers.clock import Clock, Timing, agree, without_summer_time
+from gmwm.readers.clock import (
+    Clock,
+    Timing,
+    agree,
+    is_time_of_day,
+    seconds_of_day,
+    without_summer_time,
+)
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
@@ -170,6 +177,12 @@ def _part(
     if roles.time is not None:
         if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
             arrays[roles.time], odd = without_summer_time(arrays[roles.time], table.where)
+        elif meaning(table.names[roles.time]).seconds in (None, 1.0) and is_time_of_day(
+            arrays[roles.time]
+        ):
+            arrays[roles.time] = seconds_of_day(arrays[roles.time])
+            text = "times of day (hhmmss) count as seconds since midnight"
+            odd = [Notice("time-of-day", "note", "", text)]
         start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
     for name, index in roles.channels.items():
         unit = unit_of[name]
@@ -183,8 +196,8 @@ def _part(
     further = [_auxiliary(column, arrays[column.index], 1.0 / used_rate) for column in auxiliary]
     series = {name: arrays[index] for name, index in roles.channels.items()}
     arrays.clear()
-    recording = Recording.taking(
-        series,
+    recording = Recording.from_arrays(
+        ((name, series.pop(name)) for name in list(series)),
         rate=used_rate,
         units=unit_of,
         source=table.source,

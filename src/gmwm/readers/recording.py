@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 
 import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError, printable
@@ -111,7 +111,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Mapping[str, Channel]):
+class Recording(Mapping[str, Channel], Printed):
     """Channels that begin and end together: a mapping of their names to `Channel`.
 
     Most often they have one sampling rate; in a log of sensors with clocks of their own each has
@@ -140,7 +140,7 @@ class Recording(Mapping[str, Channel]):
     @classmethod
     def from_arrays(
         cls,
-        arrays: Mapping[str, FloatArray],
+        arrays: Mapping[str, FloatArray] | Iterable[tuple[str, FloatArray]],
         rate: float,
         units: Mapping[str, str],
         source: str = "",
@@ -150,8 +150,9 @@ class Recording(Mapping[str, Channel]):
 
         Parameters
         ----------
-        arrays : mapping of str to (n,) array_like
-            Channel name -> samples, NaN where one is missing.
+        arrays : mapping of str to (n,) array_like, or iterable of pairs
+            Channel name -> samples, NaN where one is missing. Of pairs that are made one by one,
+            each series is in memory once.
         rate : float
             Sampling rate, Hz.
         units : mapping of str to str
@@ -167,27 +168,15 @@ class Recording(Mapping[str, Channel]):
             If the rate is not positive, a unit is missing or unknown, or the channels are not
             series of numbers of one length, none infinite.
         """
-        return cls.taking(dict(arrays), rate, units, source, notices)
-
-    @classmethod
-    def taking(
-        cls,
-        arrays: dict[str, FloatArray],
-        rate: float,
-        units: Mapping[str, str],
-        source: str = "",
-        notices: Sequence[Notice] = (),
-    ) -> Recording:
-        """`from_arrays` that empties the dictionary, so that series are in memory once."""
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
             raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
         channels = []
-        for name in list(arrays):
+        for name, values in arrays.items() if isinstance(arrays, Mapping) else arrays:
             unit = units.get(name) or units.get(name.partition("_")[0])
             if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
-            series, auxiliary = _series(name, arrays.pop(name)), auxiliary_unit(unit)
+            series, auxiliary = _series(name, values), auxiliary_unit(unit)
             if auxiliary is not None:
                 channels.append(auxiliary_channel(name, series, 1.0 / rate, auxiliary))
                 continue
@@ -334,9 +323,6 @@ class Recording(Mapping[str, Channel]):
     def __repr__(self) -> str:
         size = f"{self._rates} Hz, {self.duration:.6g} s"
         return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         head = f"{self.source or 'recording'}: {self._rates} Hz, {self.duration:.6g} s"

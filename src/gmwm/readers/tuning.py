@@ -56,6 +56,9 @@ LEAST_SPREAD, LARGEST_SPREAD = 1e-60, 1e60
 BEYOND_SENSORS = 1e6
 """rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
 
+MOST_TURNS = 0.1
+"""Of the steps of times of day, hhmmss, that pass a minute: at 0.2 Hz a twelfth do."""
+
 STEPS_OF_HOUR, NEAR_HOUR, MOST_HOURS = 2.0, 0.25, 2
 """Usual steps, or s, to which a step of an hour is the change of summer time; twice a year."""
 

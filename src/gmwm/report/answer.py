@@ -12,7 +12,7 @@ from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.estimate import Fit
 from gmwm.export import Triad
-from gmwm.report.health import is_departure
+from gmwm.report.health import findings_of_fits
 from gmwm.report.numbers import SHOWN, Certified
 from gmwm.report.text import duration_text, short
 
@@ -67,7 +67,9 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line."""
     severe = [n for n in calibration.notices if n.severity == "bad"]
-    warnings = [n for n in calibration.notices if n.severity == "warning"]
+    of_fits = findings_of_fits(calibration)
+    warnings = [n for n in (*of_fits, *calibration.notices) if n.severity == "warning"]
+    removed = dict.fromkeys(n.where for n in of_fits if n.values.get("removed"))
     invalid = [name for name, fit in calibration.items() if not fit.valid]
     out = [*invalid, *calibration.skipped]
     parts = [f"{', '.join(invalid)} not valid"] if invalid else []
@@ -76,13 +78,15 @@ def verdict(calibration: Calibration) -> dict[str, str]:
         parts.append(_counted(severe, "severe issue"))
     if warnings:
         parts.append(_counted(warnings, "warning"))
+    if removed:
+        parts.append(f"departures from noise taken off ({', '.join(removed)})")
     if severe or out:
         all_out = not any(fit.valid for fit in calibration.values())
         state, word = ("bad", "Not healthy") if all_out or severe else ("care", "Usable in part")
         return {"state": state, "word": word, "text": "; ".join(parts)}
     if not calibration.is_examined:
         return {"state": "care", "word": "Not examined", "text": "the fits are valid"}
-    if warnings:
+    if parts:
         return {"state": "care", "word": "Healthy, with care", "text": "; ".join(parts)}
     text = "nothing was found that spoils the estimates"
     return {"state": "good", "word": "Healthy", "text": text}
@@ -156,15 +160,8 @@ def _row(name: str, fit: Fit, calibration: Calibration, certified: Certified) ->
         "slow": slow_terms(fit),
         "valid": is_valid,
         "why": why,
-        "reason": "health" if _is_finding(name, fit, calibration) else name,
         "known": known_at(fit, SHOWN),
     }
-
-
-def _is_finding(name: str, fit: Fit, calibration: Calibration) -> bool:
-    """Whether the section of findings has what makes a fit not valid."""
-    known = {n.code for n in calibration.notices if (n.where, n.severity) == (name, "bad")}
-    return any(is_departure(notice) or notice.code in known for notice in fit.notices)
 
 
 def _is_bound(text: Mapping[str, str] | None) -> bool:

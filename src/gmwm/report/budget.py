@@ -21,6 +21,7 @@ from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 
 _TOLD = 60.0  # s, the coasting time of the sentence
+_MINOR = 0.1  # of the variance of an axis: terms below it are left out on paper
 _NAMES = {
     (HORIZONTAL, "attitude"): "tilt",
     (HORIZONTAL, "velocity"): "horizontal velocity",
@@ -90,6 +91,12 @@ def _name(of: str, quantity: str) -> str:
 
 
 def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
+    # On paper, the terms that matter at the end, in what an axis has most effect on.
+    ends = {row.channel: row.quantity for row in budget.rows}
+    most = {
+        name: sum(r.values[-1] ** 2 for r in budget.rows if (r.channel, r.quantity) == (name, end))
+        for name, end in ends.items()
+    }
     return [
         {
             "channel": row.channel,
@@ -98,6 +105,8 @@ def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
             "unit": FIELD_UNITS[row.quantity],
             "values": [short(value * per_si(row.quantity)) for value in row.values],
             "invalid": row.channel in invalid,
+            "minor": row.quantity != ends[row.channel]
+            or bool(row.values[-1] ** 2 < _MINOR * most[row.channel]),
         }
         for row in budget.rows
         if any(row.values)

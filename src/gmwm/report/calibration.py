@@ -14,6 +14,7 @@ import numpy as np
 
 import gmwm
 from gmwm._core.files import written
+from gmwm._core.notices import worst_first
 from gmwm._core.units import field_units
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.errors import printable
@@ -161,7 +162,9 @@ def _channel(
     return {
         "name": name,
         # A misfit that the intervals allow for is in the line below the title, and not twice.
-        "notices": [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")],
+        "notices": worst_first(
+            [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")]
+        ),
         "model": fit.model.title(),
         "valid": is_valid,
         "why": why,

@@ -168,7 +168,10 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
         "x": [each[1] for each in shown],
         "y": [float(f"{each[2]:.5g}") for each in shown],
         "text": [each[0] for each in shown],
-        "textposition": ["top right" if each[0] != "K" else "top left" for each in shown],
+        "textposition": [
+            "top left" if label == "K" or tau > 0.5 * fitted.wv.tau[-1] else "top right"
+            for label, tau, _ in shown
+        ],
         "textfont": {"size": 14, "color": SUM_COLOUR},
         # Open, so that a point of the data beneath is seen.
         "marker": {"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
@@ -274,7 +277,7 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
         {**_line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2),
          "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
     ]  # fmt: skip
-    units = _units("less the mean", "u", fitted)
+    units = _units("signal less mean", "u", fitted)
     layout = {
         "height": 220,
         "xaxis": _linear(f"time [{unit}]"),

@@ -14,24 +14,15 @@ _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
-    """Content of the section: notices, worst first, and the good ones apart.
-
-    Departures from the model that make a fit not valid are among them: they are found in what the
-    fit leaves, and are of the recording.
-    """
+    """Content of the section: notices, worst first, and the good ones apart."""
     examined = calibration.is_examined
-    severe = [
-        replace(notice, where=" ".join(part for part in (name, notice.where) if part))
-        for name, fit in calibration.items()
-        for notice in fit.notices
-        if is_departure(notice)
-    ]
     notices = [
         notice
         for notice in calibration.notices
         if notice.code != AMBIGUITY and not (examined and notice.code in _COUNTED_ELSEWHERE)
     ]
-    found = severe + [notice for notice in notices if notice.severity != "good"]
+    found = findings_of_fits(calibration)
+    found += [notice for notice in notices if examined and notice.severity != "good"]
     return {
         "examined": examined,
         "unexamined": () if examined else list(map(str, notices)),
@@ -42,9 +33,15 @@ def health(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def is_departure(notice: Notice) -> bool:
-    """Whether it is a change of the bias that makes a fit not valid."""
-    return notice.severity == "bad" and notice.code in DEPARTURES
+def findings_of_fits(calibration: Calibration) -> list[Notice]:
+    """Departures from noise, and what makes a fit not valid but is no finding of the recording."""
+    known = {notice.code for notice in calibration.notices if notice.severity == "bad"}
+    return [
+        replace(notice, where=" ".join(part for part in (name, notice.where) if part))
+        for name, fit in calibration.items()
+        for notice in fit.notices
+        if notice.code in DEPARTURES or (notice.severity == "bad" and notice.code not in known)
+    ]
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:

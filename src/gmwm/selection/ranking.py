@@ -152,15 +152,6 @@ class Candidate:
         return cls(**{**content, "model": model_from_list(content["model"])})
 
     @property
-    def wic(self) -> float:
-        """Wavelet information criterion, chi-square + 2 tr{cov(nu_hat, nu) Omega}.
-
-        Under the inverse covariance as weights, the trace is the number of parameters. It is an
-        estimate of the error of prediction, and chooses more terms than ``criterion``.
-        """
-        return self.chi_square + 2.0 * self.n_parameters
-
-    @property
     def p_value(self) -> float:
         """Probability of a chi-square as large; NaN without degrees of freedom."""
         return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")

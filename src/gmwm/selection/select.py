@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
 from gmwm._core.frames import frame
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
 from gmwm.estimate.result import fit_joint
@@ -46,7 +45,7 @@ _REDUNDANT = (
 
 
 @dataclass(frozen=True, repr=False)
-class Selection(Document):
+class Selection(Document, Printed):
     """Candidate models, best first, and the fit of the chosen one.
 
     Attributes
@@ -154,9 +153,6 @@ class Selection(Document):
 
     def __repr__(self) -> str:
         return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         best = self.ranking[0].criterion

@@ -93,7 +93,7 @@ class Deviations:
     upper: dict[str, FloatArray]
     n: int
     dt: float
-    confidence: float = 0.95
+    confidence: float
     name: str = ""
     quantity: str | None = None
     unit: str = "u"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from gmwm._core.distributions import chi2
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
+from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.process import PSD
@@ -37,7 +37,7 @@ def _complete_levels(n: int, wavelet: str) -> int:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WaveletVariance:
+class WaveletVariance(Printed):
     """Haar MODWT wavelet variance of a series, level by level, with what a fit needs to know.
 
     Attributes
@@ -265,9 +265,6 @@ class WaveletVariance:
         return (
             f"<{type(self).__name__} of {self.name or 'a series'}: {size}, {self.tau.size} levels>"
         )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def __str__(self) -> str:
         head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz{self._how()}"

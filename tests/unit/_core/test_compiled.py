@@ -1,7 +1,8 @@
-"""Compiled loops where nothing can be written."""
+"""Compiled loops: what is kept on disk, and where nothing can be written."""
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ import sys
 from pathlib import Path
 
 import gmwm
+from gmwm._core import compiled
 
 _SCRIPT = """
 import numpy as np
@@ -49,3 +51,44 @@ def test_a_package_that_cannot_be_written_and_no_home(tmp_path):
     assert float(value) > 0.0
     assert done.stderr.count("NUMBA_CACHE_DIR") == 1
     assert "Traceback" not in done.stderr
+
+
+_CALLEE = "from gmwm._core.compiled import compiled\n@compiled()\ndef inner():\n    return {}\n"
+_CALLER = """
+from gmwm._core.compiled import compiled
+from {0}_callee import inner
+@compiled()
+def outer():
+    return inner()
+"""
+
+
+def test_a_loop_is_compiled_anew_after_what_it_calls_changed(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "stale_caller.py").write_text(_CALLER.format("stale"))
+    values = []
+    for text, stamp in (("1.5", b"old"), ("2.5", b"new"), ("2.5", b"new")):
+        (tmp_path / "stale_callee.py").write_text(_CALLEE.format(text))
+        monkeypatch.setattr(compiled, "digest_of", lambda _, stamp=stamp: stamp)
+        for name in ("stale_callee", "stale_caller"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        caller = importlib.import_module("stale_caller")
+        values.append(caller.outer())
+        hits = caller.outer.stats.cache_hits
+    assert values == [1.5, 2.5, 2.5]
+    assert sum(hits.values()) == 1  # the third time from the disk
+
+
+def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants(tmp_path):
+    texts = {"__init__.py": "1", "a.py": "@compiled()", "b/tuning.py": "X = 1", "b/other.py": "y"}
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    digest = compiled.digest_of.__wrapped__
+    first = digest(tmp_path)
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text + " ")
+        assert (digest(tmp_path) != first) == (name != "b/other.py")
+        (tmp_path / name).write_text(text)
+    assert digest(tmp_path) == first

@@ -2,7 +2,7 @@
 
 import json
 import re
-import sys
+from functools import partial
 
 import matplotlib
 
@@ -22,7 +22,6 @@ from gmwm import (
     RandomWalk,
     RateRamp,
     WhiteNoise,
-    cli,
     error_budget,
 )
 from gmwm.budget.budget import short
@@ -213,7 +212,7 @@ def test_models_that_are_not_valid_are_named():
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
     assert not fit.valid
     notes = error_budget(fit, (1.0,)).notes
-    assert "the model is not valid, read its notices first: gyro_x" in notes
+    assert "the model of gyro_x is not valid: read the notices first" in notes
 
 
 # -- looks ----------------------------------------------------------------------------------------
@@ -341,17 +340,8 @@ def test_bad_input(what):
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", "budget", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        return code, *capsys.readouterr()
-
-    return _run
+def run(run):
+    return partial(run, "budget")
 
 
 def test_the_command_prints_the_table(run, calibration, tmp_path):

@@ -1,5 +1,7 @@
 """Steps, transients and slow periods: found, with their sizes, and not in noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -180,6 +182,19 @@ def test_a_calibration_takes_it_off_on_request_and_reports_that():
     assert low < 2e-6 < high
 
 
+def test_what_stays_is_not_to_be_taken_off_again():
+    rec = recording(noise(10) + SAMPLE * STEP)
+    (there,) = departures(gmwm.calibrate(rec, WhiteNoise() + RandomWalk())["gyro_x"])
+    before, after = (departure_notice(there, "rad/s", stays=stays) for stays in (False, True))
+    assert "remove" in before.action and before.values["removable"]
+    assert not after.values["removable"]
+    for notice in (after, with_option(after)):
+        assert "remove" not in notice.action and notice.action.startswith("calibrate the part")
+    assert "or --start" in with_option(after).action
+    unsure = departure_notice(replace(there, evidence=EVIDENT / 2.0), "rad/s")
+    assert with_option(unsure).action == unsure.action == "a longer record does"
+
+
 def test_the_noise_that_an_estimated_step_takes_is_given_back():
     # Generalized least squares under white noise is the difference of the means of both parts.
     n, runs = 256, 400
@@ -263,3 +278,16 @@ def test_a_pulse_is_two_steps_of_one_size_and_both_are_removed():
     assert sorted(each["size"] for each in gone) == pytest.approx([-3e-4, 3e-4], abs=3e-5)
     assert fit.valid
     assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)
+
+
+def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
+    n, dt = 54_000, 0.1
+    level = np.cumsum(np.random.default_rng(2).random(n) < 1.0 / 9000.0) % 2
+    x = WhiteNoise(1e-4).simulate(n, dt, 2) + 1e-4 * level
+    rec = recording(x, 1.0 / dt)
+    fit = gmwm.calibrate(rec, WhiteNoise(), screening=(), remove_departures=True)["gyro_x"]
+    (notice,) = [one for one in fit.notices if one.code == "departures-many"]
+    assert notice.values["removed"] == len([n for n in fit.notices if n.values.get("evident")])
+    assert [name for name, holds in fit.reasons.items() if not holds] == ["stationary"]
+    # A slow term describes it, and nothing needs to be taken off.
+    assert gmwm.calibrate(rec, WhiteNoise() + RandomWalk(), screening=())["gyro_x"].valid

@@ -37,6 +37,22 @@ def test_models_are_those_of_the_whole(file):
     assert not found.is_examined
 
 
+@pytest.mark.parametrize("size", [0.3, 10.0])
+def test_a_change_of_level_within_a_gap_is_reported_as_a_step(tmp_path, size):
+    x = gmwm.simulate(gmwm.WhiteNoise(1e-4), n=20_000, dt=0.01, seed=3)
+    x[10_000:] += size * 1e-3
+    x[10_000:10_100] = np.nan
+    np.save(tmp_path / "gap.npy", x[:, None])
+    channels = {"gyro_x": 0}
+    found = gmwm.calibrate_stream(
+        tmp_path / "gap.npy", MODEL, rate=100, units=UNITS, channels=channels
+    )
+    assert not found["gyro_x"].reasons["stationary"]
+    (step,) = [n for n in found["gyro_x"].notices if n.code == "step"]
+    assert step.values["size"] == pytest.approx(size * 1e-3, rel=0.3)
+    assert step.values["time_lower"] <= 101.0 and step.values["time_upper"] >= 100.0
+
+
 def test_the_command_reads_blocks_beyond_its_memory(file, tmp_path):
     asked = ["calibrate", str(file), "--rate", "100", "--gyro-unit", "rad/s", "--accel-unit",
              "m/s^2", "--model", "N + K", "-q", "-o", str(tmp_path / "out")]  # fmt: skip

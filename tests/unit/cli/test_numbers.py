@@ -1,12 +1,11 @@
 """``gmwm bound``, ``gmwm reduce`` and ``gmwm certify``."""
 
 import json
-import sys
 
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, SensorNumbers, WhiteNoise, cli
+from gmwm import GaussMarkov, SensorNumbers, WhiteNoise
 from gmwm.cli.certify import _numbers
 
 MODELS = {
@@ -25,23 +24,6 @@ def calibration(tmp_path_factory):
     opened = {name: model.opened() for name, model in MODELS.items()}
     found = gmwm.calibrate(recording, opened, screening=())
     return found.save(tmp_path_factory.mktemp("calibration") / "calibration.json")
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, output, messages."""
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        return code, *capsys.readouterr()
-
-    return _run
 
 
 def test_bound_prints_and_saves_what_python_gives(run, calibration, tmp_path):

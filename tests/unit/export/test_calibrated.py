@@ -13,6 +13,7 @@ import gmwm
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.notices import Notice
 from gmwm.export import TARGETS
+from gmwm.filter_numbers import judged
 from gmwm.process import as_model
 from imu_numbers import numbers
 
@@ -352,6 +353,41 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     arw = np.radians(np.array(content["arw"][:2])) / 60.0
     assert arw == pytest.approx([found[f"gyro_{axis}"].N for axis in "xy"], rel=1e-5)
     assert "gmwm.reduce" not in gmwm.export(calibration, "kalibr")
+
+
+def table_of(text):
+    """Cells of the numbers of each axis in the comments of a file."""
+    rows = (line.lstrip("# ").split() for line in text.splitlines())
+    return {row[0]: row[1:] for row in rows if row and re.fullmatch("(gyro|accel)_[xyz]", row[0])}
+
+
+def test_the_table_has_the_one_correlation_time_of_the_file_and_what_it_costs(slow):
+    text = gmwm.export(slow, "kfgins")
+    content = yaml.safe_load(text)["imunoise"]
+    found = bound(slow, "N+GM", 60.0)
+    units = {"gyro": np.radians(1.0) / 3600.0, "accel": 1e-5}
+    for name, (_, sigma, tau, _, *nees) in table_of(text).items():
+        held = content["gbstd" if name[0] == "g" else "abstd"]["xyz".index(name[-1])]
+        assert float(tau) == pytest.approx(3600.0 * content["corrtime"], rel=1e-3)
+        assert float(sigma) == pytest.approx(held * units[name[:-2]], rel=1e-3)
+        # Those of the process in the file, which is wider than that of the axis by itself.
+        model = WhiteNoise(found[name].N) + GaussMarkov(float(sigma), float(tau))
+        expected = judged({name: slow[name]}, replace(found[name], model=model)).nees
+        assert [float(v) for v in nees] == pytest.approx(list(expected.values()), rel=0.01)
+        assert float(nees[0]) < found[name].nees[60.0]
+
+
+@pytest.mark.parametrize(("form", "target"), [("N+K", "kalibr"), ("N+GM", "kfgins")])
+def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
+    saved = gmwm.export(bound(slow, form, 60.0), target)
+    assert all("-" in cells or len(cells) == 4 for cells in table_of(saved).values())
+    assert "NEES is not known where the file holds other numbers" in saved
+    # The calibration, and numbers that the axes share, know it.
+    known = gmwm.export(slow, target, horizon=60.0)
+    assert not any("-" in cells for cells in table_of(known).values())
+    assert "NEES is not" not in known
+    if form == "N+K":
+        assert "NEES is not" not in gmwm.export(bound(slow, form, 60.0, shared=True), target)
 
 
 @pytest.mark.parametrize(

@@ -240,11 +240,21 @@ def test_what_is_left_out_and_is_not_small_is_a_warning():
     # A ramp that outgrows its constant, and quantization of an angle without white noise above it.
     ramp = WhiteNoise(1e-4) + RateRamp(1e-5)
     coarse = Model((QuantizationNoise(1e-2), RandomWalk(1e-6)))
-    for truth in (ramp, coarse, ONE, QuantizationNoise(1e-6) + ONE):
-        found = gmwm.bound({"gyro_x": truth})["gyro_x"]
+    # The angle by this line is back where it was after the horizon, and after ten.
+    line = ONE + Sinusoid(3e-4, 1.0 / 60.0)
+    large = [("gyro_x", ramp), ("gyro_x", coarse), ("gyro_z", line)]
+    for name, truth in [*large, ("gyro_x", ONE), ("gyro_x", QuantizationNoise(1e-6) + ONE)]:
+        found = gmwm.bound({name: truth})[name]
         warned = [n for n in found.notices if n.code == "optimistic"]
-        assert len(warned) == (max(found.nees.values()) > 1.05) == (truth in (ramp, coarse))
-        assert all(n.values["nees"] == max(found.nees.values()) for n in warned)
+        times = (6.0, 18.0, 60.0, 180.0, 600.0)
+        chain = Chain.usual("gyro" if name == "gyro_x" else "")
+        errors = chain.errors(truth, found.model, DT, times, believed_sd=found.initial_sd)
+        worst = int(np.argmax(errors.nees()))
+        assert len(warned) == (errors.nees()[worst] > 1.05) == ((name, truth) in large)
+        for notice in warned:
+            assert notice.values["time"] == pytest.approx(times[worst])
+            assert notice.values["nees"] == pytest.approx(errors.nees()[worst])
+    assert max(gmwm.bound({"gyro_z": line})["gyro_z"].nees.values()) < 1.0
 
 
 def test_a_loose_form_names_the_one_that_is_worth_its_state():

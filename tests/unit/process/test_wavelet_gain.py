@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.process import CATALOGUE
-from gmwm.process.spectral import wavelet_variance
+from gmwm.process.spectral import Panels, wavelet_variance
 from gmwm.process.wavelet_gain import gain_weights, lagrange, pair_weights, unit_legendre
 from gmwm.process.wavelets import NAMES, wavelet
 
@@ -207,3 +207,10 @@ def test_lagrange_polynomials_reproduce_polynomials_and_their_nodes():
     for degree in range(8):
         np.testing.assert_allclose(found @ nodes**degree, at**degree, atol=1e-12)
     np.testing.assert_array_equal(found[33:], np.eye(8))
+
+
+@pytest.mark.parametrize("degree", range(12))
+def test_a_panel_is_smooth_if_a_polynomial_of_low_degree_goes_through_its_points(degree):
+    points = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+    values = np.polynomial.chebyshev.chebval(points, np.eye(12)[degree]) + 0.1
+    assert Panels.are_smooth(values[None])[0] == (degree < 9)

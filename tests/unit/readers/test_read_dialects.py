@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.readers import read
+from gmwm.readers import read, read_blocks
+from gmwm.readers.clock import is_time_of_day
 from gmwm.readers.names import CANONICAL
 
 N = 100
@@ -163,7 +164,10 @@ MOMENTS = [FIRST + timedelta(milliseconds=5 * i) for i in range(400)]
     ("form", "zone", "delimiter"),
     [("%Y-%m-%dT%H:%M:%S,%f", "Z", ";"), ("%Y-%m-%dT%H:%M:%S.%f", "+02", ","),
      ("%Y%m%dT%H%M%S.%f", "Z", ","), ("%Y%m%dT%H%M%S,%f", "+0530", ";"),
-     ("%Y-%m-%dt%H:%M:%S.%f", "z", ",")],
+     ("%Y-%m-%dt%H:%M:%S.%f", "z", ","), ("%Y-%m-%d %H:%M:%S.%f", " UTC", ","),
+     ("%Y/%m/%d %H:%M:%S.%f", "", ","), ("%Y-%jT%H:%M:%S.%f", "Z", ","),
+     ("%Y%jT%H%M%S.%f", "Z", ","), ("%G-W%V-%uT%H:%M:%S.%f", "Z", ","),
+     ("%GW%V%uT%H%M%S.%f", "", ",")],
 )  # fmt: skip
 def test_forms_of_iso_dates(tmp_path, form, zone, delimiter):
     recording = dated(tmp_path, [each.strftime(form) + zone for each in MOMENTS], delimiter)
@@ -210,6 +214,27 @@ def test_the_change_of_summer_time_is_no_gap(tmp_path, hour, step):
     (notice,) = [each for each in recording.notices if each.code == "summer-time"]
     assert (notice.severity, notice.values["row"]) == ("warning", 4000)
     assert "line 4002" in notice.text
+
+
+@pytest.mark.parametrize("rows", [None, 700])
+def test_times_of_day_as_one_number_have_no_gap_at_the_minute(tmp_path, rows):
+    moments = [FIRST + timedelta(milliseconds=100 * i) for i in range(2000)]
+    kept = moments[:1000] + moments[1003:]  # passes midnight and three minutes
+    stamps = [each.strftime("%H%M%S.%f")[:-4] for each in kept]
+    recording = dated(tmp_path, stamps)
+    assert "time-of-day" in [notice.code for notice in recording.notices]
+    if rows:
+        parts = list(read_blocks(tmp_path / "log.csv", rows=rows))
+        values = np.concatenate([part["gyro_x"].values for part in parts])
+    else:
+        values = recording["gyro_x"].values
+    assert recording.dt == pytest.approx(0.1, rel=1e-6)
+    assert np.flatnonzero(np.isnan(values)).tolist() == [1000, 1001, 1002]
+
+
+@pytest.mark.parametrize("step", [50, 100, 25, 0.05])
+def test_plain_numbers_are_no_times_of_day(step):
+    assert not is_time_of_day(step * np.arange(1000.0))
 
 
 def test_an_hour_without_samples_stays_missing_in_utc(tmp_path):

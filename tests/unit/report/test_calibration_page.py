@@ -17,7 +17,7 @@ from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
 from gmwm._core.notices import Notice
 from gmwm.cli.hints import in_options
 from gmwm.plotting import COMPONENT_COLOURS
-from gmwm.report import write_report
+from gmwm.report import figure as figures, write_report
 from gmwm.report.answer import answer, trust
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import page
@@ -30,6 +30,7 @@ from gmwm.report.figure import (
 )
 from gmwm.report.health import health
 from gmwm.report.numbers import certified
+from gmwm.report.page import resource
 from gmwm.report.text import duration_text, needed, number
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
@@ -171,9 +172,11 @@ def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
     assert headings == [None, "health", "navigation", *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
-    # The name, and the reason where it is not valid.
+    # The name, and the findings where it is not valid.
     assert links == [
-        f"#{name}" for name, fit in calibration.items() for _ in range(1 if fit.valid else 2)
+        link
+        for name, fit in calibration.items()
+        for link in ([f"#{name}"] if fit.valid else [f"#{name}", "#health"])
     ]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
     overviews = 3  # gyros, accelerometers, others
@@ -335,7 +338,7 @@ def test_the_notes_of_the_error_budget(parsed, calibration):
 
 
 def test_what_is_not_valid_is_said_before_the_headline(parsed):
-    warned = parsed.text.index("The model is not valid, read its notices first: accel_x.")
+    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
     assert warned < parsed.text.index("A minute without aiding")
 
 
@@ -568,14 +571,20 @@ def test_the_axis_of_residuals_reaches_what_is_missed(calibration):
     assert set(figure["data"][0]["marker"]["symbol"]) == {"circle"}
 
 
-def test_lines_are_seen_on_white():
-    def light(colour):
+def test_lines_are_seen_on_white_and_on_dark_screens():
+    def light(colour, brighter=1.0):
         parts = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+        parts = np.minimum(brighter * parts, 1.0)
         parts = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
         return parts @ [0.2126, 0.7152, 0.0722]
 
-    for colour in COMPONENT_COLOURS:
+    style = resource("report.css")
+    dark = style[style.index("prefers-color-scheme: dark") :]
+    ground = light(re.search(r"--page: (#\w+)", dark)[1])
+    brighter = float(re.search(r"brightness\((.*?)\)", dark)[1])
+    for colour in (*COMPONENT_COLOURS, figures._FILTER, figures._SHEET):
         assert 1.05 / (light(colour) + 0.05) >= 3.0, colour
+        assert (light(colour, brighter) + 0.05) / (ground + 0.05) >= 4.5, colour
 
 
 # -- health and length ----------------------------------------------------------------------------
@@ -589,7 +598,7 @@ def issue(severity, text, where="gyro_x", **more):
 
 
 def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
-    values = {"evidence": 1e5, "time_lower": 283.6, "time_upper": 303.2}
+    values = {"evident": True, "removable": True, "time_lower": 283.6, "time_upper": 303.2}
     mend = "calibrate the part before it or after it, or take it off (remove_departures=True)"
     step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, mend)
     fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}
@@ -600,8 +609,23 @@ def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     assert first["text"] == "A step of +2.7 mg at 293 s"
     assert first["action"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
     assert second["severity"] == "warning"
-    reasons = {row["name"]: row["reason"] for row in answer(spoilt, certified(spoilt))["rows"]}
-    assert reasons["accel_x"] == "health"
+
+
+def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
+    missed = Notice("misfit", "bad", "", "the model misses the data by 40 %", action="add a term")
+    moved = Notice("not-static", "bad", "", "the sensor moved")
+    fits = {**calibration.fits, "gyro_x": replace(calibration["gyro_x"], notices=(missed, moved))}
+    for notices in ((LENGTH, moved), ()):
+        spoilt = replace(calibration, fits=fits, notices=notices)
+        rows = [(row["where"], row["text"]) for row in health(spoilt)["rows"]]
+        assert ("gyro_x", "The model misses the data by 40 %") in rows
+        # What is a finding of the recording is not said twice.
+        assert sum("moved" in text for _, text in rows) == 1
+        shown = page(spoilt)
+        assert '<a href="#health">the model misses the data</a>' in shown
+        assert ["bad", "gyro_x The model misses the data by 40 %", "Add a term"] in Page(
+            shown
+        ).cells
 
 
 def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
@@ -616,7 +640,9 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
     assert shown.text.startswith("Sensor error")
     (first,) = re.findall(r"Not healthy: .*? Length", shown.text)
     assert "; 1 severe issue (accel_x); 1 warning (gyro_x)." in first
-    assert "1 severe issue, 1 warning and 1 note." in shown.text
+    # With those for which fits are not valid.
+    severe = 1 + sum(n.severity == "bad" for fit in calibration.values() for n in fit.notices)
+    assert f"{severe} severe issues, 1 warning and" in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)
     folded = shown.text.index("What was looked at and is fine")
@@ -638,7 +664,9 @@ def test_what_was_not_examined_says_so(calibration):
     shown = Page(page(replace(calibration, notices=notices)))
     assert "was not examined" in shown.text
     assert "column not used: 'temp'" in shown.text
-    harmless = Page(page(replace(calibration, notices=(LENGTH, issue("good", "fine")))))
+    fits = {name: fit for name, fit in calibration.items() if fit.valid}
+    harmless = replace(calibration, fits=fits, notices=(LENGTH, issue("good", "fine")))
+    harmless = Page(page(harmless))
     assert "Nothing was found that spoils the estimates." in harmless.text
 
 

@@ -7,6 +7,7 @@ from scipy import signal
 import gmwm
 from gmwm import AveragedNoise, Channel, LowPassNoise, RandomWalk, WhiteNoise
 from gmwm.calibration import noise_density
+from gmwm.selection import tuning
 from gmwm.selection.bandwidth import sensor_bandwidth
 
 DT, N = 0.01, 1e-3
@@ -76,8 +77,10 @@ def test_plain_white_noise_is_not_taken_for_filtered():
         assert sensor_bandwidth(wv, (), 7.0) is None
 
 
-def test_a_moving_average_is_found_by_its_window():
+def test_a_moving_average_is_found_by_its_window(monkeypatch):
     wv = gmwm.wavelet_variance(filtered(np.ones(7) / 7, [1.0], 4), dt=DT)
     found = sensor_bandwidth(wv, (), 7.0)
     assert found is not None
     assert found.free == AveragedNoise(window=0.07)
+    monkeypatch.setattr(tuning, "BANDWIDTH_GAIN", 1e6)
+    assert sensor_bandwidth(wv, (), 7.0) is None

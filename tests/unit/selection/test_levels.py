@@ -20,6 +20,14 @@ def test_a_walk_stays_where_the_model_without_it_misses_a_level(seed):
     assert fit.valid and fit.params["K"] > 0.0
 
 
+def test_a_walk_that_predictions_of_minutes_feel_is_not_the_simpler_choice():
+    """It ties with a Gauss-Markov process of 300 s under weights of its own, 68 % off at 1024 s."""
+    x = (WhiteNoise(1.0) + GaussMarkov(0.3, 300.0)).simulate(8192, 1.0, 29)
+    fit = gmwm.select(x, dt=1.0, max_gauss_markov=2).fit
+    assert gmwm.fit(WhiteNoise() + RandomWalk(), fit.wv).goodness.is_poor
+    assert fit.valid and set(fit.params) == {"N", "sigma", "tau"}
+
+
 def test_a_slope_that_a_walk_explains_as_well_is_reported_with_both_numbers():
     # 8 standard errors of a slope under white noise alone: K of 3.5e-6 does the same in an hour.
     slope = 8.0 * np.sqrt(12e-6 / 3600.0**3)

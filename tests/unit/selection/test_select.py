@@ -56,6 +56,7 @@ def test_ranking_is_sorted_and_printed():
     assert lines[0].split() == ["difference", "objective", "p-value", "param.", "model"]
     assert sum(line.startswith(">") for line in lines) == 1
     assert max(map(len, lines)) <= 80
+    assert any(line[1] == "=" for line in lines[1:]) == (len(selection.ties) > 1)
     assert selection[0].model in [item.model for item in selection]
 
 
@@ -108,6 +109,8 @@ def test_several_recordings_have_one_model():
     selection = gmwm.select(parts, dt=1.0)
     assert selection.model.title() == "white noise + 2 Gauss-Markov"
     assert len(selection.fit.parts) == 3
+    again = gmwm.Selection.from_dict(selection.to_dict())
+    assert len(again.fit.parts) == 3 and again.fit.params == selection.fit.params
 
 
 def test_no_random_walk_is_invented():
@@ -145,6 +148,8 @@ def test_merging_stops_where_it_must():
     x = np.random.default_rng(1).normal(size=60)
     selection = gmwm.select(x, dt=1.0, rule="merge", max_gauss_markov=2)
     assert all(len(item.model.terms) <= 3 for item in selection)
+    longer = gmwm.select(np.tile(x, 2)[:64], dt=1.0, rule="merge", max_gauss_markov=2)
+    assert any(len(item.model.terms) == 3 for item in longer)  # five parameters of six levels
     # White noise that is not there is no reason to leave Gauss-Markov processes out.
     slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 50_000, 1.0, 2)
     kept = gmwm.select(slow, dt=1.0, rule="merge").model

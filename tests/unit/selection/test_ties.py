@@ -140,6 +140,11 @@ class TestSelection:
         said = wider_ranges(tied.fit, wide)
         assert len(said) == len(wide)
         assert all(" rather than " in words for words in said)
+        low, high = tied.fit.interval()["N"]
+        assert (
+            said[0]
+            == f"N {0.5 * low:.3g} to {2 * high:.3g} u/sqrt(Hz) rather than {low:.3g} to {high:.3g}"
+        )
         slightly = {
             key: (low, high + 0.1 * (high - low))
             for key, (low, high) in tied.fit.interval().items()

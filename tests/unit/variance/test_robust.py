@@ -12,7 +12,12 @@ from scipy.stats import binom, chi2, norm
 import gmwm
 from gmwm.errors import InputError
 from gmwm.variance.covariance.haar import dyadic_levels, haar_counts, haar_covariance
-from gmwm.variance.covariance.robust import excess_series, pair_shares, robust_covariance
+from gmwm.variance.covariance.robust import (
+    _semidefinite,
+    excess_series,
+    pair_shares,
+    robust_covariance,
+)
 from gmwm.variance.kernels import cumulative, haar_coefficients
 from gmwm.variance.robust import consistency, robust_variance, tuning_constant
 from gmwm.variance.robust_kernels import middle_bin
@@ -446,3 +451,9 @@ def test_clean_data_agree_with_the_classical_estimates():
         # The classical estimate is efficient: the difference has the difference of variances.
         more = np.diag(robust_covariance(process.psd, n, 1.0, 0.6, classical) - classical)[:12]
         assert np.all(np.abs(both[:, 1] - both[:, 0]) < 4.0 * np.sqrt(more))
+
+
+def test_a_matrix_with_a_negative_eigenvalue_loses_it():
+    np.testing.assert_allclose(_semidefinite(np.array([[1.0, 2.0], [2.0, 1.0]])), 1.5)
+    definite = np.array([[2.0, 1.0], [1.0, 2.0]])
+    assert _semidefinite(definite) is definite

@@ -181,8 +181,8 @@ def conclude(
         error_growth=growth,
     )
     shown = missed_level_notices(fit.goodness)
-    if misfits:
-        shown += misfit_notices(fit.goodness, discrepancy)
+    if misfits or fit.goodness.is_poor:
+        shown += misfit_notices(fit.goodness, discrepancy, failed=misfits)
     return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
 
 

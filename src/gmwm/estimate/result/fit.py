@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -16,10 +15,10 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import Printed, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.errors import InputError, MissingNameError
+from gmwm.errors import MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key
 from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
 from gmwm.estimate.result.goodness import Goodness
@@ -48,7 +47,7 @@ METHOD_NAMES = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(Document):
+class Fit(Document, Printed):
     """An estimated error model of one channel.
 
     ``fit["tau_1"]`` is the `Estimate` of one parameter.
@@ -319,9 +318,6 @@ class Fit(Document):
         verdict = "valid" if self.valid else "not valid"
         return f"<{type(self).__name__} {self.model!r}, {METHOD_NAMES[self.method]}, {verdict}>"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
     def __str__(self) -> str:
         lines = wrapped(f"{self.wv.name or 'series'}: {self.model.title()}", indent=2)
         lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {self._how()}", indent=2)
@@ -382,20 +378,6 @@ class Fit(Document):
                 region.slope, factor * region.coefficient, region.tau_min, region.tau_max
             )  # fmt: skip
         return lines
-
-    def plot_trace(self, ax: Axes | None = None) -> Axes:
-        """Log-likelihood against the iterations of EM; returns the axes.
-
-        Raises
-        ------
-        InputError
-            If the fit was not made by EM.
-        """
-        from gmwm import plotting
-
-        if not self.trace:
-            raise InputError(f"a fit by {self.method!r} has no iterations to show")
-        return plotting.trace(np.array(self.trace), ax=ax)
 
     # -- tables and files -------------------------------------------------------------------------
 

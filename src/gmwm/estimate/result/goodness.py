@@ -166,8 +166,11 @@ class Goodness:
 
     @property
     def misses_a_level(self) -> bool:
-        """Whether the model misses some level by more than one in a hundred right models does."""
-        return self.largest_p < tuning.REDUNDANT_P
+        """Whether the model misses some level by more than one in a hundred right models does.
+
+        Or by what predictions feel: see `is_poor`.
+        """
+        return self.largest_p < tuning.REDUNDANT_P or self.is_poor
 
     def loses_to(self, larger: Goodness) -> bool:
         """Whether it misses an averaging time that a larger model describes.
@@ -179,7 +182,7 @@ class Goodness:
     @property
     def describes_all(self) -> bool:
         """Whether the model is seen to miss no level, to one in a hundred."""
-        return self.largest_p >= tuning.REDUNDANT_P
+        return self.largest_p >= tuning.REDUNDANT_P and not self.is_poor
 
     @property
     def sentence(self) -> str:

@@ -43,6 +43,7 @@ REASONS = {
     "transient": "stationary",
     "drift-at-start": "stationary",
     "slow-period": "stationary",
+    "departures-many": "stationary",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
@@ -194,10 +195,17 @@ def undetermined_notices(model: Model, keys: Sequence[str], matrix: FloatArray) 
     ]  # fmt: skip
 
 
-def misfit_notices(goodness: Goodness, discrepancy: float) -> list[Notice]:
-    """What it means for prediction that a model fails the chi-square test.
+def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> list[Notice]:
+    """What it means for prediction that a model misses an averaging time.
 
-    ``discrepancy`` is the relative error of the variances that was allowed for.
+    Parameters
+    ----------
+    goodness : Goodness
+    discrepancy : float
+        Relative error of the variances that was allowed for.
+    failed : bool
+        Whether the chi-square test failed. If not, a misfit is bad that one in twenty right models
+        has at any level, and else a warning.
     """
     beyond = goodness.beyond_chance
     if beyond is None:
@@ -211,7 +219,10 @@ def misfit_notices(goodness: Goodness, discrepancy: float) -> list[Notice]:
             f"predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
             f"model's Allan deviation, by {abs(residual):.2g} standard errors"
         )
-        return [Notice("misfit", "bad", "", text, values)]
+        if failed or goodness.largest_p < tuning.POOR_P:
+            return [Notice("misfit", "bad", "", text, values)]
+        text += f", which {100.0 * goodness.largest_p:.0f} % of right models have at some level"
+        return [Notice("misfit", "warning", "", text, values)]
     text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
     text += ", which the intervals allow for" if discrepancy > 0.0 else ""
     return [Notice("misfit", "note", "", text, values)]

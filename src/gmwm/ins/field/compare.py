@@ -10,86 +10,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.distributions import norm, student as t
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured, MeasuredSpec
+from gmwm.ins.field.outcome import PARTS, Outcome, Paired, by_part, paired, true_squares
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import Smoothed, smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
-from gmwm.ins.montecarlo import InnovationTest, Ratio, mean_ratio
+from gmwm.ins.montecarlo import mean_ratio
 from gmwm.ins.spec import read_models
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_PARTS = {"horizontal": (0, 1), "vertical": (2,)}
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """How the filter with one sensor model came through the outages.
-
-    Attributes
-    ----------
-    error : (K, 3) ndarray
-        Estimate at the end of each outage less the smoothed position: north, east, down, m.
-    variance : (K, 3, 3) ndarray
-        Of these, as predicted, m^2: by as much as the covariance of the smoothed position less
-        than that of the filter, since what both have in common cancels.
-    reference_variance : (3,) ndarray
-        Mean of the variances of the smoothed positions, m^2.
-    rms : dict
-        Root mean square of the true errors by part, m: the uncertainty of the reference included.
-    predicted : dict
-        The same as the filter predicted.
-    nees : Ratio
-        Per degree of freedom.
-    score : (K,) ndarray
-        Negative logarithm of the predicted density at the reference; less is better.
-    nis : InnovationTest
-        Of the whole log.
-    """
-
-    error: FloatArray
-    variance: FloatArray
-    reference_variance: FloatArray
-    rms: dict[str, float]
-    predicted: dict[str, float]
-    nees: Ratio
-    score: FloatArray
-    nis: InnovationTest
-
-
-@dataclass(frozen=True)
-class Paired:
-    """Errors of one model over those of another, outage by outage.
-
-    Attributes
-    ----------
-    ratio, lower, upper : float
-        Ratio of the root mean squares and its interval.
-    p_value : float
-        Of equal errors.
-    score, score_p_value : float
-        Mean difference of the scores, and the p-value of none.
-    error : float
-        Standard error of the logarithm of the ratio.
-    """
-
-    ratio: float
-    lower: float
-    upper: float
-    p_value: float
-    score: float
-    score_p_value: float
-    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +97,10 @@ class Comparison:
 
         def beats(a: str, b: str) -> str:
             pair = self.pairs[a, b]
-            size = abs(np.log(pair.ratio))
-            if pair.p_value < tuning.ACCURACY_LEVEL / share and size > tuning.TIE_RATIO:
+            if pair.p_value < tuning.ACCURACY_LEVEL / share:
                 return "better" if pair.ratio < 1.0 else ""
-            honest = pair.score < -tuning.TIE_SCORE
-            if honest and pair.score_p_value < tuning.SCORE_LEVEL / share:
-                return "more-honest"
-            return ""
+            honest = pair.score_p_value < tuning.SCORE_LEVEL / share
+            return "more-honest" if honest and pair.score < 0.0 else ""
 
         unbeaten = [a for a in names if not any(beats(b, a) for b in names if b != a)]
         values: dict[str, Any] = {"models": ", ".join(unbeaten), "resolved": self.resolved,
@@ -193,17 +129,18 @@ class Comparison:
     @property
     def resolved(self) -> float:
         """Ratio of errors that is found with a probability of 95 %; the best of all pairs."""
-        return float(np.exp(-self._factor * max(pair.error for pair in self.pairs.values())))
+        return float(np.exp(-tuning.TIE_RATIO - self._beyond))
 
     @property
     def length_needed(self) -> float:
         """Length of such a log in which a ratio of 0.9 is found with 95 %, s."""
-        error = max(pair.error for pair in self.pairs.values())
-        return self.duration * float((self._factor * error / np.log(tuning.WORTH)) ** 2)
+        return self.duration * (self._beyond / (-np.log(tuning.WORTH) - tuning.TIE_RATIO)) ** 2
 
     @property
-    def _factor(self) -> float:
-        return float(norm.isf(0.5 * tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
+    def _beyond(self) -> float:
+        """How much more than what matters the logarithm of a ratio must be to be found."""
+        error = max(pair.error for pair in self.pairs.values())
+        return error * float(norm.isf(tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types."""
@@ -238,7 +175,7 @@ class Comparison:
                 name: (np.linalg.norm(each.error[:, axes], axis=1), each.predicted[part])
                 for name, each in self.outcomes.items()
             }
-            for part, axes in _PARTS.items()
+            for part, axes in PARTS.items()
         }
         pairs = {f"{name} / {first}": self.pairs[name, first] for name in others}
         ratios = {what: (pair.ratio, pair.lower, pair.upper) for what, pair in pairs.items()}
@@ -261,7 +198,7 @@ class Comparison:
         ]  # fmt: skip
         for name, each in self.outcomes.items():
             parts = "  ".join(
-                f"{each.rms[part]:>8.4g} ({each.predicted[part]:>7.4g})" for part in _PARTS
+                f"{each.rms[part]:>8.4g} ({each.predicted[part]:>7.4g})" for part in PARTS
             )
             mark = " " if each.nees.within else "*"
             nis = each.nis.nis.value
@@ -330,9 +267,9 @@ def compare(
         name: _outcome(name, replay, smoothed[name], lla, passes, every)
         for name, replay in replays.items()
     }
-    scale = np.mean([_true_squares(each) for each in outcomes.values()], axis=(0, 1))
+    scale = np.mean([true_squares(each) for each in outcomes.values()], axis=(0, 1))
     pairs = {
-        (a, b): _paired(outcomes[a], outcomes[b], scale)
+        (a, b): paired(outcomes[a], outcomes[b], scale)
         for a in outcomes for b in outcomes if a != b
     }  # fmt: skip
     return Comparison(measured.title, every, outcomes, pairs, duration, measured.notices)
@@ -395,57 +332,21 @@ def _outcome(
     covariance = np.array([found[each.end][1] for each in every])
     error = ned_difference(estimate, lla)
     variance = covariance - smoothed.covariance
+    predicted = np.einsum("kii->ki", covariance)
     # Rounding, and a filter that is no better with all fixes than without, must not make it zero.
-    floor = tuning.LEAST_SHARE * np.einsum("kii->ki", covariance)
+    floor = tuning.LEAST_SHARE * predicted
     variance = variance + np.einsum(
         "ki,ij->kij", np.maximum(floor - np.einsum("kii->ki", variance), 0.0), np.eye(3)
     )
     squares = np.einsum("ki,ki->k", error, np.linalg.solve(variance, error[..., None])[..., 0])
     reference = np.mean(np.einsum("kii->ki", smoothed.covariance), axis=0)
-    total = error**2 + reference
-    predicted = np.einsum("kii->ki", covariance)
     return Outcome(
         error=error,
         variance=variance,
         reference_variance=reference,
-        rms={p: float(np.sqrt(np.mean(np.sum(total[:, i], axis=1)))) for p, i in _PARTS.items()},
-        predicted={
-            p: float(np.sqrt(np.mean(np.sum(predicted[:, i], axis=1)))) for p, i in _PARTS.items()
-        },
+        rms=by_part(error**2 + reference),
+        predicted=by_part(predicted),
         nees=mean_ratio(squares / 3.0),
         score=0.5 * (squares + np.linalg.slogdet(variance)[1]),
         nis=replay.test(),
     )
-
-
-def _true_squares(outcome: Outcome) -> FloatArray:
-    return np.asarray(outcome.error**2 + outcome.reference_variance)
-
-
-def _paired(first: Outcome, second: Outcome, scale: FloatArray) -> Paired:
-    """Ratio of the errors, each component in units of its usual size, by the delta method."""
-    a = np.sum(_true_squares(first) / scale, axis=1)
-    b = np.sum(_true_squares(second) / scale, axis=1)
-    log = 0.5 * float(np.log(np.mean(a) / np.mean(b)))
-    part = 0.5 * (a / np.mean(a) - b / np.mean(b))
-    count = part.size
-    error = float(np.std(part, ddof=1) / np.sqrt(count))
-    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, count - 1)) * error
-    difference = first.score - second.score
-    score_error = float(np.std(difference, ddof=1) / np.sqrt(count))
-    mean = float(np.mean(difference))
-    return Paired(
-        ratio=float(np.exp(log)),
-        lower=float(np.exp(log - width)),
-        upper=float(np.exp(log + width)),
-        p_value=_two_sided(log, error, count),
-        score=mean,
-        score_p_value=_two_sided(mean, score_error, count),
-        error=error,
-    )
-
-
-def _two_sided(value: float, error: float, count: int) -> float:
-    if error == 0.0:
-        return 1.0 if value == 0.0 else 0.0
-    return float(2.0 * t.sf(abs(value) / error, count - 1))

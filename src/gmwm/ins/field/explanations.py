@@ -112,7 +112,7 @@ _ARM = Constant(
     tuning.LARGEST_ARM,
 )  # fmt: skip
 _HEADING = Constant(
-    "heading", ("heading",), lambda r, x: r.turned(float(x[0])), 0.01, 0.5 * np.pi
+    "heading", ("heading",), lambda r, x: r.turned_by(float(x[0])), 0.01, 0.5 * np.pi
 )  # fmt: skip
 TOGETHER = ((_CLOCK,), (_ARM,), (_HEADING,), (_CLOCK, _ARM))
 """What is tried. Along a straight track at constant speed a time offset is a lever arm, so that one
@@ -144,12 +144,12 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
 def far_heading(base: Replay) -> Candidate:
     """A heading that is wrong by much, as of an IMU that is mounted rotated."""
     angles = np.arange(1, tuning.HEADINGS) * (2.0 * np.pi / tuning.HEADINGS)
-    tried = [base.turned(float(angle), tuning.ROUGH_HEADING) for angle in angles]
+    tried = [base.turned_by(float(angle), tuning.ROUGH_HEADING) for angle in angles]
     best = int(np.argmax([each.log_likelihood for each in tried]))
     angle = float(angles[best])
 
     def refined() -> tuple[Explanation, ...]:
-        return _fitted(base, base.turned(angle, tuning.FINE_HEADING), (_HEADING,), angle)
+        return _fitted(base, base.turned_by(angle, tuning.FINE_HEADING), (_HEADING,), angle)
 
     return Candidate(frozenset({"heading"}), difference(tried[best], base), refined)
 

@@ -13,33 +13,52 @@ from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import LEVEL, Candidate, Explanation, cost, difference
 from gmwm.ins.field.replay import Replay
-from gmwm.ins.filter import KINDS
+from gmwm.ins.filter import KINDS, FilterInnovations
 
 Scaling = Callable[[Replay, float], Replay]
 """A log with a standard deviation times the exponential of a number."""
 
 
 def outliers(base: Replay) -> Candidate | None:
-    """Few fixes that are far off: those that a gate rejects when they come."""
-    total = base.innovations.kind.size
-    aiding = replace(base.aiding, gate=LEVEL / max(total, 1))
-    gated = replace(base, aiding=aiding).innovations
-    count = int(np.count_nonzero(~gated.used))
+    """Few fixes that are far off: those that a gate rejects when they come.
+
+    Where it rejects the first one, the fix that made the initial state may be the outlier.
+    """
+    gated = _gated(base)
+    found = [_left_out(base, base, gated)]
+    if gated.kind.size and not gated.used[np.argmax(gated.kind == KINDS["position"])]:
+        start = base.anywhere()
+        found.append(_left_out(base, start, _gated(start)))
+    best = max((each for each in found if each), key=lambda each: each.excess, default=None)
+    return best and Candidate(frozenset({"outliers"}), best.gain, lambda: (best,))
+
+
+def _gated(start: Replay) -> FilterInnovations:
+    gate = LEVEL / max(start.innovations.kind.size, 1)
+    return replace(start, aiding=replace(start.aiding, gate=gate)).innovations
+
+
+def _left_out(base: Replay, start: Replay, gated: FilterInnovations) -> Explanation | None:
+    """What a gate rejected left out, and the first fix if the start is not that of ``base``."""
+    total, first = gated.kind.size, int(start is not base)
+    count = int(np.count_nonzero(~gated.used)) + first
     if not 0 < count <= tuning.MOST_OUTLIERS * total + 1.0:
         return None
     rejected = {kind: ~gated.used[gated.kind == KINDS[kind]] for kind in base.kinds()}
-    here = base.without(rejected)
+    here = start.without(rejected)
     # Each is as if its error were a parameter: it costs no density, but for its size.
     log_sd = float(np.nansum(np.log(gated.sd[~gated.used])))
-    gain = here.log_likelihood - log_sd - base.log_likelihood
     most = max(rejected, key=lambda kind: np.count_nonzero(rejected[kind]))
     values = {"count": float(count), "fraction": float(np.mean(rejected[most])),
-              "time": float(gated.time[~gated.used][0])}  # fmt: skip
-    found = Explanation(
-        "outliers", most, lambda replay: replay.without(rejected), here, gain,
+              "time": 0.0 if first else float(gated.time[~gated.used][0])}  # fmt: skip
+
+    def change(replay: Replay) -> Replay:
+        return (replay.anywhere() if first else replay).without(rejected)
+
+    return Explanation(
+        "outliers", most, change, here, here.log_likelihood - log_sd - base.log_likelihood,
         count * cost(3, total), values,
     )  # fmt: skip
-    return Candidate(frozenset({"outliers"}), gain, lambda: (found,))
 
 
 def fix_noise(base: Replay) -> Iterator[Candidate]:

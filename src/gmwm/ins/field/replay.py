@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
+from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.start import Alignment, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
@@ -37,6 +38,8 @@ class Replay:
     stood : float
         Time at rest of which the gyros' mean is subtracted, s; their ``bias_sd`` is how well it is
         known then. 0 if there is none.
+    turned : float
+        Time over which the gyros turned the heading back to the start, s.
     """
 
     imu: Imu
@@ -45,6 +48,7 @@ class Replay:
     models: SensorModels
     aiding: Aiding
     stood: float = 0.0
+    turned: float = 0.0
 
     @classmethod
     def of(cls, measured: Measured, alignment: Alignment) -> Replay:
@@ -60,7 +64,9 @@ class Replay:
         if alignment.gyro_bias_sd is not None:
             known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
             models = replace(models, bias_sd={**models.bias_sd, **known})
-        return cls(imu, alignment.state, alignment.sd, models, aiding, alignment.stood)
+        return cls(
+            imu, alignment.state, alignment.sd, models, aiding, alignment.stood, alignment.turned
+        )
 
     # -- what comes of it -------------------------------------------------------------------------
 
@@ -132,13 +138,17 @@ class Replay:
             self, state=replace(self.state, lla=lla), aiding=replace(self.aiding, lever_arm=arm)
         )
 
-    def turned(self, by: float, sd: float | None = None) -> Replay:
+    def turned_by(self, by: float, sd: float | None = None) -> Replay:
         """An initial heading farther by an angle, rad, known to ``sd``."""
         rpy = self.state.rpy + np.array([0.0, 0.0, by])
         heading = self.sd.heading if sd is None else sd
         return replace(
             self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
         )
+
+    def anywhere(self) -> Replay:
+        """A start that the first fix does not show: it is an outlier."""
+        return replace(self, sd=replace(self.sd, position=tuning.ANYWHERE))
 
     def with_fixes_scaled(self, factor: float, kind: str) -> Replay:
         """Standard deviations of the fixes of a kind times ``factor``, the first one's too."""
@@ -166,15 +176,22 @@ class Replay:
                     _scaled(term, factor) if term.is_white is white else term for term in terms
                 ))  # fmt: skip
                 bias[axis] *= 1.0 if white or averaged else factor
-        scaled = SensorModels(models, bias)
+        scaled, sd = SensorModels(models, bias), self.sd
         if averaged:
-            # The mean at rest is as far off as the noise makes it, not as the constant was.
+            # The mean at rest, and the heading that was turned back less it, are as far off as the
+            # noise makes them, not as the constant was.
             before, after = (
                 mean_sd(each, kind, self.stood, self.imu.dt) for each in (self.models, scaled)
             )
+
+            def instead(known: float, time: float = 1.0) -> float:
+                rest = max(known**2 - (time * before) ** 2, 0.0)
+                return float(np.hypot(np.sqrt(rest), time * after))
+
             for axis in AXES[:3]:
-                bias[axis] = float(np.sqrt(max(bias[axis] ** 2 - before**2, 0.0) + after**2))
-        return replace(self, models=SensorModels(models, bias))
+                bias[axis] = instead(bias[axis])
+            sd = replace(sd, heading=instead(sd.heading, self.turned))
+        return replace(self, models=SensorModels(models, bias), sd=sd)
 
     def without(self, rejected: dict[str, npt.NDArray[np.bool_]]) -> Replay:
         """Without some fixes; a mask for each kind."""

@@ -10,7 +10,7 @@ from gmwm.ins.filter.covariance_kernels import (
     transition,
 )
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, modified, navigate, unmodified
-from gmwm.ins.filter.filter_kernels import (
+from gmwm.ins.filter.measurement_kernels import (
     IS_HEIGHT,
     IS_POSITION,
     IS_VELOCITY,

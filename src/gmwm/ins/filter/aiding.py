@@ -14,7 +14,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.filter_kernels import IS_HEIGHT, IS_POSITION, IS_STANDSTILL, IS_VELOCITY
+from gmwm.ins.filter.measurement_kernels import IS_HEIGHT, IS_POSITION, IS_STANDSTILL, IS_VELOCITY
 from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import matrix_from_rpy, offset
 from gmwm.ins.imu import Imu

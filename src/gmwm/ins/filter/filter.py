@@ -17,7 +17,8 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
-from gmwm.ins.filter.filter_kernels import IS_POSITION, KINDS, PAUSED, run
+from gmwm.ins.filter.filter_kernels import PAUSED, run
+from gmwm.ins.filter.measurement_kernels import IS_POSITION, KINDS
 from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
 from gmwm.ins.geometry import matrix_from_rpy

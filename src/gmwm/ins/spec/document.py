@@ -50,6 +50,7 @@ def read_document(path: Path) -> dict[str, Any]:
 def _load(text: str) -> Any:
     import yaml
 
+    # PyYAML has no types of its own; with types-PyYAML installed there is nothing to ignore.
     class Strict(yaml.SafeLoader):  # type: ignore[misc,unused-ignore]
         """YAML lets a later key replace an earlier one; two filters of one name are a slip."""
 

@@ -18,7 +18,6 @@ from gmwm.ins.covariance import reduce
 from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
 from gmwm.ins.imu import Recorded, SensorModels, emulate
 from gmwm.ins.montecarlo import ErrorSource, Experiment, Scenario, Simulated
-from gmwm.ins.spec.document import read_document
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     REDUCED,
@@ -193,17 +192,6 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
         seed=spec.seed,
         title=Path(spec.trajectory).name,
     )
-
-
-def read_experiment(path: Path) -> Mapping[str, Any]:
-    """Content of a YAML file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is not YAML.
-    """
-    return read_document(path)
 
 
 def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:

@@ -13,7 +13,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.clock import agree
+from gmwm.readers.clock import agree, is_time_of_day, seconds_of_day
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.reader import read_table, roles_of, tables_of
 from gmwm.readers.recording import Recording
@@ -99,14 +99,20 @@ def read_blocks(
         )
     table = cast(_Divisible, tables[0])
     first: Recording | None = None
-    end: float | None = None  # time stamp of the last row, in the unit of the column
+    since: FloatArray | None = None  # time stamps of a part and the last one before it
+    end: FloatArray | None = None
+    of_day = False
     done = 0
     for arrays, stamps in _segments(table, rate, units or {}, channels, time, rows):
         found = read_table(_Segment(table, arrays, done), rate, units or {}, channels, time)
         if first is None:
             first = found
-        found = _on_the_grid(found, first, stamps, end, done)
-        end = None if stamps is None else float(stamps[-1])
+        if stamps is not None:
+            of_day = of_day or is_time_of_day(stamps)
+            since = None if end is None else np.append(end, stamps)
+            since = seconds_of_day(since) if of_day and since is not None else since
+            end = stamps[-1:]
+        found = _on_the_grid(found, first, since, done)
         done += next(iter(arrays.values())).size
         yield found
 
@@ -138,8 +144,7 @@ def _segments(
 def _on_the_grid(
     found: Recording,
     first: Recording,
-    stamps: FloatArray | None,
-    end: float | None,
+    since: FloatArray | None,
     rows: int,
 ) -> Recording:
     """A part with the rows that are missing between it and the one before."""
@@ -149,9 +154,9 @@ def _on_the_grid(
             f"{found.rate:.6g} Hz about row {rows:,}: cut the file there"
         )
     missing = 0
-    if stamps is not None and end is not None:
-        step = (stamps[-1] - stamps[0]) / (found.n - 1)
-        missing = round((stamps[0] - end) / step) - 1
+    if since is not None:
+        step = (since[-1] - since[1]) / (found.n - 1)
+        missing = round((since[1] - since[0]) / step) - 1
         if missing < -tuning.ROWS_BACK_OF_BLOCK:
             raise InputError(
                 f"{first.source}: time stamps go back about row {rows:,}: cut the file there"

@@ -14,30 +14,33 @@ from numpy.typing import NDArray
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
-from gmwm.variance.kernels import summed, summed_with_moments
+from gmwm.variance.streaming.window_kernels import (
+    ANY_ORDER,
+    FINE,
+    HIGHEST,
+    LOST_SUM,
+    LOWEST,
+    REFERENCE,
+    SUM,
+    add,
+    complete_windows,
+    gappy_windows,
+    total,
+)
 
 STARTS = tuning.STREAMING_STARTS
-FINE = STARTS.bit_length()  # levels of single samples: 1, 2, 4, ... STARTS
 HALO = 2 * STARTS - 1
 CHUNK = 4096
 ROOM = HALO + 2 * CHUNK  # of a row: less than a chunk, and half of what the row before had
 MOST_BLOCKS = 2 * tuning.MOST_BLOCKS
-EDGE = tuning.STREAMING_EDGE
-LEAST_EDGE = tuning.STREAMING_LEAST_EDGE
-LEAST = tuning.STREAMING_LEAST
 
-COUNT, MEAN, SQUARE, SCARCITY, LOST_MEAN, LOST_SQUARE = range(6)  # of `sums`
 N, MISSING, RUN, LEADING, BLOCKS, OCTAVE, NEXT_BLOCK, START = range(8)  # of `tallies`
 FILLED, ORIGIN, GAPPY, HEADED, OLD = range(5)  # of `state`
-REFERENCE, LOWEST, HIGHEST, SUM, LOST_SUM, FOURTH, LOST_FOURTH = range(7)  # of `totals`
 
 IntArray = NDArray[np.int64]
 
-# Sums in any order, so that they run on vector registers.
-_ANY_ORDER = {"reassoc", "contract", "nsz"}
 
-
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def _centred(out: FloatArray, samples: FloatArray, reference: float) -> float:
     total = 0.0
     for i in range(out.size):
@@ -55,131 +58,6 @@ def _range(values: FloatArray) -> tuple[float, float]:
         low = min(low, values[i])
         high = max(high, values[i])
     return low, high
-
-
-@compiled(fastmath=_ANY_ORDER)
-def _total(values: FloatArray) -> float:
-    total = 0.0
-    for i in range(values.size):
-        total += values[i]
-    return total
-
-
-@compiled(fastmath=_ANY_ORDER)
-def _fourth(values: FloatArray) -> float:
-    total = 0.0
-    for i in range(values.size - 1):
-        square = (values[i + 1] - values[i]) ** 2
-        total += square * square
-    return total
-
-
-@compiled()
-def _add(array: FloatArray, place: int, lost: int, value: float) -> None:
-    """Add with what earlier additions lost (Neumaier 1974)."""
-    before = array[place]
-    after = before + value
-    if abs(before) >= abs(value):
-        array[lost] += (before - after) + value
-    else:
-        array[lost] += (value - after) + before
-    array[place] = after
-
-
-@compiled()
-def complete_windows(
-    values: FloatArray,
-    new: int,
-    row: int,
-    sums: FloatArray,
-    totals: FloatArray,
-    scratch: FloatArray,
-) -> None:
-    """Sum up the windows that end at place ``new`` or later, of values none of which is missing.
-
-    Sums of 2 m values are those of m values, m apart: nothing cancels.
-    """
-    number = values.size
-    now = values
-    m = 1
-    for level in range(FINE):
-        count = number - 2 * m + 1
-        if count <= 0:
-            return
-        following = scratch[level % 2, :count]
-        if row == 0 or level == FINE - 1:
-            begin = max(new - 2 * m + 1, 0)
-            summed(following[:begin], now[:begin], now[m : m + begin])
-            mean, square = summed_with_moments(
-                following[begin:], now[begin:count], now[m + begin : m + count]
-            )
-            own = sums[level + row]
-            own[COUNT] += count - begin
-            _add(own, MEAN, LOST_MEAN, mean * (0.5 / m))
-            _add(own, SQUARE, LOST_SQUARE, square * (0.25 / m / m))
-            if level == 0:
-                _add(totals, FOURTH, LOST_FOURTH, _fourth(now[begin:]) / 16.0)
-        else:
-            summed(following, now[:count], now[m : m + count])
-        now = following
-        m *= 2
-
-
-@compiled()
-def gappy_windows(
-    values: FloatArray,
-    present: FloatArray,
-    new: int,
-    row: int,
-    levels: tuple[int, int],
-    sums: FloatArray,
-    totals: FloatArray,
-    scratch: FloatArray,
-) -> None:
-    """The same for levels of a range, where samples may be missing: half windows are means of some.
-
-    Those that have too few, or none at either end, are left out: what is missing lies within half a
-    window, at any place equally often.
-    """
-    number = values.size
-    integral, there = scratch[0, : number + 1], scratch[1, : number + 1]
-    # About their own mean, which differences do not see.
-    centre = 0.0
-    for i in range(number):
-        centre += present[i] * values[i]
-    centre /= max(_total(present), 1.0)
-    integral[0], there[0] = 0.0, 0.0
-    for i in range(number):
-        integral[i + 1] = integral[i] + present[i] * (values[i] - centre)
-        there[i + 1] = there[i] + present[i]
-    for level in range(levels[0], levels[1]):
-        m = 1 << level
-        edge = max(m // EDGE, min(m, LEAST_EDGE))
-        whole = float(m << row)
-        count = 0
-        mean, square, scarcity, fourth = 0.0, 0.0, 0.0, 0.0
-        for t in range(max(new - 2 * m + 1, 0), number - 2 * m + 1):
-            first = there[t + m] - there[t]
-            second = there[t + 2 * m] - there[t + m]
-            outer = min(there[t + edge] - there[t], there[t + 2 * m] - there[t + 2 * m - edge])
-            inner = min(there[t + m] - there[t + m - edge], there[t + m + edge] - there[t + m])
-            if min(first, second) < LEAST * whole or min(outer, inner) <= 0.0:
-                continue
-            before = (integral[t + m] - integral[t]) / first
-            after = (integral[t + 2 * m] - integral[t + m]) / second
-            w = 0.5 * (after - before)
-            count += 1
-            mean += w
-            square += w * w
-            scarcity += 0.25 * (1.0 / first + 1.0 / second - 2.0 / whole)
-            fourth += w**4
-        own = sums[level + row]
-        own[COUNT] += count
-        own[SCARCITY] += scarcity
-        _add(own, MEAN, LOST_MEAN, mean)
-        _add(own, SQUARE, LOST_SQUARE, square)
-        if level + row == 0:
-            _add(totals, FOURTH, LOST_FOURTH, fourth)
 
 
 @compiled()
@@ -283,7 +161,7 @@ def work_off(
             continue
         values = data[row, :filled]
         if row == 0:
-            _add(totals, SUM, LOST_SUM, _total(values[old:]))
+            add(totals, SUM, LOST_SUM, total(values[old:]))
         if state[row, GAPPY]:
             levels = (0 if row == 0 else FINE - 1, FINE)
             gappy_windows(values, present[row, :filled], old, row, levels, sums, totals, scratch)
@@ -424,7 +302,7 @@ def first_infinite(samples: FloatArray) -> int:
     """Place of the first infinite sample, or -1."""
     for begin in range(0, samples.size, CHUNK):
         part = samples[begin : begin + CHUNK]
-        if not np.isfinite(_total(part)):
+        if not np.isfinite(total(part)):
             for i in range(part.size):
                 if np.isinf(part[i]):
                     return begin + i

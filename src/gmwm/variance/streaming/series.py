@@ -10,37 +10,39 @@ from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
-from gmwm.variance.streaming import kernels
+from gmwm.variance.streaming import kernels, window_kernels
 from gmwm.variance.streaming.kernels import (
     BLOCKS,
-    COUNT,
     FILLED,
-    FINE,
-    FOURTH,
     GAPPY,
     HALO,
     HEADED,
-    HIGHEST,
     LEADING,
+    MISSING,
+    MOST_BLOCKS,
+    NEXT_BLOCK,
+    OCTAVE,
+    ORIGIN,
+    ROOM,
+    RUN,
+    START,
+    N,
+)
+from gmwm.variance.streaming.window_kernels import (
+    COUNT,
+    FINE,
+    FOURTH,
+    HIGHEST,
     LOST_FOURTH,
     LOST_MEAN,
     LOST_SQUARE,
     LOST_SUM,
     LOWEST,
     MEAN,
-    MISSING,
-    MOST_BLOCKS,
-    NEXT_BLOCK,
-    OCTAVE,
-    ORIGIN,
     REFERENCE,
-    ROOM,
-    RUN,
     SCARCITY,
     SQUARE,
-    START,
     SUM,
-    N,
 )  # fmt: skip
 
 _ROWS = tuning.STREAMING_ROWS
@@ -239,7 +241,7 @@ class Series:
             left = min(before[0].size, reach)
             right = min(after[0].size, reach)
             part = slice(before[0].size - left, values.size - after[0].size + right)
-            kernels.gappy_windows(
+            window_kernels.gappy_windows(
                 values[part], there[part], 0, row, (level, level + 1), self.sums, self.totals,
                 self._scratch,
             )  # fmt: skip

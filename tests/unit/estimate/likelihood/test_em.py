@@ -203,31 +203,6 @@ def test_what_it_returns_has_the_likelihood_it_says():
     assert likelihood(fit.model.terms) == pytest.approx(fit.log_likelihood, abs=1e-6)
 
 
-def test_the_drawn_trace_rises():
-    truth = WhiteNoise(0.5) + RandomWalk(0.1)
-    fit = em(
-        truth.opened(), truth.simulate(500, 1.0, seed=6), start=WhiteNoise(3.0) + RandomWalk(1.0)
-    )
-    ax = fit.plot_trace()
-    for _ in range(2):  # on the same axes again
-        x, y = ax.lines[-1].get_data()
-        heights = ax.transData.transform(np.column_stack([x, y]))[:, 1]
-        assert heights.size > 3
-        assert np.all(np.diff(heights) > -1e-9)
-        ax = fit.plot_trace(ax)
-
-
-def test_the_trace_can_be_drawn():
-    truth = WhiteNoise(0.5) + RandomWalk(0.1)
-    fit = em(truth.opened(), truth.simulate(500, 1.0, seed=6))
-    iterations = fit.plot_trace().lines[-1].get_xdata()
-    # All of them but the best, which misses nothing.
-    expected = 1 + np.flatnonzero(np.array(fit.trace) < max(fit.trace))
-    np.testing.assert_array_equal(iterations, expected)
-    with pytest.raises(InputError, match="no iterations"):
-        gmwm.fit(truth.opened(), truth.simulate(500, 1.0, seed=6), dt=1.0).plot_trace()
-
-
 # -- a drift of the state -------------------------------------------------------------------------
 
 

@@ -470,6 +470,12 @@ def test_candidates_are_few_positive_and_spread():
         assert not times or max(times) > 100.0 * min(times)
 
 
+def test_candidates_have_the_amplitudes_of_the_data():
+    x = WhiteNoise(2.0).simulate(5000, 1.0, 1)
+    ((found,),) = candidates(Series.of(as_model(WhiteNoise()), as_channel(x, 1.0), None, gaps=True))
+    assert 1.0 < found.N < 4.0  # coarse levels count as much as fine ones
+
+
 @pytest.mark.parametrize("method", ["mle", "em"])
 @pytest.mark.parametrize("kept", [lambda k: k % 2 == 1, lambda k: k * 7 % 10 < 4])
 def test_gaps_may_be_anywhere(method, kept):

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 
 import gmwm
-from gmwm import RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.problem import slope_p_value
+from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.problem import slope_dof, slope_p_value
 from gmwm.process import as_model
 
 
@@ -54,3 +55,19 @@ class TestSlopeOfAWalk:
         x = 1e-3 * np.arange(4096.0) + WhiteNoise(1.0).simulate(4096, 1.0, 1)
         x[100:] = np.nan
         assert slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd) == 1.0
+
+
+@pytest.mark.parametrize("estimated", ["N", "sigma"])
+def test_degrees_of_freedom_are_those_of_generalised_least_squares(estimated):
+    n, error, step, truth = 1000, 0.1, 1e-4, {"N": 1.0, "sigma": 0.05}
+
+    def log_variance(N, sigma):
+        covariance = toeplitz(sigma**2 * np.exp(-np.arange(n) / 20.0)) + N**2 * np.eye(n)
+        design = np.column_stack([np.arange(n) - 0.5 * (n - 1), np.ones(n)])
+        return np.log(np.linalg.inv(design.T @ np.linalg.solve(covariance, design))[0, 0])
+
+    beside = [truth | {estimated: truth[estimated] + d} for d in (step, -step)]
+    gradient = (log_variance(**beside[0]) - log_variance(**beside[1])) / (2.0 * step)
+    model = WhiteNoise(truth["N"]) + GaussMarkov(sigma=truth["sigma"], tau=20.0)
+    found = slope_dof(model, [estimated], np.array([[error**2]]), n, 1.0)
+    assert found == pytest.approx(2.0 / (gradient * error) ** 2, rel=0.03)

@@ -189,6 +189,22 @@ class TestEveryMethod:
         assert notice.severity == "bad" and lacking.goodness.is_poor
         assert "predictions over" in notice.text
 
+    def test_a_level_that_predictions_feel_makes_a_fit_not_valid(self):
+        # The chi-square test passes, and as large a residual has one in fifty right models.
+        x = (WhiteNoise(1.0) + GaussMarkov(0.5, 100.0)).simulate(8192, 1.0, 13)
+        wv = gmwm.wavelet_variance(x, dt=1.0)
+        walk = gmwm.fit(WhiteNoise() + RandomWalk(), wv)
+        assert walk.discrepancy == 0.0 and walk.goodness.largest_p > 0.01
+        assert [name for name, holds in walk.reasons.items() if not holds] == ["describes_data"]
+        right = gmwm.fit(WhiteNoise() + GaussMarkov(), wv)
+        assert right.valid and walk.goodness.loses_to(right.goodness)
+
+    def test_such_a_level_that_chance_makes_is_a_warning(self):
+        fit = gmwm.fit(WhiteNoise(), WhiteNoise(1e-4).simulate(4000, 0.1, 14), dt=0.1)
+        (notice,) = (each for each in fit.notices if each.code == "misfit")
+        assert notice.severity == "warning" and fit.goodness.is_poor and fit.valid
+        assert 0.05 < fit.goodness.largest_p < 0.2
+
     def test_levels_are_judged_without_the_discrepancy_beyond_the_finest(self):
         fit = fitted(truth=WhiteNoise(1.0) + RandomWalk(0.1), n=4000)
         at = replace(fit.goodness, allowed=0.0 * fit.goodness.residual)

@@ -1,12 +1,15 @@
 """Sensor models compared on logs whose truth is known but not used."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from gmwm.errors import InputError
-from gmwm.ins import compare
+from gmwm.ins import compare, tuning
+from gmwm.ins.field.outcome import paired
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
@@ -81,6 +84,28 @@ def test_equal_models_are_a_tie(drive):
     assert found.verdict.code == "tie"
     assert found.pairs["a", "b"].ratio == 1.0
     assert 0.0 < found.resolved < 1.0
+
+
+def test_what_does_not_matter_is_a_tie_however_sure_it_is(drive):
+    """A hundred outages, models that are 0.045 apart in score and 1.7 % in error: less than counts.
+
+    The level is that at the margin, 0.05 and 2 %, which these are below.
+    """
+    found = compare(drive[0], {"a": sensors(), "b": sensors(slow=1.01)})
+    outcome = found.outcomes["a"]
+    rng = np.random.default_rng(7)
+    named = {"better": 0, "more-honest": 0, "tie": 0}
+    for _ in range(150):
+        error, score = rng.standard_normal((100, 3)), rng.standard_normal(100)
+        other = 1.017 * error * np.exp(0.05 * rng.standard_normal(error.shape))
+        none = np.zeros(3)
+        a = replace(outcome, error=error, score=score, reference_variance=none)
+        apart = rng.normal(0.045, 0.1, 100)
+        b = replace(outcome, error=other, score=score + apart, reference_variance=none)
+        pairs = {("a", "b"): paired(a, b, np.ones(3)), ("b", "a"): paired(b, a, np.ones(3))}
+        named[replace(found, outcomes={"a": a, "b": b}, pairs=pairs).verdict.code] += 1
+    assert named["better"] <= binom.isf(1e-4, 150, tuning.ACCURACY_LEVEL)
+    assert named["more-honest"] <= binom.isf(1e-4, 150, tuning.SCORE_LEVEL)
 
 
 def test_errors_against_the_smoother_are_those_against_the_truth(drive):

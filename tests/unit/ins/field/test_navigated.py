@@ -1,14 +1,13 @@
 """Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
 
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from gmwm import cli
 from gmwm.errors import InputError
 from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
@@ -172,21 +171,8 @@ def test_outliers_are_told_apart_from_a_wrong_model(tmp_path):
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.chdir(tmp_path)
-
-    def _run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["gmwm", "navigate", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            code = stop.code
-        return code, *capsys.readouterr()
-
-    return _run
+def run(run):
+    return partial(run, "navigate")
 
 
 def test_the_command_writes_the_solution_and_a_report(run):

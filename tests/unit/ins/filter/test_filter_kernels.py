@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
-from gmwm.ins.filter.filter_kernels import (
+from gmwm.ins.filter.filter_kernels import axis_sums, correct, sample_error
+from gmwm.ins.filter.measurement_kernels import (
     IS_HEIGHT,
     IS_POSITION,
     IS_STANDSTILL,
     IS_VELOCITY,
-    axis_sums,
-    correct,
     measurement_row,
     residual,
-    sample_error,
 )
 from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry.earth import ned_difference, offset

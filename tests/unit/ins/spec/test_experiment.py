@@ -1,11 +1,11 @@
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins import read_experiment
 from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.montecarlo.scenario import Scenario
@@ -139,12 +139,12 @@ def test_a_document(tmp_path: Path) -> None:
     )
     expected = {"trajectory": "car", "base": {"x": 1}, "other": {"x": 2}}
     assert read_document(path) == expected
-    assert read_experiment(path) == expected
 
 
 def test_no_experiment() -> None:
+    no_mapping: Any = 5
     with pytest.raises(InputError, match="write KEY: VALUE"):
-        experiment_from(5)  # type: ignore[arg-type]
+        experiment_from(no_mapping)
     with pytest.raises(InputError, match="is there twice"):
         experiment_from(LEAST | {"filters": {1: "truth", "1": "truth"}})
 

@@ -1,5 +1,6 @@
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -130,6 +131,6 @@ def test_a_duration_cuts_or_goes_on() -> None:
         ),
     ],
 )
-def test_impossible_manoeuvres_are_refused(make: object, message: str) -> None:
+def test_impossible_manoeuvres_are_refused(make: Callable[[], object], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        make()  # type: ignore[operator]
+        make()

@@ -327,9 +327,21 @@ def test_a_gap_of_half_the_record_ends_the_curve_and_is_reported():
     (notice,) = found.notices
     assert notice.code == "curve-shortened"
     assert notice.values == {"levels": 2, "tau": 1024.0, "complete": 4096.0}
+    again = gmwm.WaveletVariance.from_dict(found.to_dict())
+    np.testing.assert_array_equal(again.variance, found.variance)
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), found)
     assert notice in fit.notices and fit.valid
     assert not gmwm.wavelet_variance(with_gaps(x, [(2500, 2600)]), dt=1.0).notices
+
+
+def test_levels_that_are_not_filled_know_what_their_coefficients_know():
+    threes = [(i, i + 3) for i in range(5, 19_000, 5)]
+    gaps = gmwm.wavelet_variance(
+        with_gaps(WhiteNoise(1.0).simulate(20_000, 1.0, 1), threes), dt=1.0
+    ).gaps
+    unfilled = gaps.change == 0.0
+    assert np.any(unfilled) and not np.all(unfilled)
+    assert np.all(np.diag(gaps.inflation) >= 1.0)
 
 
 def test_recorded_steps_pass_through_short_gaps():

@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.errors import InputError
+from gmwm.variance.streaming import window_kernels
 
 FINE = 10
 """Levels of 1 to 512 samples, all windows of which are seen."""
@@ -315,3 +316,10 @@ def test_infinite_blocks_change_nothing():
 def test_a_sentence_for_what_cannot_be_used(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_sum_keeps_what_larger_numbers_would_swallow():
+    total = np.zeros(2)
+    for value in (1.0, 1e100, 1.0, -1e100):
+        window_kernels.add(total, 0, 1, value)
+    assert total.sum() == 2.0

@@ -49,6 +49,8 @@ class Alignment:
         How it came about.
     stood : float
         Time over which that was averaged, s.
+    turned : float
+        Time over which the gyros turned a course of GNSS back to the start, s.
     """
 
     epoch: int
@@ -58,6 +60,7 @@ class Alignment:
     gyro_bias_sd: float | None
     notices: tuple[Notice, ...]
     stood: float = 0.0
+    turned: float = 0.0
 
 
 def align(
@@ -123,10 +126,11 @@ def align(
         np.hypot(_tilt_sd(models, length, imu.dt, still), drift * (epoch - levelled) * imu.dt)
     )
     lat = float(positions.value[fix, 0])
+    back = 0.0
     if heading is not None:
         yaw, yaw_sd, how = heading, heading_sd, "heading as given"
     else:
-        yaw, yaw_sd, how = _heading(
+        yaw, yaw_sd, how, back = _heading(
             course(imu, aiding, bias, body, epoch, drift),
             compass(mean, level, lat, biased) if still else None,
         )
@@ -152,11 +156,11 @@ def align(
     )  # fmt: skip
     return Alignment(
         epoch, *_at_fix(imu, aiding, epoch, fix, C, velocity, (velocity_sd, tilt_sd, yaw_sd)),
-        bias - earth if still else bias, known_sd, notices, length if still else 0.0,
+        bias - earth if still else bias, known_sd, notices, length if still else 0.0, back,
     )  # fmt: skip
 
 
-def _heading(*found: tuple[float, float, str] | None) -> tuple[float, float, str]:
+def _heading(*found: tuple[float, float, str, float] | None) -> tuple[float, float, str, float]:
     """The one that is known best."""
     known = [each for each in found if each is not None]
     if not known:

@@ -34,8 +34,11 @@ def _carry(C: FloatArray, rotation: FloatArray, kept: FloatArray) -> None:
 
 def course(
     imu: Imu, aiding: Aiding, bias: FloatArray, C: FloatArray, epoch: int, drift: float
-) -> tuple[float, float, str] | None:
-    """Heading at an epoch from the first course that GNSS shows, turned back by the gyros."""
+) -> tuple[float, float, str, float] | None:
+    """Heading at an epoch from the first course that GNSS shows, turned back by the gyros.
+
+    Heading, its standard deviation, how it was found, and the time over which it was turned, s.
+    """
     found = _from_velocity(aiding, epoch * imu.dt) or _from_chord(aiding, epoch * imu.dt)
     if found is None:
         return None
@@ -49,9 +52,9 @@ def course(
         part = kept[max(round(begin / imu.dt) - epoch - 1, 0) :]
         turned = rpy_from_matrix(part)[:, 2] - rpy_from_matrix(C)[2]
     mean_turn = float(np.angle(np.mean(np.exp(1j * turned))))
-    gone = drift * (0.5 * (begin + end) - epoch * imu.dt)
-    total = float(np.sqrt(sd**2 + tuning.CRAB_SD**2 + gone**2))
-    return course - mean_turn, total, f"heading from GNSS, {begin:.6g} s after the start"
+    back = 0.5 * (begin + end) - epoch * imu.dt
+    total = float(np.sqrt(sd**2 + tuning.CRAB_SD**2 + (drift * back) ** 2))
+    return course - mean_turn, total, f"heading from GNSS, {begin:.6g} s after the start", back
 
 
 def _from_velocity(aiding: Aiding, start: float) -> tuple[float, float, float, float] | None:
@@ -89,10 +92,10 @@ def _from_chord(aiding: Aiding, start: float) -> tuple[float, float, float, floa
 
 def compass(
     mean: FloatArray, level: FloatArray, lat: float, gyro_sd: float
-) -> tuple[float, float, str] | None:
+) -> tuple[float, float, str, float] | None:
     """Heading from the Earth's rotation, if the gyros show it. Groves (2013), eq. 5.105."""
     north, east, _ = matrix_from_rpy(level) @ mean[:3]
     sd = float(gyro_sd / (RATE * np.cos(lat)))
     if sd > tuning.COMPASS_SD:
         return None
-    return float(np.arctan2(-east, north)), sd, "heading from the Earth's rotation"
+    return float(np.arctan2(-east, north)), sd, "heading from the Earth's rotation", 0.0
