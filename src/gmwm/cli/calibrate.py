@@ -317,7 +317,7 @@ def write_files(
         if {"gyro", "accel"} <= quantities:
             try:
                 with stage("exports"):
-                    export(result, "kalibr", path=new / "imu.yaml")
+                    export(shown, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
                 horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
                 lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]
