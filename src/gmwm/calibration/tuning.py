@@ -8,7 +8,7 @@ same to 0.1 %, less than the width of any level."""
 
 MOST_LEFT_OUT = 0.1
 """Fraction of the samples of a channel that outliers may take: up to it gaps move no level by more
-than a fifth of a standard error (docs/health.md)."""
+than a fifth of a standard error (docs/moments.md)."""
 
 MOST_TERMS = 2
 """Lines and resonances offered to the model of a channel; each doubles the candidate models."""
@@ -48,9 +48,9 @@ MOST_DEPARTURES = 5
 REMOVALS = 3
 """Rounds of taking off what is found: beside the noise that is left without it more may show."""
 
-MOST_REMOVED = 3
-"""Departures of one record that may be accidents: a telegraph bias has four and more in five of six
-records of six mean dwell times, real recordings of 2 h 46 min have three at most."""
+MOST_REMOVED = 4
+"""Departures of one record that may be accidents: a telegraph bias has five or more in five of six
+records of six mean dwell times, real recordings of 2 h 46 min have four at most."""
 
 MOST_MEANS = 256
 """Block means; dense matrices of them are made."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise
@@ -190,7 +191,10 @@ def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
 
 def test_too_short_to_be_examined(record):
     step = np.repeat([0.0, 1.0], 1000)
-    assert find_motion(record(gyro_x=step)).moves == ()
+    recording = record(gyro_x=step)
+    found = find_motion(recording)
+    assert found.moves == ()
+    assert found.static == ((0.0, recording.duration),)
 
 
 def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
@@ -253,3 +257,18 @@ def test_motion_of_one_recording_is_not_that_of_the_next(moved):
     flat = moved(np.zeros((9_000, 3)))
     assert find_motion(flat).moves == ()
     assert find_motion(spun).moves == first.moves != ()
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_steady_vibration_is_seen_where_axes_share_it(record, shared):
+    """A band of noise from the first sample to the last, of one axis, is a noise like any other."""
+    n, rng = 20_000, np.random.default_rng(1)
+    band = sosfilt(butter(4, [0.3, 0.8], "band", output="sos"), rng.standard_normal(n))
+    shaking = 4.0 * band / np.std(band)
+    axes = {
+        f"accel_{axis}": 2e-2 * (rng.standard_normal(n) + shaking * (shared or axis == "z"))
+        for axis in "xyz"
+    }
+    found = gmwm.health(record(**axes))
+    assert not [notice for notice in found.notices if notice.severity == "bad"]
+    assert len(found.of(code="crosstalk")) == (3 if shared else 0)

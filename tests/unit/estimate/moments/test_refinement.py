@@ -79,8 +79,8 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
     for _ in range(4):
         z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners()))
         start = profile.at(design.unpack(z, best.shapes))
-        compiled = profile._compiled(z, start)
-        stepwise = profile._stepwise(z, start)
+        compiled = profile._compiled(z, start, profile.design.bounds)
+        stepwise = profile._stepwise(z, start, profile.design.bounds)
         assert compiled.objective <= start.objective
         assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
         np.testing.assert_allclose(
@@ -95,7 +95,10 @@ def test_a_term_without_an_amplitude_does_not_hold_up_the_others(wv):
     profile = Profile(design, wv.variance, np.diag(1.0 / wv.variance))
     start = profile.at([(), (0.3,), (0.3,)])  # of two alike, one has all
     z = design.pack(start.shapes)
-    compiled, stepwise = profile._compiled(z, start), profile._stepwise(z, start)
+    compiled, stepwise = (
+        profile._compiled(z, start, profile.design.bounds),
+        profile._stepwise(z, start, profile.design.bounds),
+    )
     assert np.count_nonzero(start.x) == 2
     assert compiled.objective < start.objective
     assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
