@@ -69,6 +69,7 @@ def test_textbook_values_of_the_continuous_form():
     assert walk["F"] == 0.0
     assert walk["Q"] == pytest.approx(9e-12)
     assert walk["P0"] == pytest.approx(4e-8)
+    assert channel(RandomWalk(3e-6) + WhiteNoise(1e-4), DT, "gyro")["continuous"]["P0"] == 0.0
     zeta, w0 = 0.1, 2.0 * np.pi * 12.0
     found = channel(Resonance(3e-4, 12.0, zeta) + WhiteNoise(1e-4), DT, "gyro")["continuous"]
     assert found["F"] == pytest.approx(w0 * np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]), rel=1e-9)
