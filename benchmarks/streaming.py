@@ -2,7 +2,8 @@
 
 ``python benchmarks/streaming.py`` prints seconds and ratios for 1e7 samples, interleaved, medians
 of ``--rounds``; then processor time per sample of the stream for 1e6, 1e7 and 1e8 samples from a
-generator, and how far memory grows from 2e6 to 2e7 samples.
+generator, how far memory grows from 2e6 to 2e7 samples, and how far levels of 1e6 samples are from
+those of all windows.
 
 Wall-clock times of a busy machine say little: processor time stands beside them. That of the exact
 variance is of all its threads.
@@ -90,16 +91,29 @@ def memory(sizes: list[int]) -> None:
         print(f"peak memory of the process after a stream of {n:.0e} samples: {peak:.0f} MiB")
 
 
+def agreement(n: int) -> None:
+    white = gmwm.WhiteNoise(1.0)
+    for model in (white, white + gmwm.RandomWalk(3e-3), white + gmwm.GaussMarkov(0.3, 40.0)):
+        x = model.simulate(n, 1.0, seed=11) + 1e6
+        exact = gmwm.wavelet_variance(x, dt=1.0)
+        error = np.sqrt(np.diag(exact.covariance_under(model.psd)))
+        far = np.abs(streamed(np.array_split(x, 37)).variance - exact.variance) / error
+        print(f"{model!r}: at most {np.max(far):.4f} standard errors at any of {far.size} levels")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=float, default=1e7)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--generate", type=float, nargs="*", default=[1e6, 1e7, 1e8])
     parser.add_argument("--memory", type=float, nargs="*", default=[2e6, 2e7])
+    parser.add_argument("--agreement", type=float, default=1e6)
     given = parser.parse_args()
     memory([int(n) for n in given.memory])  # before anything large is made
     if given.generate:
         per_sample([int(n) for n in given.generate], given.rounds)
+    if given.agreement:
+        agreement(int(given.agreement))
     if given.samples:
         table(int(given.samples), given.rounds)
 

@@ -145,7 +145,8 @@ def _quiet(output: TextIO | None) -> Iterator[None]:
     os.environ["MPLBACKEND"] = "agg"
     import matplotlib as mpl
 
-    style = {"svg.fonttype": "none", "svg.hashsalt": "gmwm", "figure.figsize": (6.4, 4.0)}
+    style = {"svg.fonttype": "none", "svg.hashsalt": "gmwm", "figure.figsize": (6.4, 4.0),
+             "figure.constrained_layout.use": True}  # fmt: skip
     with contextlib.redirect_stdout(output or sys.stdout), mpl.rc_context(style):
         yield
 

@@ -27,9 +27,9 @@ BOUNDS = {
     "sigma2_3": {"table4": 0.00185},
 }
 RUN = {
-    "table2": (TABLE_2, ["GMWM", "EM*", "AV"], 12),
-    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 12),
-    "table4": (TABLE_4, ["GMWM"], 4),
+    "table2": (TABLE_2, ["GMWM", "EM*", "AV"], 8),
+    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 8),
+    "table4": (TABLE_4, ["GMWM"], 3),
 }
 CASES = [(study, name) for name, by_study in BOUNDS.items() for study in by_study]
 # 48 correlation times in the record: maximum likelihood is above the bound, too.

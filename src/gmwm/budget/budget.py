@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor
 from gmwm.errors import InputError
@@ -173,7 +174,8 @@ class ErrorBudget:
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
                 values = self.total()[quantity]
                 lines.append(f"  {label:<{head - 2}}{_row(quantity, values)}")
-        return "\n".join([*lines, *([""] if self.notes else []), *(f"- {n}" for n in self.notes)])
+        notes = [line for note in self.notes for line in wrapped(note, first="- ", indent=2)]
+        return "\n".join([*lines, *([""] if notes else []), *notes])
 
     def plot(
         self, ax: Axes | None = None, *, of: str | None = None, quantity: str | None = None

@@ -103,9 +103,9 @@ def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Not
     severity: Severity
     if found.is_evident:
         severity = "bad" if harmful else "warning"
-        part = f"{100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
+        part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
         text = (
-            f"{what}; it accounts for up to {part} of the model's wavelet variance, so that slow "
+            f"{what}; it accounts for {part} of the model's wavelet variance, so that slow "
             "terms of the model are too large"
         )
         action = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"

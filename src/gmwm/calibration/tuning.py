@@ -8,7 +8,7 @@ same to 0.1 %, less than the width of any level."""
 
 MOST_LEFT_OUT = 0.1
 """Fraction of the samples of a channel that outliers may take: up to it gaps move no level by more
-than a fifth of a standard error (docs/health.md)."""
+than a fifth of a standard error (docs/moments.md)."""
 
 MOST_TERMS = 2
 """Lines and resonances offered to the model of a channel; each doubles the candidate models."""

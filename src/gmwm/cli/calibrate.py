@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
@@ -111,7 +112,7 @@ def calibrate(
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Calibrate every channel of a recording at rest, or of several of one sensor.
+    """Find an error model for every channel of a recording at rest.
 
     FILE is CSV (plain or .gz; any of the usual separators, with or without a header), NPY, NPZ,
     MAT, HDF5, Parquet or Feather; a bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), or a log of
@@ -230,24 +231,20 @@ def show(result: Calibration) -> None:
     from gmwm.estimate.result import JointFit
     from gmwm.report import duration_text
 
-    console = new_console()
-    console.print(
-        f"{result.source}: {duration_text(result.duration)} at {result.rate:g} Hz, "
-        f"{result.n:,} samples a channel",
-        highlight=False,
-    )
-    print_whole(console, _table(result))
-    for notice in worst_first([each for each in result.notices if _is_shown(each)]):
-        console.print(f"- {with_option(notice)}", highlight=False)
-    for name, why in result.skipped.items():
-        console.print(f"- {name} skipped: {why.text}", highlight=False)
+    size = f"{duration_text(result.duration)} at {result.rate:g} Hz, {result.n:,} samples a channel"
+    for line in wrapped(f"{result.source}: {size}", indent=2):
+        click.echo(line)
+    print_whole(new_console(), _table(result))
+    shown = worst_first([each for each in result.notices if _is_shown(each)])
+    remarks = [str(with_option(notice)) for notice in shown]
+    remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
-            console.print(f"- {name}: {fit.agreement}", highlight=False)
-        for notice in fit.notices:
-            if notice.code in _OF_RECORDING:
-                continue
-            console.print(f"- {name}: {with_option(notice)}", highlight=False)
+            remarks.append(f"{name}: {fit.agreement}")
+        of_fit = [notice for notice in fit.notices if notice.code not in _OF_RECORDING]
+        remarks += [f"{name}: {with_option(notice)}" for notice in of_fit]
+    for remark in remarks:
+        click.echo("\n".join(wrapped(remark, first="- ", indent=2)))
 
 
 def _is_shown(notice: Notice) -> bool:
@@ -269,7 +266,7 @@ def _table(result: Calibration) -> Table:
             usual = row.usual
             cells = [name if i == 0 else "", row.key]
             if row.kind == "bound":
-                cells += [f"{usual.value:.3g}", f"below {usual.upper:.3g}", usual.unit]
+                cells += [f"{usual.value:.4g}", f"below {usual.upper:.4g}", usual.unit]
             elif row.kind == "estimated":
                 interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
                 cells += [f"{usual.value:.4g}", interval, usual.unit]
@@ -320,7 +317,7 @@ def write_files(
         if {"gyro", "accel"} <= quantities:
             try:
                 with stage("exports"):
-                    export(result, "kalibr", path=new / "imu.yaml")
+                    export(shown, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
                 horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
                 lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]

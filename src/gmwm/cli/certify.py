@@ -24,9 +24,10 @@ _GRAVITY = 9.80665
               help="Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM "
                    "or their like, or of gmwm bound and gmwm reduce (.json).")  # fmt: skip
 @click.option("-N", "white", metavar="GYRO,ACCEL",
-              help="Or noise densities, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz),")  # fmt: skip
+              help="White noise in use, in place of --imu, rad/s/sqrt(Hz) and "
+                   "m/s^2/sqrt(Hz).")  # fmt: skip
 @click.option("-K", "walk", metavar="GYRO,ACCEL",
-              help="with random walks, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).")  # fmt: skip
+              help="Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).")  # fmt: skip
 @click.option("--outages", default="10,60", show_default=True, metavar="T,T,...",
               help="Times without aiding in seconds.")  # fmt: skip
 @click.option("--keyframe", type=float, default=1.0, show_default=True, metavar="S",
@@ -34,18 +35,23 @@ _GRAVITY = 9.80665
 @click.option(
     "--motion",
     metavar="NAME",
-    help="handheld, drone, car, fixed-wing, or a recording of your own motion, for:",
+    help="Motion in which the errors below act: handheld, drone, car, fixed-wing, or a recording "
+    "of your own.",
 )
 @click.option("--scale-error", type=float, default=0.0, metavar="PERCENT",
-              help="of both sensors,")  # fmt: skip
-@click.option("--misalignment", type=float, default=0.0, metavar="DEG", help="of the axes,")
+              help="Scale error of both sensors.")  # fmt: skip
+@click.option(
+    "--misalignment", type=float, default=0.0, metavar="DEG", help="Misalignment of the axes."
+)
 @click.option("--g-sensitivity", type=float, default=0.0, metavar="DEG/S/G",
-              help="of gyros,")  # fmt: skip
+              help="g-sensitivity of the gyros.")  # fmt: skip
 @click.option("--time-offset", type=float, default=0.0, metavar="MS",
-              help="against what the IMU is fused with.")  # fmt: skip
+              help="Delay against what the IMU is fused with.")  # fmt: skip
 @click.option("--vibration-rectification", type=float, default=0.0, metavar="MG/G^2",
-              help="Of accelerometers, with")  # fmt: skip
-@click.option("--vibration", type=float, default=0.0, metavar="G", help="root mean square.")
+              help="Vibration rectification of the accelerometers, with --vibration.")  # fmt: skip
+@click.option(
+    "--vibration", type=float, default=0.0, metavar="G", help="Vibration, root mean square."
+)
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
               help="File to save the certificate in.")  # fmt: skip
 @units_option
@@ -56,7 +62,7 @@ def certify(
     g_sensitivity: float, time_offset: float, vibration_rectification: float, vibration: float,
     output: Path | None, units: str, as_json: bool,
 ) -> None:  # fmt: skip
-    """Tell how consistent a filter will be with the numbers in use, and why.
+    """Predict how consistent a filter is with the numbers in use.
 
     FILE is a calibration.json, taken for the truth. True errors beside those that the filter
     believes, for free inertial growth, an INS/GNSS filter in outages and relative poses between

@@ -24,9 +24,10 @@ if TYPE_CHECKING:
               help="Only write files to try the other commands with: static.csv of a sensor at "
                    "rest, imu.csv and fixes.csv of a drive with it.")  # fmt: skip
 def demo(output: Path, hours: float, seed: int, files: bool) -> None:
-    """Simulate a six-axis MEMS IMU at 100 Hz, calibrate it, compare with the truth.
+    """Simulate an IMU, calibrate it and compare with the truth.
 
-    Gyros have white noise and a Gauss-Markov process, accelerometers white noise and a random walk.
+    The IMU is a MEMS sensor of six axes at 100 Hz. Gyros have white noise and a Gauss-Markov
+    process, accelerometers white noise and a random walk.
 
     \b
     Examples:

@@ -30,7 +30,7 @@ def export(
 ) -> None:
     """Write numbers for a filter as the program wants them.
 
-    FILE is a calibration.json, or numbers that gmwm.bound or gmwm.reduce saved. Several files make
+    FILE is a calibration.json, or numbers that gmwm bound or gmwm reduce saved. Several files make
     one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
     the smallest that are never too optimistic for its error models; comments say what they are.
 

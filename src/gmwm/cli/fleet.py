@@ -56,13 +56,14 @@ def fleet(
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Calibrate many units of a sensor, a recording of each, and compare them.
+    """Calibrate many units of a sensor and compare them.
 
-    PATTERN is a file or, in quotes, a pattern such as 'lot-7/**/*.csv'; files are those of gmwm
-    calibrate. Each unit has a calibration of its own in the folder, as soon as it is done;
-    fleet.parquet has a row per unit, channel and parameter; fleet.html shows how the units
-    differ, which stand apart, and what a data sheet could promise. A file that cannot be used is
-    reported and costs the others nothing. Several recordings of one unit are for gmwm calibrate.
+    PATTERN is the recording of a unit or, in quotes, a pattern such as 'lot-7/**/*.csv'; files
+    are those of gmwm calibrate. Each unit has a calibration of its own in the folder, as soon as
+    it is done; fleet.parquet has a row per unit, channel and parameter; fleet.html shows how the
+    units differ, which stand apart, and what a data sheet could promise. A file that cannot be
+    used is reported and costs the others nothing. Several recordings of one unit are for gmwm
+    calibrate.
 
     Exit status: 0 if a unit has a valid model, 1 if none has (the files are written all the same),
     2 if no file can be used.

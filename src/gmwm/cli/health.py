@@ -19,7 +19,7 @@ from gmwm.cli.options import part_options, printing_options, read_recording, rea
 @part_options
 @printing_options
 def health(file: Path, output: Path | None, as_json: bool, quiet: bool, **reading: Any) -> None:
-    """Find what is wrong with a static recording before it is calibrated.
+    """Find what is wrong with a recording before it is calibrated.
 
     Motion, gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
     resonances, drift, changes of the noise, dependence between channels; worst first, with what

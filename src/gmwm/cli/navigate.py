@@ -31,7 +31,7 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 @click.option("--trajectory", metavar="NAME",
               help="helicopter, car, loiter, or a CSV of time, latitude, longitude, height, roll, "
                    "pitch, yaw.")  # fmt: skip
-@click.option("--duration", type=float, help="s, of the trajectory.")
+@click.option("--duration", type=float, help="Of the trajectory, in seconds.")
 @click.option("--truth", metavar="FILE", help="calibration.json that sensor errors are drawn from.")
 @click.option("--filter", "filters", multiple=True, metavar="NAME=FILE",
               help="A filter and the calibration.json that it believes; 'truth' for the true "
@@ -56,12 +56,12 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
               help="Length of the outages that are cut into the log to compare sensors; auto is "
                    "30 s.  [default: auto]")  # fmt: skip
 @click.option("--lever-arm", metavar="X,Y,Z",
-              help="m, from the IMU to the antenna: forward, right, down.")  # fmt: skip
+              help="From the IMU to the antenna, metres: forward, right, down.")  # fmt: skip
 @click.option("--heading", type=float,
-              help="deg, at the first fix; by default from GNSS once it moves.")  # fmt: skip
+              help="Degrees, at the first fix; by default from GNSS once it moves.")  # fmt: skip
 @click.option("--attitude", metavar="ROLL,PITCH,YAW",
-              help="deg, at the first fix, of a record that begins in motion; by default from the "
-                   "data.")  # fmt: skip
+              help="Degrees, at the first fix, of a record that begins in motion; by default "
+                   "from the data.")  # fmt: skip
 @click.option(
     "--imu-start",
     type=float,
@@ -75,11 +75,11 @@ _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
     help="Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'.",
 )
 @click.option("--gate", type=float, metavar="P",
-              help="Reject fixes whose innovation is less likely, e.g. 1e-5.")  # fmt: skip
+              help="Reject fixes whose innovation is less probable, e.g. 1e-5.")  # fmt: skip
 @click.option(
     "--gyro-bias",
     metavar="VALUE",
-    help="How far a gyro may be off when it is switched on.  [default: 0.1 deg/s]",
+    help="Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]",
 )
 @click.option("--accel-bias", metavar="VALUE",
               help="The same of an accelerometer.  [default: 0.1 m/s^2]")  # fmt: skip
@@ -114,13 +114,13 @@ def navigate(
     as_json: bool,
     **options_of_reading: Any,
 ) -> None:
-    """Prove sensor models by navigating; or filter your own IMU and GNSS.
+    """Prove sensor models by navigating, or filter your own data.
 
     INS/GNSS filters, outages, Monte Carlo: errors of the sensors, drawn from the true models or
     taken from real static recordings, are added to the error-free signals of a trajectory; every
     filter navigates on the same errors. Printed are the errors at the end of the outages and
-    whether each filter is consistent. A YAML file can hold more than the options, which go
-    before it; see docs/navigation.md.
+    whether each filter is consistent. A YAML file can hold more than the options, which
+    override it; see docs/navigation.md and docs/own-log.md.
 
     With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
     written; whether the innovations agree with the sensor models is printed, and which fault of

@@ -24,14 +24,14 @@ units_option = click.option(
 _OPTIONS = (
     click.argument("file", type=click.Path(path_type=Path)),
     click.option("--form", default="N+K", show_default=True,
-                 help="N+K, N+GM, N+K+GM; of reduce also N+2GM."),
+                 help="N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too."),
     click.option("--shared", is_flag=True, help="The same numbers for all axes of a sensor."),
     click.option("--gyro-bias", type=float, default=0.0, metavar="RAD/S",
                  help="Standard deviation of the turn-on bias of a gyro."),
     click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
-                 help="The same of an accelerometer."),
+                 help="Standard deviation of the turn-on bias of an accelerometer."),
     click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
-                 help="File to save them in."),
+                 help="File to save the numbers in."),
     units_option,
     click.option("--json", "as_json", is_flag=True, help="Print JSON."),
 )  # fmt: skip
@@ -49,13 +49,13 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
               help="Time without aiding in seconds; of relative poses, the interval of "
                    "keyframes.")  # fmt: skip
 @click.option("--level", type=float, metavar="P",
-              help="Dominate the confidence region of this level, e.g. 0.95, and not the estimate "
+              help="Cover the confidence region of this level, e.g. 0.95, and not the estimate "
                    "alone.")  # fmt: skip
 def bound(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
     units: str, as_json: bool, horizon: float, level: float | None,
 ) -> None:  # fmt: skip
-    """Give the smallest numbers with which a filter is never too optimistic.
+    """Find the smallest numbers that are never too optimistic.
 
     FILE is a calibration.json.
 
@@ -76,7 +76,7 @@ def bound(
 @click.command()
 @_with_options
 @click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
-              help="Times without aiding for which they shall be good, in seconds.")  # fmt: skip
+              help="Times without aiding that the numbers are for, in seconds.")  # fmt: skip
 @click.option("--keyframe", type=float, metavar="S",
               help="Interval of keyframes or scans, in place of outages, for relative "
                    "poses.")  # fmt: skip
@@ -84,7 +84,7 @@ def reduce(
     file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
     units: str, as_json: bool, outages: str, keyframe: float | None,
 ) -> None:  # fmt: skip
-    """Give the numbers with which a small filter is consistent in given outages.
+    """Find the numbers with which a small filter is consistent.
 
     FILE is a calibration.json.
 

@@ -53,8 +53,10 @@ _PART = (
                  help="Stamps of messages: of their headers, or when they were recorded."),
     click.option("--channels", "only", metavar="NAME,...",
                  help="Only these channels: gyro_x,accel_z, or gyro for all of them."),
-    click.option("--start", type=float, metavar="S", help="Leave out what is before, in seconds."),
-    click.option("--stop", type=float, metavar="S", help="Leave out what is after."),
+    click.option("--start", type=float, metavar="S",
+                 help="Leave out what is before this time, in seconds."),
+    click.option("--stop", type=float, metavar="S",
+                 help="Leave out what is after this time, in seconds."),
 )  # fmt: skip
 
 _ESTIMATING = (

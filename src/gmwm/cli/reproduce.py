@@ -63,7 +63,9 @@ def reproduce(
     rotate: bool,
     **reading: Any,
 ) -> None:
-    """Repeat an experiment of Stebler et al. (2012), or our own harder one.
+    """Repeat an experiment of the paper, or our own harder one.
+
+    The paper is that of Stebler and others (2012).
 
     table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Concatenate, ParamSpec, Protocol, cast, overload
 
@@ -69,6 +69,17 @@ class Axis:
     quantity: str
     bias_sd: float
     fit: Fit | None
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Axis) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[object, ...]:
+        """The same model and fit, not equal ones: a process of one's own may hold anything."""
+        return self.name, self.dt, self.quantity, self.bias_sd, id(self.model), id(self.fit)
 
     @property
     def unit(self) -> str:
@@ -149,14 +160,14 @@ class Axes:
         return tuple(tuple(a for a in self.axes if a.quantity == kind) for kind in kinds)
 
     def numbers(
-        self, found: Callable[[tuple[Axis, ...]], list[FilterNumbers]], shared: bool
+        self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> FilterNumbers | SensorNumbers:
         """The result, from a function that gives axes that share their numbers their results."""
         numbers = self.sensor(found, shared)
         return next(iter(numbers.values())) if self.single else numbers
 
     def sensor(
-        self, found: Callable[[tuple[Axis, ...]], list[FilterNumbers]], shared: bool
+        self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> SensorNumbers:
         """The same as a mapping, of one axis too."""
         groups = self.groups if shared else tuple((axis,) for axis in self.axes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -93,16 +94,20 @@ def bound(
         for axis in axes.axes:
             _fit(axis)
 
-    def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
+    def found(group: tuple[Axis, ...]) -> Sequence[FilterNumbers]:
         return bound_of(group, form, horizon, level)
 
     return axes.numbers(found, shared)
 
 
+@lru_cache(maxsize=64)
 def bound_of(
-    group: Sequence[Axis], form: str, horizon: float, level: float | None
-) -> list[FilterNumbers]:
-    """The bound of axes that share their numbers; see `bound`."""
+    group: tuple[Axis, ...], form: str, horizon: float, level: float | None
+) -> tuple[FilterNumbers, ...]:
+    """The bound of axes that share their numbers; see `bound`.
+
+    A report asks for some of them again, and the exports for those of the report.
+    """
     targets = tuple(Target.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
     region: list[Target] = []
     if level is not None:
@@ -125,7 +130,7 @@ def bound_of(
         looseness = [_loose(found[0], best) for found, best in zip(errors, tight, strict=True)]
     else:
         looseness = [()] * len(group)
-    return [
+    return tuple(
         FilterNumbers(
             form=form,
             model=model,
@@ -143,7 +148,7 @@ def bound_of(
             stderr=stderr,
         )
         for axis, target, found, loose in zip(group, targets, errors, looseness, strict=True)
-    ]
+    )
 
 
 def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:

@@ -226,7 +226,7 @@ def _units(kind: str, factor: float) -> Notice:
     return Notice("other-units", "warning", kind, text, {"factor": factor}, mend)
 
 
-def _bound(group: Sequence[Axis], horizon: float, level: float | None = None) -> FilterNumbers:
+def _bound(group: tuple[Axis, ...], horizon: float, level: float | None = None) -> FilterNumbers:
     """Shared by the axes of a kind."""
     return bound_of(group, "N+K", horizon, level)[0]
 

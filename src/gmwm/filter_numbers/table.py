@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gmwm._core import checks
+from gmwm._core.text import WIDTH
 from gmwm._core.units import field_units, si_parameter_unit
 
 UNITS = ("field", "si")
@@ -58,9 +59,12 @@ def _cell(row: Mapping[str, float], key: str, scale: float) -> str:
 
 
 def _lines(width: int, names: Sequence[str], cells: Sequence[Sequence[str]]) -> list[str]:
+    """The table, in equal parts beneath each other where it is wider than a page."""
     widths = [max(9, *map(len, column)) for column in zip(*cells, strict=True)]
+    count = -(-sum(each + 1 for each in widths) // (WIDTH - width))
+    size = -(-len(widths) // count)
     return [
-        (f"{name:<{width}}" + "".join(f" {c:>{w}}" for c, w in zip(row, widths, strict=True)))
-        .rstrip()
+        (f"{name:<{width}}" + "".join(f" {row[i]:>{widths[i]}}" for i in part)).rstrip()
+        for part in (range(len(widths))[k : k + size] for k in range(0, len(widths), size))
         for name, row in zip(names, cells, strict=True)
-    ]  # fmt: skip
+    ]

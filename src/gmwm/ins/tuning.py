@@ -53,6 +53,10 @@ ZERO_VELOCITY = (2.0, 1.0)
 """How many times as much an IMU may scatter as where the vehicle stood at the start to count as at
 rest, and the length that is looked at, s: engines and roads shake it by far more."""
 
+WAY, FEWEST_WAYS, MIXED_UP = 20.0, 8, 3.0
+"""s between fixes whose way is compared with their velocities; how many are needed; and how many
+times as far off they must be as with two columns exchanged: right ones are never farther off."""
+
 # -- alignment ------------------------------------------------------------------------------------
 
 STEADY_WINDOW = 0.5
@@ -151,6 +155,9 @@ LEAST_WHITE, LONGEST_COLOUR = -4.0, 1e4
 
 SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
 """Logarithm of the factors on a noise that are tried first, and of the largest."""
+
+NOT_NOISE = 30.0
+"""Times the white noise of a model, beyond which a log is more likely wrong than a calibration."""
 
 AMBIGUOUS = 3.0
 """Of the log-likelihood: an explanation that is less than 20 times as probable is no decision."""

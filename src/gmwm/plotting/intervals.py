@@ -29,19 +29,20 @@ def intervals(
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-    most = max(len(rows) for rows in panels.values())
+    names = max((list(rows) for rows in panels.values()), key=len)
     figure, axes = plt.subplots(
-        1, len(panels), figsize=(4.4 * len(panels), 1.2 + 0.38 * most), layout="constrained",
-        squeeze=False,
+        1, len(panels), figsize=(4.4 * len(panels), 1.2 + 0.38 * len(names)), layout="constrained",
+        squeeze=False, sharey=True,
     )  # fmt: skip
+    axes[0, 0].set_yticks(range(len(names)), names)
+    axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     for ax, (title, rows) in zip(axes[0], panels.items(), strict=True):
-        for place, (values, (value, lower, upper)) in enumerate(rows.values()):
+        for name, (values, (value, lower, upper)) in rows.items():
+            place = names.index(name)
             ax.plot([lower, upper], [place, place], color=COMPONENT_COLOURS[0], linewidth=2.0)
             ax.plot(value, place, "o", color=COMPONENT_COLOURS[0], markersize=7)
             ax.plot(values, [place] * len(values), "|", color=DATA_COLOUR, markersize=11)
         ax.axvline(1.0, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
-        ax.set_yticks(range(len(rows)), list(rows))
-        ax.invert_yaxis()
         ax.set_xscale("log")
         first, last = ax.get_xlim()
         marked = (1.0, 3.0) if last > _WIDE * first else (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0, 9.0)

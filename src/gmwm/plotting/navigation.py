@@ -72,7 +72,8 @@ def track(
         ax.set_xlabel("east [m]")
         ax.set_ylabel("north [m]")
         _plain(ax)
-        ax.legend(fontsize="x-small")
+        # Below: solutions run from corner to corner.
+        ax.legend(fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
 
 
@@ -162,8 +163,11 @@ def growth(
     for column, (title, filters) in enumerate(panels.items()):
         for row, label in enumerate(labels):
             ax = axes[row, column]
-            for colour, _, (name, (time, rms, predicted)) in _styles(filters):
-                ax.plot(time, rms[:, row], color=colour, linewidth=1.7,
+            for behind, (colour, _, (name, (time, rms, predicted))) in zip(
+                reversed(range(len(filters))), _styles(filters), strict=True
+            ):
+                # Wider the farther behind: filters that err alike are all seen.
+                ax.plot(time, rms[:, row], color=colour, linewidth=1.4 + 0.9 * behind,
                         label=literal(name, _IN_LEGEND))  # fmt: skip
                 ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
             _plain(ax)

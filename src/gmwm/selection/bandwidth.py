@@ -12,13 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments import Design, dictionary, dictionary_fit
+from gmwm.estimate.moments import Design, Profile, dictionary, dictionary_fit
 from gmwm.estimate.problem import (
     Scales,
-    Term,
     objectives_with,
     solve_nonnegative,
     weight_root,
@@ -104,7 +102,7 @@ class _Beside:
 
     scales: Scales
     root: FloatArray
-    matrix: FloatArray
+    curves: FloatArray
     target: FloatArray
 
     @classmethod
@@ -125,40 +123,31 @@ class _Beside:
             and not (kind.ordered_by == "tau" and shape[0] < fastest * scales.dt)
             for kind, (_, shape) in zip(kinds, atoms, strict=True)
         ]
-        return cls(scales, root, root @ matrix[:, kept], root @ wv.variance)
+        return cls(scales, root, matrix[:, kept], wv.variance)
 
     @property
     def objective(self) -> float:
         """Weighted sum of squares without one more term."""
-        residual = solve_nonnegative(self.matrix, self.target)[1]
+        residual = solve_nonnegative(self.root @ self.curves, self.root @ self.target)[1]
         return float(residual @ residual)
 
     def squares(self, curves: FloatArray) -> FloatArray:
         """Weighted sums of squares with each curve in turn, (J, G) to (G,)."""
-        return objectives_with(self.matrix, self.root @ curves, self.target)
+        root = self.root
+        return objectives_with(root @ self.curves, root @ curves, root @ self.target)
 
     def best(self, free: Process) -> tuple[Bandwidth, float]:
         """A family at its best shape, and the objective there."""
-        design, term = Design(Model((free,)), self.scales), Term.of(free, 0)
+        design = Design(Model((free,)), self.scales)
         start = design.grid(0)[int(np.argmin(self.squares(design.grid_curves(0))))]
         if isinstance(free, AveragedNoise):
             return self._whole_window(free, start)
-        together = np.column_stack([self.matrix, self.target])
-        z0 = free.shape_to_free(start)[term.free_shape]
-
-        def residual(z: FloatArray) -> FloatArray:
-            together[:, -1] = self.root @ design.curve(0, term.moved(start, z))
-            return solve_nonnegative(together, self.target)[1]
-
-        fitted = least_squares(
-            residual, z0, bounds=(z0 - _REACH, z0 + _REACH), diff_step=1e-4, xtol=1e-4, max_nfev=20
-        )
-        shape = term.moved(start, fitted.x)
+        profile = Profile(design, self.target, self.root, self.curves)
+        point = profile.refine(profile.at([start]), _REACH)
         names = [p.name for p in free.shape_parameters]
-        given = free.with_values(**dict(zip(names, shape, strict=True)))
-        return Bandwidth(given, given.with_values(bandwidth=None), z0.size), 2.0 * float(
-            fitted.cost
-        )
+        given = free.with_values(**dict(zip(names, point.shapes[0], strict=True)))
+        n_shapes = design.terms[0].n_shapes
+        return Bandwidth(given, given.with_values(bandwidth=None), n_shapes), point.objective
 
     def _whole_window(self, free: Process, start: Shape) -> tuple[Bandwidth, float]:
         """The best window of a whole number of samples: a moving average has no other."""

@@ -498,3 +498,12 @@ def test_what_is_left_out_is_reported_with_its_unit():
         (notice,) = [each for each in found if each.code == "line-left-out"]
         assert shown in notice.text
         assert notice.values["amplitude"] == 2e-2
+
+
+def test_what_is_asked_again_is_not_made_again():
+    model = WhiteNoise(1e-3) + RandomWalk(1e-5)
+    first = gmwm.bound(model)
+    assert gmwm.bound(model) is first
+    # A process of one's own may hold what its values do not show: equal is not the same.
+    assert gmwm.bound(WhiteNoise(1e-3) + RandomWalk(1e-5)) is not first
+    assert gmwm.bound(model, horizon=30.0).horizon == 30.0

@@ -179,6 +179,7 @@ def test_forms_of_iso_dates(tmp_path, form, zone, delimiter):
     ("wrong", "problem"),
     [("2026-03-01T00:00:65.000Z", "is no date that exists"),
      ("2026-03-01T00:00:60.000Z", "is no date that exists"),
+     ("2026-03-01T23:58:60.000Z", "is no date that exists"),
      ("2026-03-01T00:00:00.500+99:99", "is no date that exists"),
      ("2026-03-01T00:00:00.500+02:75", "is no date that exists"),
      ("2026-03-01T00:00:00.500", "has no zone, unlike the dates before it"),

@@ -7,9 +7,9 @@ import pytest
 
 import gmwm
 from gmwm.errors import InputError
-from gmwm.readers import read
+from gmwm.readers import read, tuning
 from gmwm.readers.clock.beat import without_beat
-from gmwm.readers.clock.uneven import followed
+from gmwm.readers.clock.uneven import _costs, followed
 
 N = 6000
 
@@ -243,3 +243,13 @@ def test_a_clock_that_wanders_has_no_shifts(recorded):
     clock.stamps = clock.stamps + wander
     found, _ = recorded(clock)
     assert {each.code for each in found.notices}.isdisjoint({"clock-shifts", "clock-set"})
+
+
+def test_rows_are_copies_only_where_their_stamps_do_not_repeat_as_well():
+    """Samples that repeat with their stamps are buffered; those that repeat alone are copies."""
+    stamps = np.repeat(np.arange(50.0), 2)
+    same = np.diff(stamps, prepend=-1.0) == 0.0
+    usual = np.array([*tuning.CLOCK_COSTS, 0.0])
+    lone = np.where(np.arange(100) < 30, same, False)
+    np.testing.assert_array_equal(_costs(stamps, lone), usual)
+    np.testing.assert_array_equal(_costs(np.arange(100.0), same)[[1, 4]], [0.0, usual[1]])

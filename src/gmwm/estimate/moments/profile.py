@@ -42,6 +42,9 @@ class Point:
     objective: float
 
 
+Bounds = tuple[FloatArray, FloatArray]
+
+
 class _Place(NamedTuple):
     """What is known where residuals were asked for."""
 
@@ -62,16 +65,27 @@ class Profile:
         Observed wavelet variances, u^2.
     root : (J, J) ndarray
         L with L'L the weight matrix.
+    beside : (J, k) ndarray, optional
+        Curves of what else the series may hold, each with an amplitude of its own, at the end of
+        `Point.x`.
     """
 
-    def __init__(self, design: Design, target: FloatArray, root: FloatArray) -> None:
+    def __init__(
+        self, design: Design, target: FloatArray, root: FloatArray, beside: FloatArray | None = None
+    ) -> None:
         self.design = design
-        self.target, self.root = (np.array(each, order="C") for each in (target, root))
-        linear = np.isin(np.arange(len(design.terms)), design.linear)
+        if beside is None:
+            beside = np.zeros((target.size, 0))
+        self.target, self.root, self._beside = (
+            np.array(each, order="C") for each in (target, root, beside)
+        )
+        linear = np.isin(np.arange(len(design.terms) + self._beside.shape[1]), design.linear)
+        linear[len(design.terms) :] = True
         self._linear, self._given = np.flatnonzero(linear), np.flatnonzero(~linear)
 
     def _profiled(self, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Weighted columns, best free amplitudes, and the weighted residuals."""
+        curves = np.hstack([curves, self._beside])
         columns, x, residual = profiled(self.root, curves, self._linear, self._given, self.target)
         return columns, x, residual
 
@@ -80,18 +94,19 @@ class Profile:
         _, x, residual = self._profiled(self.design.curves(shapes))
         return Point(shapes, x, float(residual @ residual))
 
-    def refine(self, start: Point) -> Point:
-        """Local minimum reached from ``start``; never worse than it."""
-        design = self.design
-        z0 = design.pack(start.shapes)
+    def refine(self, start: Point, reach: float = np.inf) -> Point:
+        """Local minimum reached from ``start``, at most so far from it; never worse than it."""
+        z0 = self.design.pack(start.shapes)
         if z0.size == 0:
             return self.at(start.shapes)
         if z0.size > self.target.size:
             return self.at(start.shapes)
-        point = self._compiled(z0, start) or self._stepwise(z0, start)
+        low, high = self.design.bounds
+        bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
+        point = self._compiled(z0, start, bounds) or self._stepwise(z0, start, bounds)
         return point if point.objective <= start.objective else start
 
-    def _compiled(self, z0: FloatArray, start: Point) -> Point | None:
+    def _compiled(self, z0: FloatArray, start: Point, bounds: Bounds) -> Point | None:
         """The local minimum, if all curves are known in compiled form."""
         design = self.design
         compiled = design.compiled
@@ -100,21 +115,22 @@ class Profile:
         shapes = np.zeros((len(design.shaped), MOST_SHAPES))
         for row, i in zip(shapes, design.shaped, strict=True):
             row[: len(start.shapes[i])] = start.shapes[i]
-        fixed = np.zeros((self.target.size, len(design.terms)))
+        nothing = np.zeros((self.target.size, len(design.terms)))
+        fixed = np.hstack([nothing, self._beside])
         for i, term in enumerate(design.terms):
             if not term.n_shapes:
                 fixed[:, i] = design.curve(i, start.shapes[i])
         weighted = (self.root, self._linear, self._given, compiled.amplitudes, self.target)
         found, z, x, objective = refined(
-            z0, design.bounds, compiled.terms, shapes, fixed, compiled.levels, weighted,
+            z0, bounds, compiled.terms, shapes, fixed, compiled.levels, weighted,
             (*_TOLERANCES.values(), _MAX_EVALUATIONS),
         )  # fmt: skip
         return Point(design.unpack(z, start.shapes), x, objective) if found else None
 
-    def _stepwise(self, z0: FloatArray, start: Point) -> Point:
+    def _stepwise(self, z0: FloatArray, start: Point, bounds: Bounds) -> Point:
         """The same for curves of any process."""
         design = self.design
-        low, high = design.bounds
+        low, high = bounds
         template = start.shapes
         owners = design.owners()
 
@@ -140,7 +156,8 @@ class Profile:
 
         def slope_at(z: FloatArray) -> FloatArray:
             _, shapes, columns, x, _ = at(z)
-            slopes, factor = design.shape_derivatives(shapes), design.amplitudes(x)[owners]
+            slopes = design.shape_derivatives(shapes)
+            factor = design.amplitudes(x[: len(design.linear)])[owners]
             return np.asarray(projected(self.root, columns, x, slopes, factor))
 
         found = leastsq(

@@ -121,8 +121,7 @@ def bound_notices(upper: Mapping[str, float]) -> list[Notice]:
     return [
         Notice(
             "amplitude-bound", "bad", key,
-            "not identifiable from these data (not significantly above zero): below "
-            f"{bound:.3g} with 95 % confidence",
+            "not significantly above zero, so that only an upper bound is known",
             {"upper": bound},
         )
         for key, bound in upper.items()

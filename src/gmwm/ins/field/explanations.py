@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -152,6 +153,26 @@ def far_heading(base: Replay) -> Candidate:
         return _fitted(base, base.turned_by(angle, tuning.FINE_HEADING), (_HEADING,), angle)
 
     return Candidate(frozenset({"heading"}), difference(tried[best], base), refined)
+
+
+def wrong_signs(base: Replay) -> Iterator[Candidate]:
+    """Axes of the gyros or of the accelerometers that point the other way.
+
+    Two of both kinds are a mounting and no fault; of one kind they are axes of another body. A sign
+    that the motion does not show is zero.
+    """
+    for kind in ("gyro", "accel"):
+        ways = list(product((1.0, -1.0), repeat=3))
+        tried = [base.with_signs(kind, signs) for signs in ways]
+        gains = np.array([difference(each, base) for each in tried])
+        best = int(np.argmax(gains))
+        alike = np.array(ways)[gains > gains[best] - tuning.AMBIGUOUS]
+        shown = np.where(np.all(alike == alike[0], axis=0), alike[0], 0.0)
+        values = dict(zip(("x", "y", "z"), shown.tolist(), strict=True))
+        change = partial(Replay.with_signs, kind=kind, signs=ways[best])
+        gain, price = float(gains[best]), cost(1, len(ways))
+        found = Explanation("axis-signs", kind, change, tried[best], gain, price, values)
+        yield Candidate(frozenset({"axis-signs"}), gain, partial(tuple, (found,)))
 
 
 def _fitted(

@@ -16,6 +16,7 @@ from gmwm.ins.field.explanations import (
     constant_errors,
     cost,
     far_heading,
+    wrong_signs,
 )
 from gmwm.ins.field.noises import coloured, fix_noise, outliers, sensor_noise
 from gmwm.ins.field.replay import Replay
@@ -106,7 +107,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
     if contradicted(here) or any(each.gain > cost(1) for each in found):
         sizes = [here.test(kind).nis.value for kind in here.kinds()]
         if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
-            found.append(far_heading(here))
+            found += [far_heading(here), *wrong_signs(here)]
         slow = coloured(here)
         if slow is not None:
             found.append(slow)
@@ -232,6 +233,20 @@ def _heading(fault: Explanation) -> tuple[str, str]:
     )
 
 
+def _signs(fault: Explanation) -> tuple[str, str]:
+    turned, unseen = (
+        [f"{fault.where}_{axis}" for axis, sign in fault.values.items() if sign == wanted]
+        for wanted in (-1.0, 0.0)
+    )
+    text = f"the sign of {', '.join(turned) or 'an axis'} is the wrong one"
+    if unseen:
+        text += f" (this motion does not show that of {', '.join(unseen)})"
+    return text, (
+        "bring gyros and accelerometers to the same axes forward, right, down: "
+        f"--channel {(turned or unseen)[0]}=-COLUMN turns one round"
+    )
+
+
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
     share = f"{100.0 * fault.values['fraction']:.2g} %"
@@ -261,8 +276,11 @@ def _fix_noise(fault: Explanation) -> tuple[str, str]:
 
 def _white(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
+    text = f"white noise is {_times(factor)} the model's"
+    if factor > tuning.NOT_NOISE:
+        return text, "vibration adds to it, but look first at units, axes and stamps"
     return (
-        f"white noise is {_times(factor)} the model's",
+        text,
         f"the sensor model is wrong: multiply N by {factor:.2g}, or calibrate again; vibration "
         "adds to it",
     )
@@ -284,6 +302,7 @@ _WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {
     "time-offset": _time,
     "lever-arm": _arm,
     "heading": _heading,
+    "axis-signs": _signs,
     "outliers": _outliers,
     "coloured": _coloured,
     "fix-noise": _fix_noise,

@@ -14,6 +14,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.calendar import in_seconds
+from gmwm.ins.field.fix_axes import check_axes
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.logs import (
     POSITION_WORDS,
@@ -133,6 +134,7 @@ def read_fixes(
     ------
     InputError
         If the file cannot be used; the message names the line.
+        If positions and velocities go together with two columns exchanged only.
     """
     return read_fix_log(path).aiding(start, position_sd, velocity_sd, lever_arm)
 
@@ -165,8 +167,11 @@ def _read(table: CsvTable, scale: str) -> FixLog:
         count = int(np.count_nonzero(no_fix))
         text = f"{count} positions at 0, 0 are counted as missing"
         notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
+    time = found[TIME] * (stated_seconds(table.source, table.names[columns[TIME]]) or 1.0)
+    if velocity is not None:
+        check_axes(table.source, time, position, velocity)
     return FixLog(
-        time=found[TIME] * (stated_seconds(table.source, table.names[columns[TIME]]) or 1.0),
+        time=time,
         position=position,
         velocity=velocity,
         position_sd=_deviations(table, columns, found, "sd ", position),

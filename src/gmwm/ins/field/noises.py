@@ -30,7 +30,7 @@ def outliers(base: Replay) -> Candidate | None:
         start = base.anywhere()
         found.append(_left_out(base, start, _gated(start)))
     best = max((each for each in found if each), key=lambda each: each.excess, default=None)
-    return best and Candidate(frozenset({"outliers"}), best.gain, lambda: (best,))
+    return Candidate(frozenset({"outliers"}), best.gain, lambda: (best,)) if best else None
 
 
 def _gated(start: Replay) -> FilterInnovations:

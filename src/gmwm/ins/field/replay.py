@@ -146,6 +146,16 @@ class Replay:
             self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
         )
 
+    def with_signs(self, kind: str, signs: tuple[float, ...]) -> Replay:
+        """Axes of a kind of sensors the other way round; levelled by the accelerometers anew."""
+        turn = np.array(signs)
+        if kind == "gyro":
+            return replace(self, imu=replace(self.imu, rotation=self.imu.rotation * turn))
+        x, y, z = -turn * matrix_from_rpy(self.state.rpy)[2]
+        rpy = np.array([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z)), self.state.rpy[2]])
+        imu = replace(self.imu, velocity=self.imu.velocity * turn)
+        return replace(self, imu=imu, state=replace(self.state, rpy=rpy))
+
     def anywhere(self) -> Replay:
         """A start that the first fix does not show: it is an outlier."""
         return replace(self, sd=replace(self.sd, position=tuning.ANYWHERE))

@@ -92,7 +92,7 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
     adjoint, information = np.zeros(n), np.zeros((n, n))
     lla, covariance = np.empty((at.size, 3)), np.empty((at.size, 3, 3))
     place = {epoch: i for i, epoch in enumerate(wanted.tolist())}
-    for epoch, advance, updates in reversed(forward.steps):
+    for before, epoch, updates in reversed(forward.steps):
         if epoch in place:
             i, C = place[epoch], kept[epoch]
             error = -C[:3] @ adjoint
@@ -103,14 +103,18 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
             adjoint = adjoint - h * (K @ adjoint + update.innovation / update.variance)
             left = information - np.outer(h, K @ information)
             information = left - np.outer(left @ K, h) + np.outer(h, h) / update.variance
-        if advance is not None:
+        for first, count in reversed(forward.strides(before, epoch)):
+            advance = forward.transition(first, count)[0]
             adjoint = advance.T @ adjoint
             information = advance.T @ information @ advance
     return Smoothed(at, lla, covariance, solution)
 
 
 class _Forward:
-    """The covariance along a solution, with all that the way back needs."""
+    """The covariance along a solution, with what the way back needs.
+
+    Transitions are computed again on that way: kept, they would be most of the memory.
+    """
 
     def __init__(
         self, replay: Replay, ready: Filter, events: Events, solution: Solution, P: FloatArray
@@ -120,7 +124,7 @@ class _Forward:
         nodes = np.rint(solution.time / replay.imu.dt).astype(np.int64)
         self._index = {int(epoch): i for i, epoch in enumerate(nodes)}
         self._nodes, self._solution = nodes, solution
-        self.steps: list[tuple[int, FloatArray | None, list[_Update]]] = []
+        self.steps: list[tuple[int, int, list[_Update]]] = []
         self._events = events
 
     def position(self, epoch: int) -> FloatArray:
@@ -131,31 +135,30 @@ class _Forward:
         """Go through; the covariance after the measurements of the wanted epochs."""
         epochs = np.union1d(self._nodes, self._events.epoch)
         kept, event, before = {}, 0, int(epochs[0])
-        n = self._P.shape[0]
         for epoch in epochs.tolist():
-            advance = None
-            if epoch > before:
-                advance = np.eye(n)
-                while before < epoch:
-                    count = min(epoch - before, self._ready.stride)
-                    advance = self._advanced(before, count) @ advance
-                    before += count
+            for first, count in self.strides(before, epoch):
+                self._propagate(first, count)
             updates = []
             while event < self._events.epoch.size and self._events.epoch[event] == epoch:
                 updates += self._updates(event, epoch)
                 event += 1
-            self.steps.append((epoch, advance, updates))
+            self.steps.append((before, epoch, updates))
+            before = epoch
             if epoch in wanted:
                 kept[epoch] = self._P.copy()
         return kept
+
+    def strides(self, before: int, epoch: int) -> list[tuple[int, int]]:
+        """First epoch and number of samples of each step of the covariance between two epochs."""
+        stride = self._ready.stride
+        return [(k, min(stride, epoch - k)) for k in range(before, epoch, stride)]
 
     def _nominal(self, epoch: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         i = int(np.clip(np.searchsorted(self._nodes, epoch, side="right") - 1, 0, None))
         return self._solution.velocity[i], self._solution.lla[i], self._solution.matrix[i], i
 
-    def _advanced(self, epoch: int, count: int) -> FloatArray:
-        """Propagate the covariance by some samples; returns the transition."""
-        states, dt = self._ready.states, self._imu.dt
+    def transition(self, epoch: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of all states over some samples, and that of navigation by itself and by sensors."""
         v, lla, C, i = self._nominal(epoch + 0.5 * count)
         if i + 1 < self._nodes.size:
             later = i + 1
@@ -165,15 +168,19 @@ class _Forward:
             v = (1.0 - share) * v + share * self._solution.velocity[later]
             C = (1.0 - share) * C + share * self._solution.matrix[later]
         F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
-        transition(v, lla, np.ascontiguousarray(C), count * dt, F, A, B)
-        n = self._P.shape[0]
+        transition(v, lla, np.ascontiguousarray(C), count * self._imu.dt, F, A, B)
+        return _whole(self._ready.states, A, B, count), A, B
+
+    def _propagate(self, epoch: int, count: int) -> None:
+        """Propagate the covariance by some samples."""
+        _, A, B = self.transition(epoch, count)
+        states, n = self._ready.states, self._P.shape[0]
         propagate(
             self._P, A, B, states.axis, states.partner, states.phi[count], states.phi_off[count],
             states.gain[count], states.noise[count], states.noise_off[count], states.cross[count],
             states.integral[count], np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)),
             np.zeros(n),
         )  # fmt: skip
-        return _whole(states, A, B, count)
 
     def _updates(self, event: int, epoch: int) -> list[_Update]:
         """Update the covariance by the components of a fix, with the filter's innovations."""

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import islice
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -160,8 +161,11 @@ class BagTable:
         numbers = [self.message.columns[self.names[column]] for column in wanted]
         row = 0
         with self.bag.opened() as reader:
-            for block in _blocks(reader, self.topic.name):
-                _, times, raw = zip(*block, strict=True)
+            # Records that are let go at once are cheap; of those held, so are messages alone.
+            records = map(itemgetter(1, 2) if self.log else itemgetter(2),
+                          _messages(reader, self.topic.name))  # fmt: skip
+            while block := list(islice(records, _BLOCK)):
+                times, raw = zip(*block, strict=True) if self.log else ((), block)
                 where = partial(self._place, row)
                 stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
                 if self.log:
@@ -300,12 +304,6 @@ def _counts(reader: Any) -> tuple[dict[str, dict[str, int]], list[str]]:
                 of_type = counts[each.msgtype]
                 of_type[each.topic] = of_type.get(each.topic, 0) + each.msgcount
     return counts, sorted(set(others))
-
-
-def _blocks(reader: Any, topic: str) -> Iterator[list[_Record]]:
-    records = _messages(reader, topic)
-    while block := list(islice(records, _BLOCK)):
-        yield block
 
 
 def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Record]:

@@ -79,8 +79,8 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
     for _ in range(4):
         z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners()))
         start = profile.at(design.unpack(z, best.shapes))
-        compiled = profile._compiled(z, start)
-        stepwise = profile._stepwise(z, start)
+        compiled = profile._compiled(z, start, profile.design.bounds)
+        stepwise = profile._stepwise(z, start, profile.design.bounds)
         assert compiled.objective <= start.objective
         assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
         np.testing.assert_allclose(
@@ -89,13 +89,39 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
         np.testing.assert_allclose(compiled.x, profile.at(compiled.shapes).x, rtol=1e-8)
 
 
+def test_curves_beside_a_term_are_those_of_terms_of_a_model(wv):
+    """They take what is theirs, in both searches; a step stays within its reach."""
+    root = weight_root(dictionary_fit(wv, wv.variance).covariance)
+    low_pass = gmwm.LowPassNoise(order=2.0, damping=0.7)
+    others = (gmwm.WhiteNoise(), gmwm.Resonance(frequency=1.0, damping=0.05), gmwm.RandomWalk())
+    whole = Design(gmwm.Model((low_pass, *others)), Scales.of(wv))
+    shapes = [(6.0, 2.0, 0.7), (), (1.0, 0.05), ()]
+    beside = whole.curves(shapes)[:, 1:]
+    design = Design(gmwm.Model((low_pass,)), Scales.of(wv))
+    alone = Profile(design, wv.variance, root, beside)
+    start = alone.at(shapes[:1])
+    found = alone.refine(start)
+    together = Profile(whole, wv.variance, root)
+    expected = together.refine(together.at(shapes))
+    stepwise = alone._stepwise(design.pack(start.shapes), start, design.bounds)
+    for other in (expected, stepwise):
+        assert found.objective == pytest.approx(other.objective, rel=1e-7)
+        assert found.shapes[0][0] == pytest.approx(other.shapes[0][0], rel=1e-4)
+    assert abs(np.log(found.shapes[0][0] / 6.0)) > 0.2
+    near = alone.refine(start, 0.1)
+    assert abs(np.log(near.shapes[0][0] / 6.0)) == pytest.approx(0.1, rel=1e-6)
+
+
 def test_a_term_without_an_amplitude_does_not_hold_up_the_others(wv):
     """Its column of the Jacobian is zero, as long as it has none."""
     design = Design(gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), Scales.of(wv))
     profile = Profile(design, wv.variance, np.diag(1.0 / wv.variance))
     start = profile.at([(), (0.3,), (0.3,)])  # of two alike, one has all
     z = design.pack(start.shapes)
-    compiled, stepwise = profile._compiled(z, start), profile._stepwise(z, start)
+    compiled, stepwise = (
+        profile._compiled(z, start, profile.design.bounds),
+        profile._stepwise(z, start, profile.design.bounds),
+    )
     assert np.count_nonzero(start.x) == 2
     assert compiled.objective < start.objective
     assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)

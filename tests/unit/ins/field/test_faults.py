@@ -134,6 +134,25 @@ def test_an_imu_mounted_rotated():
     assert np.linalg.norm(arm[:2] - turned) < 0.6
 
 
+@pytest.mark.parametrize(
+    ("kind", "signs", "shown"),
+    [("gyro", (-1, -1, -1), (0, 0, -1)), ("accel", (-1, -1, -1), (-1, -1, -1)),
+     ("accel", (1, -1, -1), (1, -1, -1))],
+)  # fmt: skip
+def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
+    """A car on level roads shows the sign of its yaw rate alone."""
+    log, _ = emulated_log(212, duration=DURATION, rate=10.0)
+    of = {"gyro": log.imu.rotation, "accel": log.imu.velocity}
+    of[kind] = of[kind] * signs
+    turned = replace(log, imu=type(log.imu)(log.imu.dt, of["gyro"], of["accel"]))
+    navigated = Navigated.of(turned)
+    (fault,) = navigated.fault_notices
+    assert (fault.code, fault.where) == ("axis-signs", kind)
+    assert tuple(fault.values[axis] for axis in "xyz") == shown
+    assert navigated.faults.explained
+    assert f"--channel {kind}_z" in fault.action or kind == "accel"
+
+
 def test_two_faults_together():
     navigated = found(208, "stamps", "lever arm", duration=300.0)
     assert set(codes(navigated)) == {"time-offset", "lever-arm"}

@@ -48,6 +48,37 @@ def test_velocities(tmp_path: Path, header: str, sign: float) -> None:
 
 
 @pytest.mark.parametrize(
+    ("column", "what"),
+    [
+        ("latitude_deg,longitude_deg,height_m,vn,ve,vd", ""),
+        ("longitude_deg,latitude_deg,height_m,vn,ve,vd", "latitude and longitude"),
+        ("latitude_deg,longitude_deg,height_m,ve,vn,vd", "velocity north and east"),
+        ("latitude_deg,longitude_deg,height_m,vn,ve,vu", "velocity down and up"),
+    ],
+)
+@pytest.mark.parametrize("outliers", [False, True])
+def test_columns_that_are_exchanged(tmp_path: Path, column: str, what: str, outliers: bool) -> None:
+    """Silently, a filter would blame its sensors."""
+    rng = np.random.default_rng(5)
+    time = np.arange(400.0)
+    velocity = np.stack(
+        [12.0 * np.cos(time / 40.0), 9.0 * np.sin(time / 30.0), 0.4 * np.sin(time / 20.0)], axis=1
+    )
+    gone = np.cumsum(velocity, axis=0) + rng.standard_normal((400, 3)) * [1.0, 1.0, 1.5]
+    if outliers:
+        gone[rng.random(400) < 0.03] += 50.0
+    noisy = velocity + 0.1 * rng.standard_normal((400, 3))
+    latitude, longitude = 46.0 + gone[:, 0] / 111e3, 7.0 + gone[:, 1] / 77e3
+    rows = np.column_stack([time, latitude, longitude, 400.0 - gone[:, 2], noisy])
+    path = write(tmp_path, rows.tolist(), f"time_s,{column}")
+    if what:
+        with pytest.raises(InputError, match=f"only if {what} are exchanged"):
+            read_fixes(path)
+    else:
+        assert len(read_fixes(path).fixes) == 2
+
+
+@pytest.mark.parametrize(
     ("header", "count"),
     [
         ("sd_north_m,sd_east_m,sd_down_m", 3),

@@ -154,6 +154,7 @@ def test_every_key_is_documented() -> None:
     table = page.split("| key | what")[1].split("Paths are relative")[0]
     for name in ExperimentSpec.model_fields:
         assert f"`{name}`" in table
+    page = (REPOSITORY / "docs/own-log.md").read_text()
     example = page.split("As a file:")[1].split("```")[1]
     for name in MeasuredSpec.model_fields:
         assert f"\n{name}:" in example

@@ -1,0 +1,83 @@
+"""``gmwm calibrate``: what each option does to the report that it writes."""
+
+import html
+import re
+
+import numpy as np
+import pytest
+
+N = 5000
+READING = ("--rate", "100", "--gyro-unit", "deg/s", "--accel-unit", "g", "--model", "N", "-q")
+STEP = 0.08  # deg/s
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """A gyro whose bias steps, another one, and an accelerometer: white noise."""
+    rng = np.random.default_rng(5)
+    gyro = 0.1 * rng.standard_normal((N, 2))
+    gyro[3000:, 0] += STEP
+    rows = np.column_stack([gyro, 1.0 + 1e-3 * rng.standard_normal(N)])
+    path = tmp_path_factory.mktemp("data") / "static.csv"
+    np.savetxt(path, rows, "%.6f", ",", header="gyro_x,gyro_y,accel_z", comments="")
+    return path
+
+
+@pytest.fixture
+def report(run, file, tmp_path, monkeypatch):
+    """A function of further options: the text of the report, and the page."""
+    monkeypatch.setattr("gmwm.report.numbers.HORIZONS", (1.0, 60.0))
+
+    def _report(*options):
+        code, _, told = run("calibrate", file, *READING, *options, "-o", "out")
+        assert code == 0, told
+        page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+        shown = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+        return " ".join(html.unescape(re.sub("<[^>]+>", " ", shown)).split()), page
+
+    return _report
+
+
+def test_what_is_found_and_taken_off(report):
+    text, _ = report()
+    assert "Usable in part : gyro_x not valid" in text
+    assert re.search(r"bad gyro_x A step of .*? --remove-departures", text)
+    text, _ = report("--remove-departures")
+    assert "Healthy, with care : departures from noise taken off (gyro_x)" in text
+    assert re.search(r"note gyro_x A step of .*? Taken off", text)
+    assert "not valid" not in text
+    assert "calibrate static.csv" not in text  # the command has the path that was given
+    assert "--remove-departures -o out" in text
+
+
+def test_a_data_sheet_and_an_exported_file(report, tmp_path):
+    (tmp_path / "sheet.yaml").write_text("gyro: {N: 0.3 deg/sqrt(h), B: 7 deg/h}\n")
+    text, page = report("--datasheet", "sheet.yaml", "--export", "kalibr", "--leave", "all")
+    assert "data sheet : sheet.yaml" in text
+    ratios = re.findall(r"Data sheet: N 0\.3 deg/sqrt\(h\) \(measured (\S+) times that\)", text)
+    assert list(map(float, ratios)) == pytest.approx([2.0, 2.0], rel=0.1)  # 0.1 deg/s at 100 Hz
+    assert page.count('"name":"data sheet"') == 2
+    # Nothing is looked for, and what is copied is what was written.
+    assert "The recording was not examined." in text
+    written = (tmp_path / "out" / "imu.yaml").read_text()
+    copied = re.findall("<pre[^>]*>(.*?)</pre>", page, flags=re.DOTALL)
+    assert written in map(html.unescape, copied)
+
+
+def test_channels_and_a_stretch(report):
+    text, page = report("--channels", "gyro", "--start", "5", "--stop", "25", "--leave", "all")
+    assert "20 s static at 100 Hz, 2,000 samples a channel" in text
+    assert "the part from 5 to 25 s is used" in text
+    assert 'id="gyro_y"' in page and 'id="accel_z"' not in page
+
+
+def test_blocks_of_a_file_that_memory_does_not_hold(report):
+    text, page = report("--memory", "0.0001")
+    assert "read a block at a time: shocks, outliers, lines" in text
+    assert "plot-series-1" not in page  # which needs all samples
+
+
+def test_several_recordings(report, file):
+    text, _ = report(file, "--leave", "all", "--channels", "accel")
+    assert "static.csv, static.csv: stochastic error models 100 s static" in text
+    assert text.count("sha256 of static.csv") == 1
