@@ -232,8 +232,8 @@ def show(result: Calibration) -> None:
     from gmwm.report import duration_text
 
     size = f"{duration_text(result.duration)} at {result.rate:g} Hz, {result.n:,} samples a channel"
-    for line in wrapped(f"{result.source}: {size}", indent=2):
-        click.echo(line)
+    # `click.echo` takes a terminal of ASCII for one of UTF-8.
+    print("\n".join(wrapped(f"{result.source}: {size}", indent=2)))
     print_whole(new_console(), _table(result))
     shown = worst_first([each for each in result.notices if _is_shown(each)])
     remarks = [str(with_option(notice)) for notice in shown]
@@ -244,7 +244,7 @@ def show(result: Calibration) -> None:
         of_fit = [notice for notice in fit.notices if notice.code not in _OF_RECORDING]
         remarks += [f"{name}: {with_option(notice)}" for notice in of_fit]
     for remark in remarks:
-        click.echo("\n".join(wrapped(remark, first="- ", indent=2)))
+        print("\n".join(wrapped(remark, first="- ", indent=2)))
 
 
 def _is_shown(notice: Notice) -> bool:

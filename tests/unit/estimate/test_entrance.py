@@ -110,7 +110,7 @@ class TestWhatIsOff:
             )
             if "K" in fit.upper_bounds:
                 assert not fit.valid
-                assert "K: not identifiable" in fit.message
+                assert "K: not significantly above zero" in fit.message
                 assert fit.interval()["K"] == (0.0, fit.upper_bounds["K"])
                 covered += 1
             else:

@@ -241,6 +241,8 @@ def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights)
         statistical = moments.covariance(noise)
         covariance = level.added_to(statistical, moments.target)
         relaxed = covariance if rounds == 1 else (1.0 - part) * relaxed + part * covariance
+        if np.min(np.diag(relaxed)) < np.finfo(float).tiny:
+            return None  # a noise that some level has nothing of gives it a weight beyond all
         profile = Profile(design, moments.target, weights.root(relaxed))
         # Weights from a first fit may point elsewhere: search anew once, then follow.
         point = search(profile) if rounds == 1 else profile.refine(profile.at(point.shapes))

@@ -241,10 +241,7 @@ def _signs(fault: Explanation) -> tuple[str, str]:
     text = f"the sign of {', '.join(turned) or 'an axis'} is the wrong one"
     if unseen:
         text += f" (this motion does not show that of {', '.join(unseen)})"
-    return text, (
-        "bring gyros and accelerometers to the same axes forward, right, down: "
-        f"--channel {(turned or unseen)[0]}=-COLUMN turns one round"
-    )
+    return text, "bring gyros and accelerometers to the same axes forward, right, down"
 
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
