@@ -241,7 +241,10 @@ def _signs(fault: Explanation) -> tuple[str, str]:
     text = f"the sign of {', '.join(turned) or 'an axis'} is the wrong one"
     if unseen:
         text += f" (this motion does not show that of {', '.join(unseen)})"
-    return text, "bring gyros and accelerometers to the same axes forward, right, down"
+    return text, (
+        "bring gyros and accelerometers to the same axes forward, right, down: turn "
+        f"{', '.join(turned or unseen)} round"
+    )
 
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
