@@ -29,8 +29,9 @@ def test_what_a_killed_process_was_at_is_done_again(tmp_path):
     work = Square(tmp_path, once=(1,), always=(4,))
     found = list(results(work, range(8), jobs=2, lost=lambda number: -number))
     assert sorted(found) == [(n, -4 if n == 4 else n**2) for n in range(8)]
-    # One of the three may have ended at 1, before it came to 4.
-    assert len(list(tmp_path.glob("4-*"))) in (2, 3)
+    # One of the three may have ended at 1, before it came to 4; or the process that ended at 1 took
+    # results with it, so that 4, where another one ended, was not yet among the next items.
+    assert 2 <= len(list(tmp_path.glob("4-*"))) <= 4
     assert str(os.getpid()) not in {path.name.partition("-")[2] for path in tmp_path.iterdir()}
 
 
