@@ -108,7 +108,7 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def _is_evident(notice: Notice) -> bool:
-    return notice.code in KINDS and bool(notice.values["evident"])
+    return notice.code in KINDS and _departure(notice).is_evident
 
 
 def _departure(notice: Notice) -> Departure:

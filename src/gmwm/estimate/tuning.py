@@ -52,8 +52,9 @@ BEYOND_CHANCE = 2.5
 
 POOR_P = 0.05
 """Level of the test that such a misfit is no chance where the chi-square test is passed: with the
-bar above alone, 1 in 100 fits of N+K, N+B, N+2GM and N+Q+GM to 2,000 s at 100 Hz were not valid,
-but 9 % of those of white noise, which no parameter fits to the coarse levels."""
+bar above alone, 4 of 400 fits of N+K, N+B, N+2GM and N+Q+GM to 2,000 s at 100 Hz were not valid,
+but 8 of 100 of white noise, which no parameter fits to the coarse levels
+(benchmarks/misfits.py)."""
 
 EXCLUDED_P = 0.001
 """Level of the test that no averaging time is missed: 4 standard errors for twenty of them."""
