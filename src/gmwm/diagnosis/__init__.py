@@ -3,7 +3,7 @@
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.repeated import thinned
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
-from gmwm.diagnosis.spectrum import Spectrum, spectrum
+from gmwm.diagnosis.spectral import Spectrum, spectrum
 from gmwm.diagnosis.still import Still, find_still, rest_of
 
 __all__ = [
