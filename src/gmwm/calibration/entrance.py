@@ -24,6 +24,7 @@ from gmwm.calibration.channel import (
     model_of,
     mostly_missing,
 )
+from gmwm.calibration.judgement import judged
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -37,16 +38,6 @@ from gmwm.diagnosis import thinned
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.variance import MIN_SAMPLES
-
-_SPOILING = {
-    "not-static": ("gyro", "accel"),
-    "tilt": ("accel",),
-    "rate-changes": ("gyro", "accel"),
-}
-"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
-
-_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
-"""Codes of issues of a channel that make its fit invalid where they are bad."""
 
 
 def calibrate(
@@ -159,17 +150,9 @@ def calibrate(
         for each in treated
         for notice in each.notices
     ]
-    spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
-    if not still:
-        spoiling.pop("not-static", None)  # as the caller says
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
     return calibration_of(
-        {
-            name: each
-            if isinstance(each, Notice)
-            else _judged(each, (*_of_sensor(each, spoiling.values()), *_of_channel(name, issues)))
-            for name, each in found.items()
-        },
+        judged(found, issues, still=still),
         dead,
         with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
         source=source,
@@ -269,21 +252,3 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     else:
         return mostly_missing(channel.name, channel.missing, channel.n)
     return Notice(code, "bad", channel.name, text, {"missing": channel.missing})
-
-
-def _of_sensor(found: ChannelModel, spoiling: Iterable[Notice]) -> list[Notice]:
-    """Those issues of the whole recording that concern its sensor."""
-    sensor = found.fit.wv.quantity or "gyro"
-    return [issue for issue in spoiling if sensor in _SPOILING[issue.code]]
-
-
-def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:
-    """The issues of a channel that make its numbers wrong, once each."""
-    bad = (each for each in issues if each.where == name and each.severity == "bad")
-    return list({each.code: each for each in bad if each.code in _SPOILING_CHANNEL}.values())
-
-
-def _judged(found: ChannelModel, spoiling: Iterable[Notice]) -> ChannelModel:
-    """With a fit that is not valid where an issue of its data makes its numbers wrong."""
-    notices = [Notice(e.code, "bad", "", e.text, e.values, e.action) for e in spoiling]
-    return replace(found, fit=replace(found.fit, notices=(*notices, *found.fit.notices)))

@@ -17,8 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    arguments_of_blocks,
     estimating_options,
+    memory_option,
     models_of_channels,
+    needs_the_whole,
     part_options,
     printing_options,
     read_recording,
@@ -36,9 +39,6 @@ if TYPE_CHECKING:
 
 NONE_VALID = 1
 """Exit status."""
-
-_WHOLE = ("start", "stop")
-"""Options of reading for which the whole file is read."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
@@ -91,10 +91,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
-@click.option("--memory", type=float, metavar="GB",
-              help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of "
-                   "ArduPilot is read a block at a time, and shocks, lines and motion are not "
-                   "looked for then. By default a quarter of the machine's.")  # fmt: skip
+@memory_option
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -159,7 +156,10 @@ def calibrate(
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = (
-                calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
+                calibrate_stream(
+                    files[0], model, screening=chosen, still=not everything, progress=bar,
+                    **arguments_of_blocks(reading),
+                )
                 if in_blocks
                 else run(
                     recordings, model, screening=chosen, still=not everything,
@@ -209,21 +209,13 @@ def _recordings(
         try:
             return [read_recording(file, **reading) for file in files], False
         except InputError as error:
-            whole = [name for name in _WHOLE if reading.get(name)]
-            if error.code != "memory" or len(files) > 1 or whole:
+            if error.code != "memory" or len(files) > 1 or needs_the_whole(reading):
                 raise
             too_large = error
     try:
-        return [next(read_blocks(files[0], **_of_stream(reading)))], True
+        return [next(read_blocks(files[0], **arguments_of_blocks(reading)))], True
     except InputError as error:
         raise (too_large if error.code == "not-divisible" else error) from None
-
-
-def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
-    """What `gmwm.calibrate_stream` is given for the options."""
-    from gmwm.cli.options import arguments_of_read
-
-    return arguments_of_read(**{k: v for k, v in reading.items() if k not in _WHOLE})
 
 
 def show(result: Calibration) -> None:

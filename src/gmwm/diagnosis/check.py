@@ -28,6 +28,7 @@ from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
     dead_notice,
     gap_notices,
+    length_notice,
     repeated_value_notice,
     saturation_notice,
     stuck_notice,
@@ -90,7 +91,12 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     # What is missing is counted anew, channel by channel.
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
     motion = find_motion(recording)
-    whole = [_length(recording), *motion_notices(motion), *read, *_clock(recording)]
+    whole = [
+        length_notice(recording.n, recording.rate),
+        *motion_notices(motion),
+        *read,
+        *_clock(recording),
+    ]
     if not motion.moves and (vibration := vibration_notice(recording)) is not None:
         whole.append(vibration)
     examined: dict[str, _Examined] = {}
@@ -135,22 +141,6 @@ def _together(recording: Recording, found: Sequence[Health]) -> Health:
         rate=recording.rate,
         n=recording.n,
     )
-
-
-def _length(recording: Recording) -> Notice:
-    length = recording.duration
-    text = f"{recording.n:,} samples at {recording.rate:g} Hz, {length:.6g} s"
-    numbers = {"duration": length, "rate": recording.rate}
-    if length < tuning.LONG_RECORD:
-        return Notice(
-            "length",
-            "note",
-            "",
-            f"{text}, too short for slow errors of minutes and more",
-            numbers,
-            "an hour or more shows them",
-        )
-    return Notice("length", "good", "", text, numbers)
 
 
 def _clock(recording: Recording) -> list[Notice]:

@@ -54,6 +54,23 @@ def _gap_notice(channel: Channel, dt: float) -> Notice | None:
     return Notice("gap", severity, channel.name, text, values, action)
 
 
+def length_notice(n: int, rate: float) -> Notice:
+    """Say how long a recording of n samples is, and whether that is short."""
+    length = n / rate
+    text = f"{n:,} samples at {rate:g} Hz, {length:.6g} s"
+    numbers = {"duration": length, "rate": rate}
+    if length < tuning.LONG_RECORD:
+        return Notice(
+            "length",
+            "note",
+            "",
+            f"{text}, too short for slow errors of minutes and more",
+            numbers,
+            "an hour or more shows them",
+        )
+    return Notice("length", "good", "", text, numbers)
+
+
 def dead_notice(channel: Channel) -> Notice | None:
     """Say that a channel never changes."""
     if channel.missing == channel.n or not channel.is_constant:
