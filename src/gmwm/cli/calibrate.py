@@ -53,8 +53,9 @@ _OF_RECORDING = (
 _EXPORTED = {
     "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
     "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m", "openvins": "kalibr_imu_chain.yaml",
-    "px4": "px4.params", "pyins": "pyins_imu.py", "state-space": "state-space.json",
+    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
+    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
+    "state-space": "state-space.json",
 }  # fmt: skip
 """Names of the files of programs that want something else than NAME.yaml."""
 
