@@ -57,10 +57,6 @@ def deviation(
         Level of the intervals, for the legend.
     title : str, optional
     ax : matplotlib.axes.Axes, optional
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     import matplotlib.pyplot as plt
 

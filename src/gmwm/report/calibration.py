@@ -60,10 +60,6 @@ def write_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from: commands, hashes of files.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     InputError

@@ -15,11 +15,6 @@ from gmwm.report.validation import svg
 def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
     """Write the report of a solution as one HTML file that needs no network.
 
-    Parameters
-    ----------
-    navigated : Navigated
-    path : path-like
-
     Raises
     ------
     InputError
@@ -45,11 +40,6 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
 
 def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
     """Write the report of a comparison of sensor models as one HTML file.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    path : path-like
 
     Raises
     ------

@@ -27,11 +27,6 @@ _COVERED = ("horizontal", "vertical")
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
     """Write the report of a validation as one HTML file that needs no network.
 
-    Parameters
-    ----------
-    validation : Validation
-    path : path-like
-
     Raises
     ------
     InputError

@@ -59,10 +59,6 @@ def wavelet_variance(
     confidence : float, optional
         Level of the chi-square intervals.
 
-    Returns
-    -------
-    WaveletVariance
-
     Raises
     ------
     InputError

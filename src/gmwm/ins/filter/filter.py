@@ -316,10 +316,6 @@ def navigate(
     second_order : bool, optional
         See `Filter`.
 
-    Returns
-    -------
-    Solution
-
     Raises
     ------
     InputError

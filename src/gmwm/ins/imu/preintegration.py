@@ -115,10 +115,6 @@ def preintegrate(
         that which the models have by themselves, zero for random walks; the increments alone then
         make a factor that knows of no states.
 
-    Returns
-    -------
-    Preintegration
-
     Raises
     ------
     InputError

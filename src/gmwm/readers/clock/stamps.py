@@ -102,10 +102,6 @@ class Clock:
         expected : float, optional
             Rate that the user or the file states, Hz.
 
-        Returns
-        -------
-        Timing
-
         Raises
         ------
         InputError

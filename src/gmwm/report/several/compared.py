@@ -53,10 +53,6 @@ def write_sensor_comparison_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     InputError

@@ -44,11 +44,6 @@ _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     """Write the report of a fleet as one HTML file that needs no network.
 
-    Parameters
-    ----------
-    fleet : Fleet
-    path : path-like
-
     Raises
     ------
     InputError

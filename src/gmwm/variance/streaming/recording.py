@@ -53,10 +53,6 @@ def stream(path: Any, **reading: Any) -> StreamedRecording:
     **reading
         The arguments of `gmwm.read`; ``rows`` of a block.
 
-    Returns
-    -------
-    StreamedRecording
-
     Raises
     ------
     InputError
