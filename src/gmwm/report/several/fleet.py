@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-import gmwm
-from gmwm._core.files import written
 from gmwm._core.units import factor, field_units
-from gmwm.errors import printable
+from gmwm.errors import InputError, printable
 from gmwm.fleet import (
     CONFIDENCE,
     CONTENT,
@@ -25,7 +23,7 @@ from gmwm.fleet import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.page import rendered, resource
+from gmwm.report.page import write_page
 from gmwm.report.text import duration_text, short
 
 _TITLES = {
@@ -49,10 +47,9 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     InputError
         If the file cannot be written.
     """
-    text = rendered(
+    return write_page(
+        path,
         "fleet.html",
-        style=resource("report.css"),
-        version=gmwm.__version__,
         fleet=fleet,
         notices=[notice for notice in fleet.notices if notice not in fleet.failed.values()],
         about=_about(fleet),
@@ -79,9 +76,6 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         troubled=_troubled(fleet),
         options=_options(fleet),
     )
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
 
 
 def fleet_fragment(fleet: Fleet) -> str:
@@ -155,7 +149,7 @@ def _scale(spread: Spread) -> tuple[str, float]:
         for unit in field_units(plain, spread.quantity)[:1]:
             try:
                 per_si = 1.0 / factor(unit.unit, spread.unit.replace(" s", "*s"))
-            except gmwm.InputError:
+            except InputError:
                 continue
             return unit.unit, per_si
     return spread.unit, 1.0
