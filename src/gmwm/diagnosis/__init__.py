@@ -7,5 +7,5 @@ from gmwm.diagnosis.result import (
     Health as Health,
     Repetition as Repetition,
 )
-from gmwm.diagnosis.spectrum import Spectrum as Spectrum, spectrum as spectrum
+from gmwm.diagnosis.spectral import Spectrum as Spectrum, spectrum as spectrum
 from gmwm.diagnosis.still import Still as Still, find_still as find_still, rest_of as rest_of

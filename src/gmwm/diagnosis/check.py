@@ -20,12 +20,10 @@ from gmwm.diagnosis.contamination import (
 from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, innovations
-from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
 from gmwm.diagnosis.repeated import interpolation_notice, repetition, repetition_notice, thinned
 from gmwm.diagnosis.resolution import rounding_notice, step_size
-from gmwm.diagnosis.resonances import Bump, find_resonances, resonance_notice
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
     dead_notice,
@@ -34,7 +32,7 @@ from gmwm.diagnosis.samples import (
     saturation_notice,
     stuck_notice,
 )
-from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.spectral import line_notices, peaks, resonance_notice
 from gmwm.diagnosis.still import vibration_notice
 from gmwm.errors import InputError
 from gmwm.readers import Channel, Recording
@@ -244,7 +242,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         drift_notice(name, unit, dt, quiet),
     ]
     notices = [one for one in found if one is not None]
-    lines, bumps = _peaks(quiet, dt)
+    lines, bumps = peaks(quiet, dt)
     if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
     notices += line_notices(name, unit, lines)
@@ -257,27 +255,6 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         outliers=outliers,
     )
     return _Examined(notices, facts, _standardized(errors, usable))
-
-
-def _peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
-    """Lines, and resonances of what they leave."""
-    if (
-        values.size < tuning.FEWEST_OF_SPECTRUM
-        or np.count_nonzero(~np.isnan(values)) < values.size / 2
-    ):
-        return (), ()
-    power = spectrum(values, dt)
-    if not np.any(power.density > 0.0):
-        return (), ()
-    lines = find_lines(power, background(power, bands(power)))
-    occupied = np.zeros(power.density.size, dtype=bool)
-    for line in lines:
-        margin = (line.stop - line.start) // 2
-        occupied[max(line.start - margin, 0) : line.stop + margin] = True
-    if 2 * np.count_nonzero(occupied) > occupied.size:
-        return lines, ()  # a square wave: hardly anything is left to be a background
-    rest = bands(power, occupied)
-    return lines, find_resonances(power, rest, background(power, rest), occupied)
 
 
 def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:
