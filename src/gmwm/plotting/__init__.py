@@ -3,7 +3,6 @@
 from gmwm.plotting.deviation import (
     COMPONENT_COLOURS as COMPONENT_COLOURS,
     DATA_COLOUR as DATA_COLOUR,
-    LINEAR_RESIDUAL as LINEAR_RESIDUAL,
     SUM_COLOUR as SUM_COLOUR,
     boxes as boxes,
     curves as curves,

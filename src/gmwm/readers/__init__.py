@@ -7,7 +7,6 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 
 from gmwm._core.units import AUXILIARY as AUXILIARY
 from gmwm.readers.at_rest import (
-    TurningGravity as TurningGravity,
     block_means as block_means,
     steady_turn as steady_turn,
     turning_gravity as turning_gravity,

@@ -21,6 +21,7 @@ from gmwm.ins.geometry.rotation import (
     rotate as rotate,
     rotation_coefficients as rotation_coefficients,
     rpy_from_matrix as rpy_from_matrix,
+    skew as skew,
     turn_body as turn_body,
     turn_navigation as turn_navigation,
 )

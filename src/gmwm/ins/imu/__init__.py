@@ -1,10 +1,6 @@
 """Inertial signals and the errors of sensors."""
 
 from gmwm.ins.imu.emulation import Imu as Imu, emulate as emulate
-from gmwm.ins.imu.preintegration import (
-    Preintegration as Preintegration,
-    preintegrate as preintegrate,
-)
 from gmwm.ins.imu.recorded import Recorded as Recorded
 from gmwm.ins.imu.sensors import (
     AXES as AXES,

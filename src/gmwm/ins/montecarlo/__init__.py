@@ -7,11 +7,11 @@ from gmwm.ins.montecarlo.consistency import (
     chi_square_ratio as chi_square_ratio,
     mean_ratio as mean_ratio,
 )
-from gmwm.ins.montecarlo.experiment import Experiment as Experiment
 from gmwm.ins.montecarlo.filter_errors import GROUPS as GROUPS, FilterErrors as FilterErrors
 from gmwm.ins.montecarlo.outage_errors import QUANTITIES as QUANTITIES
 from gmwm.ins.montecarlo.scenario import (
     ErrorSource as ErrorSource,
+    Experiment as Experiment,
     Scenario as Scenario,
     Simulated as Simulated,
 )
