@@ -53,8 +53,9 @@ _OF_RECORDING = (
 _EXPORTED = {
     "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
     "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m", "openvins": "kalibr_imu_chain.yaml",
-    "px4": "px4.params", "pyins": "pyins_imu.py", "state-space": "state-space.json",
+    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
+    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
+    "state-space": "state-space.json",
 }  # fmt: skip
 """Names of the files of programs that want something else than NAME.yaml."""
 
@@ -169,10 +170,7 @@ def calibrate(
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 and not in_blocks else None
-        written = write_files(result, folder, own, datasheet, origin)
-        if target is not None:
-            with stage("exports"):
-                written = f"{written}\n{export_into(folder, result, target)}"
+        written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
@@ -289,8 +287,9 @@ def write_files(
     recording: Recording | None = None,
     datasheet: Path | None = None,
     origin: Mapping[str, str] | None = None,
+    target: str | None = None,
 ) -> str:
-    """Write the files, all or none; returns what to say of them."""
+    """Write the files, all or none, then that of another program; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
     from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
@@ -318,13 +317,9 @@ def write_files(
     kalibr = folder / "imu.yaml"
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
+    if target is not None and not (target == "kalibr" and "imu.yaml" in names):
+        path = folder / _EXPORTED.get(target, f"{target}.yaml")
+        with stage("exports"):
+            export(result, target, path=path)
+        lines.append(f"wrote {path} for {target}")
     return "\n".join([f"wrote {folder / name}" for name in names] + lines)
-
-
-def export_into(folder: Path, result: Calibration, target: str) -> str:
-    """Write the file of a program; returns what to say of it."""
-    from gmwm.export import export
-
-    name = "imu.yaml" if target == "kalibr" else _EXPORTED.get(target, f"{target}.yaml")
-    export(result, target, path=folder / name)
-    return f"wrote {folder / name} for {target}"

@@ -61,10 +61,6 @@ def compare(
     progress : callable, optional
         Called as ``progress(done, total, channel)``.
 
-    Returns
-    -------
-    SensorComparison
-
     Raises
     ------
     InputError

@@ -15,9 +15,9 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock import agree, is_time_of_day, seconds_of_day
 from gmwm.readers.formats import has_sensors
-from gmwm.readers.reader import read_table, roles_of, tables_of
+from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
-from gmwm.readers.roles import Reference
+from gmwm.readers.roles import Given, Reference, roles_of
 from gmwm.readers.table import Table
 
 
@@ -103,8 +103,9 @@ def read_blocks(
     end: FloatArray | None = None
     of_day = False
     done = 0
-    for arrays, stamps in _segments(table, rate, units or {}, channels, time, rows):
-        found = read_table(_Segment(table, arrays, done), rate, units or {}, channels, time)
+    given = Given(rate, units or {}, channels, time)
+    for arrays, stamps in _segments(table, given, rows):
+        found = part_of(_Segment(table, arrays, done), given).recording
         if first is None:
             first = found
         if stamps is not None:
@@ -118,15 +119,10 @@ def read_blocks(
 
 
 def _segments(
-    table: _Divisible,
-    rate: float | None,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-    rows: int,
+    table: _Divisible, given: Given, rows: int
 ) -> Iterator[tuple[dict[int, FloatArray], FloatArray | None]]:
     """Columns of some rows after others; a rest of less than half as many is joined to the last."""
-    roles = roles_of(table, units, channels, time)
+    roles = roles_of(table, given)
     wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
     held: dict[int, FloatArray] | None = None
     for arrays in table.segments(wanted, rows):
@@ -151,10 +147,7 @@ def _size(arrays: Mapping[int, FloatArray]) -> int:
 
 
 def _on_the_grid(
-    found: Recording,
-    first: Recording,
-    since: FloatArray | None,
-    rows: int,
+    found: Recording, first: Recording, since: FloatArray | None, rows: int
 ) -> Recording:
     """A part with the rows that are missing between it and the one before."""
     if not agree(found.rate, first.rate):

@@ -120,17 +120,7 @@ class ArrayTable:
         return cls(source, names, arrays, rate, notices=tuple(notices))
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns.
-
-        Parameters
-        ----------
-        columns : sequence of int
-            Their indices.
-
-        Returns
-        -------
-        dict of int to (n,) ndarray
-            NaN where a sample is missing.
+        """Read some columns; see `Table`.
 
         Raises
         ------
@@ -222,15 +212,11 @@ def damage_named(source: str, say: Callable[[Exception], str] = _damage) -> Iter
     except PermissionError as error:
         raise InputError(f"{source} cannot be read: check its permissions") from error
     except Exception as error:  # libraries raise a dozen types for damaged bytes
-        if _is_about_objects(error):
+        if isinstance(error, ValueError) and "object" in str(error).lower():
             raise InputError(
                 f"{source} holds Python objects, which are not loaded: save arrays of numbers"
             ) from error
         raise InputError(f"{source} {say(error)}") from error
-
-
-def _is_about_objects(error: Exception) -> bool:
-    return isinstance(error, ValueError) and "object" in str(error).lower()
 
 
 def array_of(array: AnyArray) -> Array:

@@ -58,10 +58,6 @@ def stream(
     **reading
         The arguments of `gmwm.read`; ``rows`` of a block.
 
-    Returns
-    -------
-    StreamedRecording
-
     Raises
     ------
     InputError
