@@ -14,10 +14,12 @@ from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Recording
 
 SCREENING = ("events", "lines", "resonances", "outliers")
-"""Samples of shocks and spikes are masked; lines and resonances are terms that a model may have;
-the wavelet variances of channels with more outliers than can be left out are robust."""
+"""Samples of shocks, spikes and lost packets are masked; lines and resonances are terms that a
+model may have; the wavelet variances of channels with more outliers than can be left out are
+robust."""
 
-_ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
+# Codes of advice that only the user can follow.
+_ADVICE = ("stuck", "held", "saturation", "abrupt-end", "temperature", "variance")
 
 
 @dataclass(frozen=True)
@@ -120,8 +122,18 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
         robust = frozenset(name for name in robust if _is_much(found.events(name), recording.n))
         masked = found.masked(recording, but=robust)
     left_out = frozenset(names) - robust if "events" in chosen else frozenset()
+    mended = [
+        notice
+        for notice in found.of(code="held")
+        if notice.where in left_out and found.channels[notice.where].held > 0.0
+    ]
     issues = [
-        replace(notice, action=_done(notice, robust, left_out), values=_values(notice, left_out))
+        replace(
+            notice,
+            action="left out" if notice in mended else _done(notice, robust, left_out),
+            values=_values(notice, left_out),
+            severity="warning" if notice in mended else notice.severity,
+        )
         for notice in found.notices
         if notice not in recording.notices
     ]
