@@ -15,7 +15,9 @@ _SPOILING = {
 }
 """Codes of issues of a whole recording that make the fits of some sensors invalid."""
 
-_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
+_SPOILING_CHANNEL = frozenset(
+    {"rounding", "saturation", "abrupt-end", "stuck", "held", "value-repeated", "variance"}
+)
 """Codes of issues of a channel that make its fit invalid where they are bad."""
 
 

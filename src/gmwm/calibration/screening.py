@@ -14,10 +14,12 @@ from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Recording
 
 SCREENING = ("events", "lines", "resonances", "outliers")
-"""Samples of shocks and spikes are masked; lines and resonances are terms that a model may have;
-the wavelet variances of channels with more outliers than can be left out are robust."""
+"""Samples of shocks, spikes and lost packets are masked; lines and resonances are terms that a
+model may have; the wavelet variances of channels with more outliers than can be left out are
+robust."""
 
-_ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
+# Codes of advice that only the user can follow.
+_ADVICE = ("stuck", "held", "saturation", "abrupt-end", "temperature", "variance")
 
 
 @dataclass(frozen=True)
@@ -131,27 +133,43 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
         {name: terms_of(found, name, chosen) for name in names},
         robust,
         {name: each for name in names if (each := found.repetition(name)) is not None},
-        (*masked.notices, *with_treatment(fresh, left_out, robust)),
+        (*masked.notices, *with_treatment(fresh, found, left_out, robust)),
     )
 
 
 def with_treatment(
-    notices: Iterable[Notice], left_out: Collection[str], robust: Collection[str] = ()
+    notices: Iterable[Notice],
+    found: Health,
+    left_out: Collection[str],
+    robust: Collection[str] = (),
 ) -> list[Notice]:
     """Notices with what is done about each here, which is not what is advised elsewhere.
 
     Parameters
     ----------
     notices : iterable of Notice
+    found : Health
     left_out : collection of str
-        Channels of which shocks, spikes and outliers are left out.
+        Channels of which shocks, spikes, outliers and held samples are left out.
     robust : collection of str, optional
         Channels that have robust wavelet variances.
     """
-    return [
-        replace(notice, action=_done(notice, robust, left_out), values=_values(notice, left_out))
-        for notice in notices
-    ]
+    treated = []
+    for notice in notices:
+        is_mended = (
+            notice.code == "held"
+            and notice.where in left_out
+            and found.channels[notice.where].held > 0.0
+        )
+        treated.append(
+            replace(
+                notice,
+                action="left out" if is_mended else _done(notice, robust, left_out),
+                values=_values(notice, left_out),
+                severity="warning" if is_mended else notice.severity,
+            )
+        )
+    return treated
 
 
 def _is_much(events: Sequence[tuple[int, int]], n: int) -> bool:

@@ -145,7 +145,7 @@ def _issues(
         "the next, were not looked for"
     )
     streamed = Notice("streamed", "note", "", text, {"samples": found.n})
-    return (*found.notices, *with_treatment(fresh, left_out), streamed)
+    return (*found.notices, *with_treatment(fresh, whole, left_out), streamed)
 
 
 def _left_out(

@@ -44,8 +44,8 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
-    "variance",
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
+    "held", "value-repeated", "variance",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 

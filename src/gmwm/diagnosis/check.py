@@ -22,10 +22,18 @@ from gmwm.diagnosis.events import event_notice, find_events, with_single_outlier
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.repeated import interpolation_notice, repetition, repetition_notice, thinned
+from gmwm.diagnosis.repeated import (
+    held_notice,
+    held_share,
+    interpolation_notice,
+    repetition,
+    repetition_notice,
+    thinned,
+)
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
+    abrupt_end_notice,
     dead_notice,
     gap_notices,
     length_notice,
@@ -172,7 +180,7 @@ def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
         (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
         for start, stop in one.facts.events
     )
-    facts = replace(one.facts, events=events, repetition=found)
+    facts = replace(one.facts, events=events, repetition=found, held=0.0)
     # Its prediction errors have no partners of the same time in other channels.
     return _Examined([repetition_notice(channel, found), *one.notices], facts, None)
 
@@ -220,9 +228,15 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     for start, stop in events:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
+    held, chance = held_share(values, step, errors.level)
+    stuck = stuck_notice(name, unit, dt, values, step, errors)
+    if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
+        held = 0.0  # most of what is held is held in a few places
+    noise = quiet[~np.isnan(quiet)]
     found = [
-        stuck_notice(name, unit, dt, values, step, errors),
-        saturation_notice(name, unit, present, quiet[~np.isnan(quiet)], step),
+        held_notice(name, held, chance) if held > 0.0 else stuck,
+        saturation_notice(name, unit, present, noise, step)
+        or abrupt_end_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
@@ -243,6 +257,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         events=events,
         lsb=step,
         outliers=outliers,
+        held=held if chance <= tuning.CHANCE_OF_HELD else 0.0,
     )
     return _Examined(notices, facts, _standardized(errors, usable))
 

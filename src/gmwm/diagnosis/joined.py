@@ -177,6 +177,7 @@ def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHeal
         ),
         lsb=min(steps, default=0.0),
         outliers=float(np.mean([part.outliers for part in parts])),
+        held=float(np.mean([part.held for part in parts])),
         repetition=times[0] if times else None,
     )
 

@@ -91,6 +91,20 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
 
+LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
+"""Part of the samples, and samples at least, next to an extreme in which the fall of the density is
+looked for; samples of one of so many parts of the record that show it."""
+
+HARMFUL_END = 0.08
+"""Density at the ends times the standard deviation: of Gaussian noise whose samples beyond 2.1
+standard deviations were sorted out, which makes its density 10 % too small."""
+
+HELD_AT_MOST, CHANCE_OF_HELD, LAST_RISE, NEAR = 0.05, 0.05, 0.75, 0.25
+"""Part of the samples that repeat the one before, and stay, which makes the noise larger by
+that; part that may equal it by chance where such samples are made missing (which makes the noise
+1.6 % smaller). Largest power of a law (t with 2.5 degrees of freedom, rounded to two deviations;
+Laplace's walk 0.65). Of the scatter, a step to compare with where there is none."""
+
 # -- prediction errors ----------------------------------------------------------------------------
 
 FEWEST_KNOWN = 64
