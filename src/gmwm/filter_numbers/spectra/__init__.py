@@ -4,6 +4,7 @@ from gmwm.filter_numbers.spectra.dominance import (
     KINDS,
     TIGHTEST,
     Problem,
+    correlation_time,
     dominating,
     with_correlation_times,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "ParameterRegion",
     "Problem",
     "Target",
+    "correlation_time",
     "dominating",
     "region_targets",
     "standard_errors",
