@@ -26,6 +26,9 @@ _OPTIONS = (
     click.option("--form", default="N+K", show_default=True,
                  help="N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too."),
     click.option("--shared", is_flag=True, help="The same numbers for all axes of a sensor."),
+    click.option("--tau", metavar="S", callback=lambda _, __, text: _tau(text),
+                 help="Correlation time of the Gauss-Markov process in seconds; \"shared\": the "
+                      "one for all axes that costs least. Each axis has its own by default."),
     click.option("--gyro-bias", type=float, default=0.0, metavar="RAD/S",
                  help="Standard deviation of the turn-on bias of a gyro."),
     click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
@@ -35,6 +38,10 @@ _OPTIONS = (
     units_option,
     click.option("--json", "as_json", is_flag=True, help="Print JSON."),
 )  # fmt: skip
+
+
+def _tau(text: str | None) -> float | str | None:
+    return text if text in (None, "shared") else seconds("--tau", text or "")[0]
 
 
 def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -52,8 +59,9 @@ def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
               help="Cover the confidence region of this level, e.g. 0.95, and not the estimate "
                    "alone.")  # fmt: skip
 def bound(
-    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    units: str, as_json: bool, horizon: float, level: float | None,
+    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
+    accel_bias: float, output: Path | None, units: str, as_json: bool, horizon: float,
+    level: float | None,
 ) -> None:  # fmt: skip
     """Find the smallest numbers that are never too optimistic.
 
@@ -67,7 +75,7 @@ def bound(
     from gmwm.filter_numbers import bound as run
 
     found = run(
-        Calibration.load(file), form, horizon, level=level, shared=shared,
+        Calibration.load(file), form, horizon, level=level, shared=shared, tau=tau,
         bias_sd={"gyro": gyro_bias, "accel": accel_bias},
     )  # fmt: skip
     show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
@@ -81,8 +89,9 @@ def bound(
               help="Interval of keyframes or scans, in place of outages, for relative "
                    "poses.")  # fmt: skip
 def reduce(
-    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    units: str, as_json: bool, outages: str, keyframe: float | None,
+    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
+    accel_bias: float, output: Path | None, units: str, as_json: bool, outages: str,
+    keyframe: float | None,
 ) -> None:  # fmt: skip
     """Find the numbers with which a small filter is consistent.
 
@@ -98,7 +107,7 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration, form, times, keyframe=keyframe, shared=shared, progress=bar,
+            calibration, form, times, keyframe=keyframe, shared=shared, tau=tau, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
     show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
