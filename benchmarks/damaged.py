@@ -35,10 +35,8 @@ def sound(rng: np.random.Generator, n: int) -> dict[str, np.ndarray]:
     }
     for size in (0.01, 0.1, 1.0):
         kinds[f"white + walk {size}"] = white + size * np.cumsum(rng.standard_normal(n))
-    for size, frequency in product((1.0, 10.0, 100.0), (0.03, 0.7, 13.0)):
-        kinds[f"white + line {size} {frequency}"] = white + size * np.sin(
-            2.0 * np.pi * frequency * time
-        )
+    for size, f in product((1.0, 10.0, 100.0), (0.03, 0.7, 13.0)):
+        kinds[f"white + line {size} {f}"] = white + size * np.sin(2.0 * np.pi * f * time)
         kinds[f"white + ramp {size}"] = white + size * time / time[-1]
     return kinds
 
