@@ -16,7 +16,7 @@ from gmwm.variance.wavelet import WaveletVariance
 
 
 def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletVariance:
-    """The wavelet variance of what was taken in so far.
+    """The wavelet variance of the samples so far.
 
     Parameters
     ----------
