@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.runs import PROCESSES, beside, spare
 from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 
 NONE_VALID = 1
 """Exit status."""
+
+_LARGE, _CHANNELS = 1 << 20, 6
+"""Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
@@ -90,7 +94,8 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--jobs", type=click.IntRange(min=1), default=PROCESSES, show_default=True,
+              help="Processes at most; short recordings take one.")  # fmt: skip
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
 @memory_option
 @printing_options
@@ -129,6 +134,10 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
+    if any(file.is_file() and file.stat().st_size > _LARGE for file in files):
+        # Started first, so that it has imported what it needs when there is work for it.
+        others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
+        click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
     from gmwm.report import read_datasheet

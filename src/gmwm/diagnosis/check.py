@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
+from gmwm._core.runs import shared
 from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import (
@@ -109,20 +111,26 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
         whole.append(vibration)
     examined: dict[str, _Examined] = {}
     channels = recording.inertial
-    for channel in channels:
-        if progress is not None:
-            progress(len(examined), len(channels), channel.name)
-        examined[channel.name] = _unrepeated(channel, motion)
+
+    def begun() -> Iterator[Channel]:
+        for channel in channels:
+            if progress is not None:
+                progress(len(examined), len(channels), channel.name)
+            yield channel
+
+    for channel, one in shared(partial(_unrepeated, motion=motion), begun()):
+        examined[channel.name] = one
+    examined = {channel.name: examined[channel.name] for channel in channels}
     if progress is not None:
         progress(len(channels), len(channels), "")
-    shared = gap_notices(channels, recording.dt)
-    shared += crosstalk_notices(
+    between = gap_notices(channels, recording.dt)
+    between += crosstalk_notices(
         {name: one.errors for name, one in examined.items() if one.errors is not None}
     )
-    shared += temperature_notices(recording)
-    notices = worst_first(whole + [found for found in shared if not found.where])
+    between += temperature_notices(recording)
+    notices = worst_first(whole + [found for found in between if not found.where])
     for name, one in examined.items():
-        own = one.notices + [found for found in shared if found.where == name]
+        own = one.notices + [found for found in between if found.where == name]
         if not motion.moves and not any(found.severity in _SEVERE for found in own):
             own.append(_clean(name))
         notices += worst_first(own)
