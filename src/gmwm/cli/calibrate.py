@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.runs import PROCESSES, beside, spare
 from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
@@ -94,7 +93,7 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=PROCESSES, show_default=True,
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
               help="Processes at most; short recordings take one.")  # fmt: skip
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
 @memory_option
@@ -135,6 +134,8 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     if any(file.is_file() and file.stat().st_size > _LARGE for file in files):
+        from gmwm._core.runs import beside, spare
+
         # Started first, so that it has imported what it needs when there is work for it.
         others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
         click.get_current_context().with_resource(others)
