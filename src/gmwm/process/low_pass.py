@@ -21,7 +21,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, WIDER, panel_weights, quadrature
+from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, WIDER, panel_weights, quadrature, rounded
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
@@ -248,19 +248,14 @@ Weights = tuple[FloatArray, FloatArray]
 @lru_cache(maxsize=8)
 def _nodes(averaging: tuple[float, ...]) -> Weights:
     """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
-    found = quadrature(_rounded(averaging))
+    found = quadrature(rounded(averaging))
     return np.log(np.tan(np.pi * found.frequency)), 2.0 * found.gain * found.weight
 
 
 def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
     """The same at Chebyshev points of panels, wide and narrow, which are so many fewer."""
-    rounded = _rounded(averaging)
-    return panel_weights(rounded, WIDER), panel_weights(rounded)
-
-
-@lru_cache(maxsize=8)
-def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
+    whole = rounded(averaging)
+    return panel_weights(whole, WIDER), panel_weights(whole)
 
 
 def _weights(length: float) -> FloatArray:
