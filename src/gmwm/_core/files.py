@@ -9,8 +9,9 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import TextIO
 
 from gmwm.errors import InputError
 
@@ -110,7 +111,7 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     return found
 
 
-def opened(path: str | os.PathLike[str]) -> BinaryIO:
+def opened(path: str | os.PathLike[str]) -> BufferedReader:
     """A file, open for reading.
 
     Raises

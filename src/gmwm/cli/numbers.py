@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gmwm._core.text import wrapped
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import seconds
+from gmwm.cli.options import seconds, together
 
 if TYPE_CHECKING:
     from gmwm.filter_numbers import Certificate, SensorNumbers
@@ -21,7 +20,7 @@ units_option = click.option(
     help="Units of what is printed; files and JSON are in SI.",
 )  # fmt: skip
 
-_OPTIONS = (
+_number_options = together(
     click.argument("file", type=click.Path(path_type=Path)),
     click.option("--form", default="N+K", show_default=True,
                  help="N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too."),
@@ -44,14 +43,8 @@ def _tau(text: str | None) -> float | str | None:
     return text if text in (None, "shared") else seconds("--tau", text or "")[0]
 
 
-def _with_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
 @click.command()
-@_with_options
+@_number_options
 @click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
               help="Time without aiding in seconds; of relative poses, the interval of "
                    "keyframes.")  # fmt: skip
@@ -82,7 +75,7 @@ def bound(
 
 
 @click.command()
-@_with_options
+@_number_options
 @click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
               help="Times without aiding that the numbers are for, in seconds.")  # fmt: skip
 @click.option("--keyframe", type=float, metavar="S",

@@ -26,7 +26,19 @@ FORMATS = (
 )  # fmt: skip
 """The same."""
 
-_OPTIONS = (
+
+def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """One decorator that gives a command several options, listed in this order."""
+
+    def decorated(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+reading_options = together(
     click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
     click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
     click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ..."),
@@ -43,9 +55,9 @@ _OPTIONS = (
                       "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
                       "[,rates][,little|big]."),
 )  # fmt: skip
+"""What the file is, for `read_recording`."""
 
-
-_PART = (
+part_options = together(
     click.option("--topic", "topics", multiple=True, metavar="NAME",
                  help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
                       "for gyros and accelerometers in topics of their own."),
@@ -58,8 +70,9 @@ _PART = (
     click.option("--stop", type=float, metavar="S",
                  help="Leave out what is after this time, in seconds."),
 )  # fmt: skip
+"""Topics, channels and a stretch, for `read_recording`."""
 
-_ESTIMATING = (
+estimating_options = together(
     click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
                  help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
                       "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
@@ -74,11 +87,13 @@ _ESTIMATING = (
                  help="Take everything as static; by default only the stretches at rest of a log "
                       "that moves are used."),
 )  # fmt: skip
+"""What is fitted, and to which samples."""
 
-_PRINTING = (
+printing_options = together(
     click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, in SI units."),
     click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
 )
+"""How results are printed."""
 
 
 memory_option = click.option(
@@ -89,32 +104,6 @@ memory_option = click.option(
 
 _OF_PARTS = ("start", "stop")
 """Names of the options of `part_options`."""
-
-
-def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of `read_recording` that say what the file is."""
-    return _with(command, _OPTIONS)
-
-
-def part_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Those of `read_recording` that choose topics, channels and a stretch."""
-    return _with(command, _PART)
-
-
-def estimating_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """What is fitted, and to which samples."""
-    return _with(command, _ESTIMATING)
-
-
-def printing_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How results are printed."""
-    return _with(command, _PRINTING)
-
-
-def _with(command: Callable[..., Any], options: Sequence[Any]) -> Callable[..., Any]:
-    for option in reversed(options):
-        command = option(command)
-    return command
 
 
 def read_recording(

@@ -92,10 +92,9 @@ def reproduce(
                                   "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
         given = [read_recording(file, **reading) for file in recordings]
         with folder_to_fill(output) as folder:
-            if rotate:
-                _rotation(experiment, folder, runs, seed, processes, given, resume)
-            else:
-                _navigation(experiment, folder, runs, seed, processes, given)
+            options = {"runs": runs, "seed": seed, "jobs": processes}
+            options |= {"resume": resume} if rotate else {}
+            _navigated(experiment, folder, given, rotate, **options)
         return
     _check_alone(experiment, {"--recording": recordings, "--rotate": rotate})
     if experiment in ("appendix-a", "selection"):
@@ -172,46 +171,19 @@ def _alone(experiment: str, folder: Path, runs: int | None, seed: int, jobs: int
     click.echo(f"{report}\n\nwrote {target}")
 
 
-def _navigation(
-    experiment: str,
-    folder: Path,
-    runs: int | None,
-    seed: int,
-    jobs: int,
-    recordings: list[Recording],
+def _navigated(
+    experiment: str, folder: Path, recordings: list[Recording], rotate: bool, **options: Any
 ) -> None:
-    """Figures 5 to 9."""
-    from gmwm.study import reproduce_figure
+    """Figures 5 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
+    from gmwm.study import reproduce_figure, reproduce_rotation
 
-    with progress_bar(experiment, "runs") as bar:
-        text, paths = reproduce_figure(
-            experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
-            progress=bar,
-        )  # fmt: skip
-    click.echo(text)
-    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
-
-
-def _rotation(
-    experiment: str,
-    folder: Path,
-    runs: int | None,
-    seed: int,
-    jobs: int,
-    recordings: list[Recording],
-    resume: bool,
-) -> None:
-    """Figures 8 and 9 with every recording calibrated in turn."""
-    from gmwm.study import reproduce_rotation
-
+    run = reproduce_rotation if rotate else reproduce_figure
     try:
-        with progress_bar(experiment, "recordings") as bar:
-            text, paths = reproduce_rotation(
-                experiment, folder, runs=runs, seed=seed, jobs=jobs, recordings=recordings,
-                resume=resume, progress=bar,
-            )  # fmt: skip
+        with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
+            text, paths = run(experiment, folder, recordings=recordings, progress=bar, **options)
     except KeyboardInterrupt:
-        click.echo(f"what is done is kept in {folder}: add --resume to go on", err=True)
+        if rotate:
+            click.echo(f"what is done is kept in {folder}: add --resume to go on", err=True)
         raise
     click.echo(text)
     click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))

@@ -16,7 +16,7 @@ from gmwm._core.files import folder_to_fill, one_writer, written
 from gmwm._core.forms import Form, NoticeForm, Notices, NotNegative, Positive, Text
 from gmwm._core.notices import Notice
 from gmwm.calibration import Calibration
-from gmwm.errors import InputError
+from gmwm.errors import InputError, printable
 from gmwm.fleet.unit import Item, Number, Unit, digest_of
 
 FOLDER = "calibrations"
@@ -105,7 +105,7 @@ class Store:
         except InputError:
             return None  # reading it says why
         if digest != origin["sha256"]:
-            if origin["path"] != _shown(item.path):
+            if origin["path"] != printable(item.path):
                 raise InputError(
                     f"{path} is of {origin['path']}, not of {item.path}: give another folder",
                     "other-runs",
@@ -145,7 +145,7 @@ class Store:
             channel: {name: each._asdict() for name, each in of_channel.items()}
             for channel, of_channel in unit.numbers.items()
         }
-        origin = {"path": _shown(unit.path), "sha256": unit.digest, "options": self.options}
+        origin = {"path": printable(unit.path), "sha256": unit.digest, "options": self.options}
         content = {**unit.result.to_dict(), "fleet": {**origin, "numbers": numbers}}
         with written(self.path(unit.name)) as stream:
             json.dump(content, stream, indent=1, allow_nan=False)
@@ -158,7 +158,7 @@ def write_index(
 ) -> None:  # fmt: skip
     """Write which units there are."""
     listed = [
-        {"path": _shown(each.path), "name": each.name,
+        {"path": printable(each.path), "name": each.name,
          "failed": each.result.to_dict() if isinstance(each.result, Notice) else None}
         for each in units
     ]  # fmt: skip
@@ -193,13 +193,6 @@ def read_index(folder: Path) -> tuple[list[Unit], float, dict[str, Any], list[No
     ]
     notices = [Notice.from_dict(each) for each in content["notices"]]
     return units, content["horizon_s"], content["options"], notices
-
-
-def _shown(path: str) -> str:
-    """A path as documents hold it: on one line, in characters that every file can have."""
-    from gmwm.errors import printable
-
-    return printable(path)
 
 
 def _calibrations(folder: Path) -> list[Path]:

@@ -217,10 +217,7 @@ def digest_of(path: str) -> str:
     try:
         if not os.path.isdir(path):
             with opened(path) as stream:
-                digest = hashlib.sha256()
-                while part := stream.read(1 << 20):
-                    digest.update(part)
-                return digest.hexdigest()
+                return hashlib.file_digest(stream, "sha256").hexdigest()
         parts = [f"{each.name} {digest_of(str(each))}\n"
                  for each in sorted(Path(path).iterdir()) if each.is_file()]  # fmt: skip
     except (OSError, ValueError) as error:  # ValueError: a null character in the name

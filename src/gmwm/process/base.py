@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from inspect import Signature, signature
 from typing import Any, ClassVar, Self
 
@@ -125,9 +125,6 @@ class Process:
                     f"its parameters are {', '.join(names) or 'none'}"
                 )
             values[name] = value
-        self._set(values)
-
-    def _set(self, values: Mapping[str, float | None]) -> None:
         for parameter in self.parameters:
             value = values[parameter.name]
             if value is not None:

@@ -28,6 +28,7 @@ from gmwm.process.spectral import (
     WIDER,
     node_weights,
     panel_weights,
+    rounded,
 )
 from gmwm.process.state_space import StateSpace
 
@@ -256,19 +257,14 @@ Weights = tuple[FloatArray, FloatArray]
 @lru_cache(maxsize=16)
 def _nodes(averaging: tuple[float, ...]) -> Weights:
     """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
-    frequency, weight = node_weights(_rounded(averaging))
+    frequency, weight = node_weights(rounded(averaging))
     return np.log(np.tan(np.pi * frequency)), weight
 
 
 def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
     """The same at Chebyshev points of panels, wide and narrow, which are so many fewer."""
-    rounded = _rounded(averaging)
-    return panel_weights(rounded, WIDER), panel_weights(rounded)
-
-
-@lru_cache(maxsize=8)
-def _rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
+    whole = rounded(averaging)
+    return panel_weights(whole, WIDER), panel_weights(whole)
 
 
 def _weights(length: float) -> FloatArray:

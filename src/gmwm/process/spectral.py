@@ -282,10 +282,14 @@ def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
         Same shape as ``tau``, in u^2.
     """
     tau = np.asarray(tau, dtype=float)
-    m = tau.ravel() / dt
-    rounded = np.where(np.abs(m - np.rint(m)) < 1e-9 * m, np.rint(m), m)
-    result = quadrature(tuple(rounded.tolist())).haar_variance(psd, dt)
+    result = quadrature(rounded(tuple((tau.ravel() / dt).tolist()))).haar_variance(psd, dt)
     return np.asarray(result.reshape(tau.shape))
+
+
+@lru_cache(maxsize=8)
+def rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
+    """Averaging times in samples, those that are whole but for rounding errors as whole numbers."""
+    return tuple(float(np.rint(m)) if abs(m - np.rint(m)) < 1e-9 * m else m for m in averaging)
 
 
 def wavelet_variance(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -11,6 +12,9 @@ from gmwm import plotting
 from gmwm._core.files import moved_into_place
 from gmwm._core.typing import FloatArray
 from gmwm.study.studies import Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
@@ -24,8 +28,6 @@ def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
     stem : Path
         Where to, without suffix.
     """
-    import matplotlib.pyplot as plt
-
     names = np.array(table["method"].to_pylist())
     methods = [m for m in study.methods if m in set(names)]
     panels = {
@@ -36,14 +38,19 @@ def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
     }
     truths = {quantity.name: study.true_value(quantity) for quantity in study.quantities}
     figure = plotting.boxes(panels, truths, title=f"{study.title} (dashed: truth)")
-    written = []
-    for suffix in (".png", ".svg"):
-        target = stem.with_suffix(suffix)
-        with moved_into_place(target) as temporary:
-            figure.savefig(temporary, format=suffix[1:], dpi=150)
-        written.append(target)
+    return saved(figure, stem)
+
+
+def saved(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as PNG and SVG; it is closed."""
+    import matplotlib.pyplot as plt
+
+    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    for path in paths:
+        with moved_into_place(path) as temporary:
+            figure.savefig(temporary, format=path.suffix[1:], dpi=150)
     plt.close(figure)
-    return written
+    return paths
 
 
 def _finite(values: FloatArray) -> FloatArray:

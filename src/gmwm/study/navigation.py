@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gmwm._core.files import moved_into_place, written
+from gmwm._core.files import written
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
@@ -28,6 +28,7 @@ from gmwm.ins.montecarlo import Experiment, Scenario, Simulated, Validation
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording
+from gmwm.study.figures import saved
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6
 from gmwm.variance import WaveletVariance
 
@@ -279,14 +280,3 @@ def reproduce_figure(
     with written(target) as stream:
         stream.write(text + "\n")
     return text, [target, *saved(draw[figure](), folder / figure)]
-
-
-def saved(figure: Figure, stem: Path) -> list[Path]:
-    import matplotlib.pyplot as plt
-
-    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
-    for path in paths:
-        with moved_into_place(path) as temporary:
-            figure.savefig(temporary, format=path.suffix[1:], dpi=150)
-    plt.close(figure)
-    return paths

@@ -26,7 +26,8 @@ from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.montecarlo import Experiment, Validation
 from gmwm.readers import Recording
-from gmwm.study.navigation import TEN, Calibrated, aligned, saved, scenario_of, times
+from gmwm.study.figures import saved
+from gmwm.study.navigation import TEN, Calibrated, aligned, scenario_of, times
 from gmwm.study.rotation import FIRST, Rotation
 
 _D = TypeVar("_D", bound=Document)
@@ -128,13 +129,6 @@ def reproduce_rotation(
     text, paths
         What to print, and the files that were written.
     """
-    for recording in recordings:
-        missing = [axis for axis in AXES if axis not in recording.names]
-        if missing:
-            raise InputError(
-                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
-                f"{', '.join(AXES)}"
-            )
     rotation = rotate(
         "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
         jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,

@@ -162,7 +162,7 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
                 if p == at or x[j] <= 0.0:
                     x[j] = 0.0
                     is_passive[j] = False
-                    first = min(first, p)
+                    first = min(first, np.int64(p))
                 else:
                     order[kept] = j
                     kept += 1
