@@ -69,6 +69,7 @@ def test_the_list_has_every_program(run):
     assert code == 0
     for name in TARGETS:
         assert f"\n{name} " in printed, name
+    assert len({target.title for target in TARGETS.values()}) == len(TARGETS)
 
 
 def test_calibrate_writes_the_same_file(run, tmp_path):

@@ -1,28 +1,14 @@
 """Error growth of unaided navigation, in closed form."""
 
 from gmwm.budget.budget import (
-    FIELD_UNITS,
-    HORIZONTAL,
-    QUANTITIES,
-    ErrorBudget,
-    ErrorRow,
-    axis,
-    per_si,
-    root_sum,
-    short,
+    FIELD_UNITS as FIELD_UNITS,
+    HORIZONTAL as HORIZONTAL,
+    QUANTITIES as QUANTITIES,
+    ErrorBudget as ErrorBudget,
+    ErrorRow as ErrorRow,
+    axis as axis,
+    per_si as per_si,
+    root_sum as root_sum,
+    short as short,
 )
-from gmwm.budget.coasting import TIMES, error_budget
-
-__all__ = [
-    "FIELD_UNITS",
-    "HORIZONTAL",
-    "QUANTITIES",
-    "TIMES",
-    "ErrorBudget",
-    "ErrorRow",
-    "axis",
-    "error_budget",
-    "per_si",
-    "root_sum",
-    "short",
-]
+from gmwm.budget.coasting import TIMES as TIMES, error_budget as error_budget

@@ -191,10 +191,6 @@ class ErrorBudget:
         quantity : {"attitude", "velocity", "position"}, optional
             By default the last that there is.
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-
         Raises
         ------
         InputError

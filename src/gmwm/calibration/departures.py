@@ -34,7 +34,7 @@ from gmwm.estimate.problem import Scales, difference_covariance
 from gmwm.process import PSD, Model, RandomWalk
 from gmwm.variance import WaveletVariance
 
-KINDS = ("step", "transient", "drift-at-start", "slow-period")
+DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
 """Of departures: the codes of their notices."""
 
 WIDE = float(norm.isf(0.025))

@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import KINDS, WIDE, Departure
+from gmwm.calibration.departures import DEPARTURES, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.readers import Channel, Recording
@@ -108,7 +108,7 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def _is_evident(notice: Notice) -> bool:
-    return notice.code in KINDS and _departure(notice).is_evident
+    return notice.code in DEPARTURES and _departure(notice).is_evident
 
 
 def _departure(notice: Notice) -> Departure:

@@ -1,5 +1,3 @@
 """The command line: parse, call, print."""
 
-from gmwm.cli.main import cli, main
-
-__all__ = ["cli", "main"]
+from gmwm.cli.main import cli as cli, main as main

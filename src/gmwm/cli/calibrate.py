@@ -17,8 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    arguments_of_blocks,
     estimating_options,
+    memory_option,
     models_of_channels,
+    needs_the_whole,
     part_options,
     printing_options,
     read_recording,
@@ -37,15 +40,15 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("start", "stop")
-"""Options of reading for which the whole file is read."""
+_LARGE, _CHANNELS = 1 << 20, 6
+"""Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
-    "variance",
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
+    "held", "value-repeated", "variance",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 
@@ -53,8 +56,9 @@ _OF_RECORDING = (
 _EXPORTED = {
     "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
     "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m", "openvins": "kalibr_imu_chain.yaml",
-    "px4": "px4.params", "pyins": "pyins_imu.py", "state-space": "state-space.json",
+    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
+    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
+    "state-space": "state-space.json",
 }  # fmt: skip
 """Names of the files of programs that want something else than NAME.yaml."""
 
@@ -89,12 +93,10 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+              help="Processes at most; short recordings take one.")  # fmt: skip
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
-@click.option("--memory", type=float, metavar="GB",
-              help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of "
-                   "ArduPilot is read a block at a time, and shocks, lines and motion are not "
-                   "looked for then. By default a quarter of the machine's.")  # fmt: skip
+@memory_option
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -131,6 +133,12 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
+    if any(file.is_file() and file.stat().st_size > _LARGE for file in files):
+        from gmwm._core.runs import beside, spare
+
+        # Started first, so that it has imported what it needs when there is work for it.
+        others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
+        click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
     from gmwm.report import read_datasheet
@@ -159,7 +167,10 @@ def calibrate(
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = (
-                calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
+                calibrate_stream(
+                    files[0], model, screening=chosen, still=not everything, progress=bar,
+                    **arguments_of_blocks(reading),
+                )
                 if in_blocks
                 else run(
                     recordings, model, screening=chosen, still=not everything,
@@ -169,10 +180,7 @@ def calibrate(
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
         own = recordings[0] if len(recordings) == 1 and not in_blocks else None
-        written = write_files(result, folder, own, datasheet, origin)
-        if target is not None:
-            with stage("exports"):
-                written = f"{written}\n{export_into(folder, result, target)}"
+        written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
@@ -209,21 +217,13 @@ def _recordings(
         try:
             return [read_recording(file, **reading) for file in files], False
         except InputError as error:
-            whole = [name for name in _WHOLE if reading.get(name)]
-            if error.code != "memory" or len(files) > 1 or whole:
+            if error.code != "memory" or len(files) > 1 or needs_the_whole(reading):
                 raise
             too_large = error
     try:
-        return [next(read_blocks(files[0], **_of_stream(reading)))], True
+        return [next(read_blocks(files[0], **arguments_of_blocks(reading)))], True
     except InputError as error:
         raise (too_large if error.code == "not-divisible" else error) from None
-
-
-def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
-    """What `gmwm.calibrate_stream` is given for the options."""
-    from gmwm.cli.options import arguments_of_read
-
-    return arguments_of_read(**{k: v for k, v in reading.items() if k not in _WHOLE})
 
 
 def show(result: Calibration) -> None:
@@ -297,8 +297,9 @@ def write_files(
     recording: Recording | None = None,
     datasheet: Path | None = None,
     origin: Mapping[str, str] | None = None,
+    target: str | None = None,
 ) -> str:
-    """Write the files, all or none; returns what to say of them."""
+    """Write the files, all or none, then that of another program; returns what to say of them."""
     from gmwm._core.files import moved_together, replaceable
     from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
@@ -326,13 +327,9 @@ def write_files(
     kalibr = folder / "imu.yaml"
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
+    if target is not None and not (target == "kalibr" and "imu.yaml" in names):
+        path = folder / _EXPORTED.get(target, f"{target}.yaml")
+        with stage("exports"):
+            export(result, target, path=path)
+        lines.append(f"wrote {path} for {target}")
     return "\n".join([f"wrote {folder / name}" for name in names] + lines)
-
-
-def export_into(folder: Path, result: Calibration, target: str) -> str:
-    """Write the file of a program; returns what to say of it."""
-    from gmwm.export import export
-
-    name = "imu.yaml" if target == "kalibr" else _EXPORTED.get(target, f"{target}.yaml")
-    export(result, target, path=folder / name)
-    return f"wrote {folder / name} for {target}"

@@ -1,20 +1,16 @@
 """What is wrong with a recording, before a model is fitted to it."""
 
-from gmwm.diagnosis.check import health
-from gmwm.diagnosis.repeated import thinned
-from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
-from gmwm.diagnosis.spectrum import Spectrum, spectrum
-from gmwm.diagnosis.still import Still, find_still, rest_of
-
-__all__ = [
-    "ChannelHealth",
-    "Health",
-    "Repetition",
-    "Spectrum",
-    "Still",
-    "find_still",
-    "health",
-    "rest_of",
-    "spectrum",
-    "thinned",
-]
+from gmwm.diagnosis.check import health as health
+from gmwm.diagnosis.joined import (
+    STRETCH as STRETCH,
+    health_stream as health_stream,
+    joined as joined,
+)
+from gmwm.diagnosis.repeated import thinned as thinned
+from gmwm.diagnosis.result import (
+    ChannelHealth as ChannelHealth,
+    Health as Health,
+    Repetition as Repetition,
+)
+from gmwm.diagnosis.spectral import Spectrum as Spectrum, spectrum as spectrum
+from gmwm.diagnosis.still import Still as Still, find_still as find_still, rest_of as rest_of

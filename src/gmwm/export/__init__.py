@@ -5,22 +5,16 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from gmwm.export.export import TARGETS, export
-from gmwm.export.imu import SENSORS, Axis, Imu, Triad, axis_of, imu_of
-from gmwm.export.target import ImuFile, Target
-
-__all__ = [
-    "SENSORS",
-    "TARGETS",
-    "Axis",
-    "Imu",
-    "ImuFile",
-    "Target",
-    "Triad",
-    "axis_of",
-    "export",
-    "imu_of",
-]
+from gmwm.export.export import TARGETS as TARGETS, export as export
+from gmwm.export.imu import (
+    SENSORS as SENSORS,
+    Axis as Axis,
+    Imu as Imu,
+    Triad as Triad,
+    axis_of as axis_of,
+    imu_of as imu_of,
+)
+from gmwm.export.target import ImuFile as ImuFile, Target as Target
 
 
 class _Room(ModuleType):

@@ -81,8 +81,8 @@ _SOURCE = (
 )
 
 GTSAM = (
-    ImuFile("gtsam", "GTSAM", "parameters of combined preintegration, Python", _CONVENTION, _SOURCE,
-           _python, horizon=tuning.KEYFRAME),
-    ImuFile("gtsam-cpp", "GTSAM", "parameters of combined preintegration, C++", _CONVENTION,
+    ImuFile("gtsam", "GTSAM (Python)", "parameters of combined preintegration", _CONVENTION,
+           _SOURCE, _python, horizon=tuning.KEYFRAME),
+    ImuFile("gtsam-cpp", "GTSAM (C++)", "parameters of combined preintegration", _CONVENTION,
            _SOURCE, _cpp, horizon=tuning.KEYFRAME, mark="//"),
 )  # fmt: skip

@@ -265,10 +265,6 @@ def fleet(
     **reading
         Arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
 
-    Returns
-    -------
-    Fleet
-
     Raises
     ------
     InputError

@@ -87,7 +87,7 @@ def _names(paths: Sequence[str]) -> list[str]:
     The name of the file without its ending; where that is not enough, with its ending and folders.
     """
     whole = [Path(os.path.abspath(path)).parts for path in paths]
-    names = [_stem(parts[-1]) for parts in whole]
+    names = [Path(parts[-1].removesuffix(".gz")).stem for parts in whole]
     for depth in range(1, max(map(len, whole)) + 1):
         twice = _repeated(names)
         names = [
@@ -107,10 +107,6 @@ def _names(paths: Sequence[str]) -> list[str]:
 def _repeated(names: Sequence[str]) -> list[bool]:
     counts = Counter(name.lower() for name in names)
     return [counts[name.lower()] > 1 for name in names]
-
-
-def _stem(name: str) -> str:
-    return Path(name.removesuffix(".gz")).stem
 
 
 def _short(name: str) -> str:

@@ -34,10 +34,13 @@ from .montecarlo.consistency import (
     innovation_test as innovation_test,
     over_time as over_time,
 )
-from .montecarlo.experiment import Experiment as Experiment
 from .montecarlo.filter_errors import FilterErrors as FilterErrors
 from .montecarlo.outage_errors import difference as difference, spread as spread
-from .montecarlo.scenario import Scenario as Scenario, Simulated as Simulated
+from .montecarlo.scenario import (
+    Experiment as Experiment,
+    Scenario as Scenario,
+    Simulated as Simulated,
+)
 from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
 from .montecarlo.validation import Validation as Validation
 from .spec.experiment import experiment_from as experiment_from

@@ -57,10 +57,6 @@ def deviation(
         Level of the intervals, for the legend.
     title : str, optional
     ax : matplotlib.axes.Axes, optional
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     import matplotlib.pyplot as plt
 
@@ -71,15 +67,7 @@ def deviation(
         tau, value, yerr=bars, fmt="o", color=DATA_COLOUR, markersize=4.5, capsize=2.5,
         elinewidth=1.0, label=f"data, {interval} interval", zorder=4,
     )  # fmt: skip
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.set_xlabel("averaging time [s]")
-    ax.set_ylabel(f"Allan deviation [{unit}]")
-    if title:
-        ax.set_title(title)
-    ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
-    ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
-    ax.set_axisbelow(True)
+    _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
 
@@ -131,17 +119,22 @@ def deviations(
     every = np.concatenate(shown)
     every = every[every > 0.0]
     ax.set_ylim(np.min(every) / _MARGIN, np.max(every) * _MARGIN)
+    _label(ax, f"deviation [{unit}]", title)
+    ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
+    return ax
+
+
+def _label(ax: Axes, value: str, title: str) -> None:
+    """Logarithmic axes over averaging times, with a grid behind what is drawn."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel("averaging time [s]")
-    ax.set_ylabel(f"deviation [{unit}]")
+    ax.set_ylabel(value)
     if title:
         ax.set_title(title)
     ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
     ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
     ax.set_axisbelow(True)
-    ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
-    return ax
 
 
 def curves(

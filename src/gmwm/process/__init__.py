@@ -1,70 +1,42 @@
 """What an error process is: parameters, spectrum, wavelet variance, state space, simulation."""
 
-from gmwm.process.arma import AR, ARIMA, ARMA, MA
-from gmwm.process.base import Process, Shape
+from gmwm.process.arma import AR as AR, ARIMA as ARIMA, ARMA as ARMA, MA as MA
+from gmwm.process.base import Process as Process, Shape as Shape
 from gmwm.process.catalogue import (
-    CATALOGUE,
-    compiled_levels,
-    model_from_list,
-    shaped_curve,
-    shaped_slope,
+    CATALOGUE as CATALOGUE,
+    compiled_levels as compiled_levels,
+    model_from_list as model_from_list,
+    shaped_curve as shaped_curve,
+    shaped_slope as shaped_slope,
 )
-from gmwm.process.gauss_markov import GaussMarkov, Resonance
-from gmwm.process.low_pass import BUTTERWORTH, AveragedNoise, LowPassNoise
-from gmwm.process.model import Model, as_model, simulate
+from gmwm.process.gauss_markov import GaussMarkov as GaussMarkov, Resonance as Resonance
+from gmwm.process.low_pass import (
+    BUTTERWORTH as BUTTERWORTH,
+    AveragedNoise as AveragedNoise,
+    LowPassNoise as LowPassNoise,
+)
+from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
 from gmwm.process.noise import (
-    BiasInstability,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    WhiteNoise,
+    BiasInstability as BiasInstability,
+    QuantizationNoise as QuantizationNoise,
+    RandomWalk as RandomWalk,
+    RateRamp as RateRamp,
+    WhiteNoise as WhiteNoise,
 )
-from gmwm.process.parameter import Parameter, parameter
-from gmwm.process.sinusoid import Sinusoid
-from gmwm.process.spectral import PSD, Panels, evaluated, haar_gain, legendre, quadrature
-from gmwm.process.state_space import StateSpace, block_diagonal
-from gmwm.process.wavelet_gain import pair_weights, unit_legendre
-from gmwm.process.wavelets import ComplexArray, Wavelet, wavelet
-
-__all__ = [
-    "AR",
-    "ARIMA",
-    "ARMA",
-    "BUTTERWORTH",
-    "CATALOGUE",
-    "MA",
-    "PSD",
-    "AveragedNoise",
-    "BiasInstability",
-    "ComplexArray",
-    "GaussMarkov",
-    "LowPassNoise",
-    "Model",
-    "Panels",
-    "Parameter",
-    "Process",
-    "QuantizationNoise",
-    "RandomWalk",
-    "RateRamp",
-    "Resonance",
-    "Shape",
-    "Sinusoid",
-    "StateSpace",
-    "Wavelet",
-    "WhiteNoise",
-    "as_model",
-    "block_diagonal",
-    "compiled_levels",
-    "evaluated",
-    "haar_gain",
-    "legendre",
-    "model_from_list",
-    "pair_weights",
-    "parameter",
-    "quadrature",
-    "shaped_curve",
-    "shaped_slope",
-    "simulate",
-    "unit_legendre",
-    "wavelet",
-]
+from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
+from gmwm.process.sinusoid import Sinusoid as Sinusoid
+from gmwm.process.spectral import (
+    PSD as PSD,
+    Panels as Panels,
+    evaluated as evaluated,
+    haar_gain as haar_gain,
+    legendre as legendre,
+    quadrature as quadrature,
+)
+from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
+from gmwm.process.wavelet_gain import pair_weights as pair_weights, unit_legendre as unit_legendre
+from gmwm.process.wavelets import (
+    ComplexArray as ComplexArray,
+    Wavelet as Wavelet,
+    wavelet as wavelet,
+)

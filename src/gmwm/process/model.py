@@ -44,10 +44,6 @@ class Model:
     Made with ``+`` and ``2 * process``. Gauss-Markov terms whose correlation times are given are
     put in the order of rising time.
 
-    Parameters
-    ----------
-    terms : iterable of Process
-
     Raises
     ------
     InputError

@@ -142,10 +142,6 @@ def wavelet(name: str) -> Wavelet:
         As in PyWavelets: "haar" (or "db1"), "db2" to "db10", "sym2" to "sym10", "coif1" to
         "coif5". The number is that of vanishing moments, for "coif" half of it.
 
-    Returns
-    -------
-    Wavelet
-
     Raises
     ------
     InputError

@@ -5,45 +5,24 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 `gmwm.errors.InputError` with one sentence: what is wrong, where, and how to correct it.
 """
 
-from gmwm._core.units import AUXILIARY
+from gmwm._core.units import AUXILIARY as AUXILIARY
 from gmwm.readers.at_rest import (
-    TurningGravity,
-    block_means,
-    steady_turn,
-    turning_gravity,
+    block_means as block_means,
+    steady_turn as steady_turn,
+    turning_gravity as turning_gravity,
 )
-from gmwm.readers.blocks import notices_of_blocks, read_blocks
-from gmwm.readers.cells import DATE, seconds_of
-from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.formats import is_frame, is_text
-from gmwm.readers.names import AXES, TIME, bare, meaning, stated_seconds
-from gmwm.readers.reader import read
-from gmwm.readers.recording import READING, Channel, Recording
-from gmwm.readers.table import label
-from gmwm.readers.text_file import content_size
-
-__all__ = [
-    "AUXILIARY",
-    "AXES",
-    "DATE",
-    "READING",
-    "TIME",
-    "Channel",
-    "CsvTable",
-    "Recording",
-    "TurningGravity",
-    "bare",
-    "block_means",
-    "content_size",
-    "is_frame",
-    "is_text",
-    "label",
-    "meaning",
-    "notices_of_blocks",
-    "read",
-    "read_blocks",
-    "seconds_of",
-    "stated_seconds",
-    "steady_turn",
-    "turning_gravity",
-]
+from gmwm.readers.blocks import notices_of_blocks as notices_of_blocks, read_blocks as read_blocks
+from gmwm.readers.cells import DATE as DATE, seconds_of as seconds_of
+from gmwm.readers.csv_table import CsvTable as CsvTable
+from gmwm.readers.formats import is_frame as is_frame, is_text as is_text
+from gmwm.readers.names import (
+    AXES as AXES,
+    TIME as TIME,
+    bare as bare,
+    meaning as meaning,
+    stated_seconds as stated_seconds,
+)
+from gmwm.readers.reader import read as read
+from gmwm.readers.recording import READING as READING, Channel as Channel, Recording as Recording
+from gmwm.readers.table import label as label
+from gmwm.readers.text_file import content_size as content_size

@@ -82,17 +82,7 @@ class CsvTable:
         return self.layout.notices
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns.
-
-        Parameters
-        ----------
-        columns : sequence of int
-            Their indices, each once.
-
-        Returns
-        -------
-        dict of int to (n,) ndarray
-            NaN where a field is empty or says that the sample is missing.
+        """Read some columns; see `Table`.
 
         Raises
         ------
@@ -100,6 +90,8 @@ class CsvTable:
             At the first line with a wrong number of fields or with text for a number; if there
             is none, for the first number that is infinite; if there is not enough memory.
         """
+        import pyarrow
+
         allowed = memory.budget()
         self._require(self._estimated_samples(len(columns)))
         held = 0
@@ -116,7 +108,8 @@ class CsvTable:
                 self._require(max(samples, self._estimated_samples(len(columns))))
         for values in series:
             values.resize(held, refcheck=False)
-        _release_unused()
+        # Arrow keeps memory for more columns, where it did any work.
+        pyarrow.default_memory_pool().release_unused()
         joined = dict(zip(columns, series, strict=True))
         for column, scale in self.layout.scales.items():
             if column in joined:
@@ -246,13 +239,6 @@ def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:
     if has_zone is None:
         return pyarrow.float64()
     return pyarrow.timestamp("ns", tz="UTC" if has_zone else None)
-
-
-def _release_unused() -> None:
-    """Give memory back that Arrow keeps for more columns, where it did any work."""
-    import pyarrow
-
-    pyarrow.default_memory_pool().release_unused()
 
 
 def _floats(column: pyarrow.ChunkedArray) -> FloatArray:

@@ -228,13 +228,10 @@ def _decimal(texts: Sequence[str], delimiter: str) -> str:
     """The mark with which more fields are numbers; never a comma that parts the fields."""
     if delimiter == "," or not any("," in text for text in texts):
         return "."
-    cells = [cell.strip(' \t"') for text in texts for cell in _loose_split(text, delimiter)]
+    separator = None if delimiter == BLANKS else delimiter
+    cells = [cell.strip(' \t"') for text in texts for cell in text.split(separator)]
     counts = {mark: sum(_is_number(cell, mark) for cell in cells) for mark in ".,"}
     return "," if counts[","] > counts["."] else "."
-
-
-def _loose_split(text: str, delimiter: str) -> list[str]:
-    return text.split() if delimiter == BLANKS else text.split(delimiter)
 
 
 def _is_number(cell: str, decimal: str) -> bool:

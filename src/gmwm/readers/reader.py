@@ -39,7 +39,7 @@ from gmwm.readers.formats import (
 )
 from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
-from gmwm.readers.roles import AuxiliaryColumn, Columns, Reference, Roles, assign_roles
+from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
 from gmwm.readers.sentinels import without_sentinels
 from gmwm.readers.table import Table, label
 
@@ -117,7 +117,7 @@ def read(
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
     tables = tables_of(path, layout, topic, clock, format)
-    return _read(tables, rate, units or {}, channels, time)
+    return _read(tables, Given(rate, units or {}, channels, time))
 
 
 def tables_of(
@@ -136,40 +136,28 @@ def tables_of(
     return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
 
 
-def _read(
-    tables: Sequence[Table],
-    rate: float | None,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-) -> Recording:
+def _read(tables: Sequence[Table], given: Given) -> Recording:
     """The recording of one table or of several."""
     if len(tables) == 1:
-        return _part(tables[0], rate, units, channels, time).recording
+        return part_of(tables[0], given).recording
     own = [table for table in tables if has_sensors(table)]
-    chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
-    parts = [_part(table, rate, units, only, time) for table, only in chosen]
+    chosen = [(own[0], given.channels)] if len(own) == 1 else shares(own, given.channels)
+    parts = [part_of(table, replace(given, channels=only)) for table, only in chosen]
     for table in tables:
         if table not in own:
             parts[0] = with_temperature(parts[0], table)
     return joined(parts)
 
 
-def _part(
-    table: Table,
-    rate: float | None,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-) -> Part:
+def part_of(table: Table, given: Given) -> Part:
     """The recording of a table, and when it begins."""
-    stated = _stated_rate(table, rate)
-    roles = roles_of(table, units, channels, time)
+    stated = _stated_rate(table, given.rate)
+    roles = roles_of(table, given)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
     lacks_rate = roles.time is None and stated is None
-    unit_of, unit_notices = channel_units(table, roles, units, lacks_rate)
+    unit_of, unit_notices = channel_units(table, roles, given.units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
     _check_size(table, roles, arrays)
@@ -193,7 +181,12 @@ def _part(
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
-    further = [_auxiliary(column, arrays[column.index], 1.0 / used_rate) for column in auxiliary]
+    further = [
+        Channel(column.name, arrays[column.index], 1.0 / used_rate, column.quantity)
+        if column.unit is None
+        else auxiliary_channel(column.name, arrays[column.index], 1.0 / used_rate, column.unit)
+        for column in auxiliary
+    ]
     series = {name: arrays[index] for name, index in roles.channels.items()}
     arrays.clear()
     recording = Recording.from_arrays(
@@ -203,7 +196,7 @@ def _part(
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
-    at_rest = rest_notices(recording, unit_of, units, isinstance(channels, Mapping))
+    at_rest = rest_notices(recording, unit_of, given.units, isinstance(given.channels, Mapping))
     recording = replace(
         recording,
         channels=(*recording.channels, *further),
@@ -211,35 +204,6 @@ def _part(
         jitter=timing.jitter if timing is not None else None,
     )
     return Part(recording, start)
-
-
-def roles_of(
-    table: Table,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-) -> Roles:
-    """Which column of a table is which channel."""
-    columns = Columns(table.source, table.names)
-    roles = assign_roles(columns, table.tentative, units, channels, time)
-    if not roles.channels:
-        raise InputError(
-            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
-            'e.g. channels={"gyro_x": 1}',
-            "channel-unknown",
-        )
-    return roles
-
-
-def read_table(
-    table: Table,
-    rate: float | None,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-) -> Recording:
-    """The recording of a table; the arguments are those of `read`."""
-    return _part(table, rate, units, channels, time).recording
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:
@@ -281,12 +245,6 @@ def _load(
     names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
     text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
     return arrays, kept, [Notice("columns-unreadable", "note", "", text)]
-
-
-def _auxiliary(column: AuxiliaryColumn, values: FloatArray, dt: float) -> Channel:
-    if column.unit is None:
-        return Channel(column.name, values, dt, column.quantity)
-    return auxiliary_channel(column.name, values, dt, column.unit)
 
 
 def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:

@@ -10,12 +10,22 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit
 from gmwm.errors import InputError
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
-from gmwm.readers.table import label
+from gmwm.readers.table import Table, label
 
 Reference = str | int
 """A column's name, or its index counted from 0."""
 
 _EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the caller of `gmwm.read` says of a table: the arguments of that name."""
+
+    rate: float | None
+    units: Mapping[str, str]
+    channels: Mapping[str, Reference] | Collection[str] | None
+    time: Reference | Literal[False] | None
 
 
 @dataclass(frozen=True)
@@ -130,32 +140,19 @@ class Columns:
         return f"its columns are {', '.join(map(repr, names[:most]))}{more}"
 
 
-def assign_roles(
-    columns: Columns,
-    tentative: bool,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-) -> Roles:
+def roles_of(table: Table, given: Given) -> Roles:
     """Decide which column is which channel.
 
-    What the caller says goes first, then the columns' names, then their number.
-
-    Parameters
-    ----------
-    columns : Columns
-    tentative : bool
-        Whether names that mean nothing may be overlooked.
-    units : mapping of str to str
-        Those that the caller gave; they decide what one or three columns without names are.
-    channels, time
-        As in `gmwm.read`.
+    What the caller says goes first, then the columns' names, then their number; the units decide
+    what one or three columns without names are.
 
     Raises
     ------
     InputError
-        If it cannot be decided.
+        If it cannot be decided, or no channel is a gyro's or an accelerometer's.
     """
+    columns = Columns(table.source, table.names)
+    units, channels, time = given.units, given.channels, given.time
     given_time = None if time is None or time is False else columns.find(time, "time")
     notices: list[Notice] = []
     if isinstance(channels, Mapping):
@@ -167,7 +164,7 @@ def assign_roles(
         if not chosen:
             known = {given_time, *stamps}
             rest = [i for i in range(len(columns.names)) if i not in known]
-            if not rest or (any(columns.names[i] for i in rest) and not tentative):
+            if not rest or (any(columns.names[i] for i in rest) and not table.tentative):
                 raise InputError(
                     f"{columns.source}: no column is known as a gyro's or an accelerometer's, "
                     f"{columns.listed()}: say which is which, e.g. {_EXAMPLE}",
@@ -192,6 +189,12 @@ def assign_roles(
         plural = "s" if len(ignored) > 1 else ""
         text = f"column{plural} not used: {', '.join(ignored)}"
         notices.append(Notice("columns-not-used", "note", "", text, {"count": len(ignored)}))
+    if not chosen:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
     return Roles(chosen, tuple(auxiliary), chosen_time, tuple(notices))
 
 

@@ -50,7 +50,13 @@ class Table(Protocol):
     def notices(self) -> tuple[Notice, ...]: ...
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns: finite values, NaN where a sample is missing."""
+        """Read some columns, by their indices, each once.
+
+        Returns
+        -------
+        dict of int to (n,) ndarray
+            Finite values, NaN where a sample is missing.
+        """
 
     def where(self, row: int) -> str:
         """Say where a row of data is, e.g. ``"line 12"``."""

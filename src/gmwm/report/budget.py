@@ -20,7 +20,7 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 
-_TOLD = 60.0  # s, the coasting time of the sentence
+_COASTING = 60.0  # s, the coasting time of the sentence
 _MINOR = 0.1  # of the variance of an axis: terms below it are left out on paper
 _NAMES = {
     (HORIZONTAL, "attitude"): "tilt",
@@ -115,9 +115,9 @@ def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
 
 def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
     """The headline: what a minute without aiding costs."""
-    if HORIZONTAL not in known.groups or _TOLD not in known.times:
+    if HORIZONTAL not in known.groups or _COASTING not in known.times:
         return ""
-    at = known.times.index(_TOLD)
+    at = known.times.index(_COASTING)
 
     def lost(budget: ErrorBudget) -> str:
         total = budget.total()

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import os
-import platform
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import gmwm
 from gmwm._core.files import written
 from gmwm._core.notices import worst_first
-from gmwm._core.units import field_units
 from gmwm.calibration import Calibration, floor, sentence, white_density
-from gmwm.errors import printable
 from gmwm.estimate import Estimate, Fit
 from gmwm.readers import Recording
 from gmwm.report.answer import answer, bias_instability, quantity_text, slow_terms, trust, verdict
@@ -27,12 +20,13 @@ from gmwm.report.figure import (
     density_figure,
     deviation_figure,
     overview_figure,
+    per_si,
     residual_figure,
     series_figure,
 )
 from gmwm.report.health import ambiguity, health
 from gmwm.report.numbers import SHOWN, Certified, certified
-from gmwm.report.page import rendered, resource
+from gmwm.report.page import origin, rendered, resource
 from gmwm.report.text import duration_text, needed, number, short
 
 _AIM = 0.1  # relative standard error
@@ -60,10 +54,6 @@ def write_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from: commands, hashes of files.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     InputError
@@ -88,10 +78,10 @@ def page(
     quantities = {name: fit.wv.quantity or "" for name, fit in calibration.items()}
     sheet = None if datasheet is None else read_datasheet(datasheet, quantities)
     numbers = certified(calibration)
+    source = {"recording": calibration.source or "not named"}
     return rendered(
         "template.html",
         scripts=(get_plotlyjs(), resource("report.js")),
-        style=resource("report.css"),
         calibration=calibration,
         length=duration_text(calibration.duration),
         answer=answer(calibration, numbers),
@@ -104,7 +94,7 @@ def page(
             _channel(name, calibration, numbers[SHOWN], recording, sheet) for name in calibration
         ],
         navigation=navigation(calibration),
-        provenance=_provenance(calibration, provenance or {}, sheet),
+        provenance=origin(source | dict(provenance or {}), "report of", sheet),
     )
 
 
@@ -130,19 +120,6 @@ def fragment(calibration: Calibration) -> str:
         f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
     )
     return f"<p>{escape(title)}</p><table>{head}{''.join(rows)}</table>"
-
-
-def _provenance(
-    calibration: Calibration, given: Mapping[str, str], sheet: Datasheet | None
-) -> dict[str, str]:
-    known = {"recording": calibration.source or "not named", **given}
-    if sheet is not None:
-        known["data sheet"] = sheet.name
-    return {printable(key): printable(value) for key, value in known.items()} | {
-        "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
-        f"Python {platform.python_version()}",
-        "report of": datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),
-    }
 
 
 def _channel(
@@ -196,13 +173,8 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
         text = quantity_text(1.0, unit, fit)
         shown.append({"letter": letter, "value": f"{value:.6e}", **{
             key: each.split(" ", 1)[1] for key, each in text.items()
-        }, "per_si": f"{_per_si(unit, fit):.9e}"})  # fmt: skip
+        }, "per_si": f"{per_si(unit, fit):.9e}"})  # fmt: skip
     return shown
-
-
-def _per_si(unit: str, fit: Fit) -> float:
-    found = field_units(unit, fit.wv.quantity)
-    return found[0].per_si if found else 1.0
 
 
 def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:

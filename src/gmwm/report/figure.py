@@ -19,7 +19,7 @@ from gmwm.calibration import Calibration, floor
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
-from gmwm.process import Model, Process
+from gmwm.process import Model
 from gmwm.readers import Channel
 from gmwm.report.datasheet import Datasheet
 from gmwm.report.samples import Spans, density, series
@@ -54,7 +54,7 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
     traces: list[Figure] = []
     first = next(iter(fits.values()))
     units = _units("Allan deviation", "u", first)
-    factor = _factor("u", first)
+    factor = per_si("u", first)
     seen: list[FloatArray] = []
     for (name, fit), colour in zip(fits.items(), _colours(len(fits)), strict=True):
         tau, components = dense_curves(fit)
@@ -96,13 +96,13 @@ def deviation_figure(
         That describe the data as well: drawn faintly.
     sheet : Datasheet, optional
     """
-    wv, factor = fitted.wv, _factor("u", fitted.wv)
+    wv, factor = fitted.wv, per_si("u", fitted)
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
     traces = [
-        {**_line(*_deviation_of(fitted, rival, factor), "models that tie", "#777777", "solid", 1.0),
-         "opacity": 0.85, "legendgroup": "ties"}
-        for rival in rivals
+        {**_line(at, factor * root_sum(list(parts.values())), "models that tie", "#777777", "solid",
+                 1.0), "opacity": 0.85, "legendgroup": "ties"}
+        for at, parts in (dense_curves(fitted, rival) for rival in rivals)
     ]  # fmt: skip
     toggles = [0] if traces else []
     for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
@@ -128,7 +128,9 @@ def deviation_figure(
     if filter_numbers is not None:
         more["whatif"] = {"curve": WHATIF, "factor": factor}
         toggles.append(len(traces))
-        traces.append(_whatif(tau, filter_numbers, factor))
+        N, K = filter_numbers
+        believed = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
+        traces.append(_line(tau, believed, WHATIF, _FILTER, "dot", 2.4))
     traces.append(_marks(fitted, filter_numbers, factor))
     low, high = deviation_range(np.concatenate([factor * total, value]))
     marks = [y for y in traces[-1]["y"] if y > low / _BELOW]
@@ -141,17 +143,6 @@ def deviation_figure(
         },
     }
     return _figure(traces, layout, units=units, toggles=toggles, **more)
-
-
-def _deviation_of(fitted: Fit, model: Model, factor: float) -> tuple[FloatArray, FloatArray]:
-    tau, components = dense_curves(fitted, model)
-    return tau, factor * root_sum(list(components.values()))
-
-
-def _whatif(tau: FloatArray, numbers: tuple[float, float], factor: float) -> Figure:
-    N, K = numbers
-    value = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
-    return _line(tau, value, WHATIF, _FILTER, "dot", 2.4)
 
 
 def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
@@ -226,14 +217,14 @@ def residual_figure(fitted: Fit) -> Figure:
 
 def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     """Root of the spectral density of the samples, with that of the model and of its terms."""
-    factor = _factor("u/sqrt(Hz)", fitted.wv)
+    factor = per_si("u/sqrt(Hz)", fitted)
     frequency, root = density(channel, spans)
     traces = [_line(frequency, factor * root, "data", "#7f8c99", "solid", 1.2)]
     toggles = [0]
     grid = np.geomspace(frequency[0], frequency[-1], 160)
     terms = zip(fitted.model.term_labels(), fitted.model.terms, strict=True)
     found: dict[str, FloatArray] = {
-        label: _root_density(term, grid, channel.dt)
+        label: np.sqrt(np.maximum(np.asarray(term.psd(grid, channel.dt), dtype=float), 0.0))
         for label, term in terms
         if term.has_spectrum() and not term.is_line and not term.is_drift
     }
@@ -259,13 +250,9 @@ def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     return _figure(traces, layout, units=units, toggles=toggles)
 
 
-def _root_density(term: Process, frequency: FloatArray, dt: float) -> FloatArray:
-    return np.sqrt(np.maximum(np.asarray(term.psd(frequency, dt), dtype=float), 0.0))
-
-
 def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     """The time series in bins, less its mean, with what was left out of it."""
-    found, factor = series(channel, spans), _factor("u", fitted.wv)
+    found, factor = series(channel, spans), per_si("u", fitted)
     end = channel.n * channel.dt
     unit, scale = ("h", 3600.0) if end > 7200.0 else ("min", 60.0) if end > 600.0 else ("s", 1.0)
     time = found.time / scale
@@ -344,8 +331,9 @@ def _units(title: str, unit: str, fitted: Fit) -> list[tuple[str, float]]:
     return [*field, (f"{title} [{si}]", 1.0 / found[0].per_si if found else 1.0)]
 
 
-def _factor(unit: str, of: Any) -> float:
-    found = field_units(unit, of.quantity if hasattr(of, "quantity") else of.wv.quantity)
+def per_si(unit: str, fitted: Fit) -> float:
+    """How many of the field's unit one SI unit is."""
+    found = field_units(unit, fitted.wv.quantity)
     return found[0].per_si if found else 1.0
 
 

@@ -5,20 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import gmwm
-from gmwm._core.files import written
 from gmwm.ins.field import Comparison, Navigated, outage_pictures
-from gmwm.report.page import rendered
+from gmwm.report.page import write_page
 from gmwm.report.validation import svg
 
 
 def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
     """Write the report of a solution as one HTML file that needs no network.
-
-    Parameters
-    ----------
-    navigated : Navigated
-    path : path-like
 
     Raises
     ------
@@ -26,10 +19,10 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         If the file cannot be written.
     """
     sensors = navigated.measured.sensors
-    text = rendered(
+    return write_page(
+        path,
         "navigated.html",
         title=navigated.measured.title,
-        version=gmwm.__version__,
         verdict=navigated.verdict.text,
         track=svg(navigated.plot_track()),
         outages=[(title, svg(figure)) for title, figure in outage_pictures(navigated)],
@@ -38,28 +31,20 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         summary=str(navigated),
         models=[(axis, model, sensors.bias_sd[axis]) for axis, model in sensors.models.items()],
     )
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
 
 
 def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
     """Write the report of a comparison of sensor models as one HTML file.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    path : path-like
 
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    text = rendered(
-        "comparison.html", title=comparison.title, version=gmwm.__version__, c=comparison,
-        summary=str(comparison), errors=svg(comparison.plot()),
-    )  # fmt: skip
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
+    return write_page(
+        path,
+        "comparison.html",
+        c=comparison,
+        summary=str(comparison),
+        errors=svg(comparison.plot()),
+    )

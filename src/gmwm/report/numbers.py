@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
-from typing import Any
 
 import yaml
 
@@ -19,8 +18,11 @@ HORIZONS = (1.0, 10.0, 60.0, 600.0)
 SHOWN = 60.0
 """s: the horizon that a page opens with."""
 
-_LANGUAGES = {"kalibr": "YAML", "gtsam": "Python", "gtsam-cpp": "C++", "matlab": "MATLAB"}
-"""Program -> language of its file."""
+_TITLES = {
+    "kalibr": "YAML, Kalibr", "gtsam": "Python, GTSAM", "gtsam-cpp": "C++, GTSAM",
+    "matlab": "MATLAB",
+}  # fmt: skip
+"""Of the files of programs, by their languages."""
 
 _NOT_VALID = "not valid: the fit is not, nor are numbers from it"
 
@@ -107,9 +109,8 @@ def _imu(
 
 def _files(imu: Imu) -> dict[str, str]:
     texts = {}
-    for name, language in _LANGUAGES.items():
+    for name, title in _TITLES.items():
         target = TARGETS[name]
-        title = target.title if target.title == language else f"{language}, {target.title}"
         if isinstance(target, ImuFile):
             texts[title] = target.text(imu if target.shared else imu.by_axis())
     return texts
@@ -134,14 +135,12 @@ def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dic
     marks = {name: f"  # {_NOT_VALID}" if name in invalid else "" for name in values}
     lines = [f"    {name!r}: {each!r},{marks[name]}" for name, each in values.items()]
     blocks = [
-        _yaml({name: each}).replace("\n", f"{marks[name]}\n", 1) for name, each in values.items()
+        yaml.safe_dump({name: each}, sort_keys=False, allow_unicode=True).replace(
+            "\n", f"{marks[name]}\n", 1
+        )
+        for name, each in values.items()
     ]
     return {
         "YAML, axis by axis": f"# {about}\n{''.join(blocks)}",
         "Python, axis by axis": "\n".join([f"# {about}", "imu_noise = {", *lines, "}", ""]),
     }
-
-
-def _yaml(content: Mapping[str, Any]) -> str:
-    text: str = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
-    return text

@@ -2,20 +2,46 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import gmwm
+from gmwm._core.files import written
+from gmwm.errors import printable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+    from gmwm.report.datasheet import Datasheet
 
 
 def resource(name: str) -> str:
     """The text of a file in this folder."""
     return files("gmwm.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Path:
+    """Write a page from its template; see `rendered`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    text = rendered(template, **values)
+    with written(path) as stream:
+        stream.write(text)
+    return Path(path)
 
 
 def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
@@ -29,7 +55,8 @@ def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
         The only ones that a browser will run, by a Content-Security-Policy; nothing is loaded from
         any network.
     **values
-        Of the template, where ``tojson`` writes figures and ``scripts`` are those above.
+        Of the template, where ``tojson`` writes figures and ``scripts`` are those above; it has the
+        ``style`` of reports and the ``version`` of this package too.
     """
     return (
         _environment()
@@ -47,7 +74,18 @@ def _environment() -> Environment:
         loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    environment.globals |= {"style": resource("report.css"), "version": gmwm.__version__}
     return environment
+
+
+def origin(known: Mapping[str, str], what: str, sheet: Datasheet | None) -> dict[str, str]:
+    """What is known of where the numbers come from, versions and the date of ``what``."""
+    known = dict(known) if sheet is None else {**known, "data sheet": sheet.name}
+    return {printable(key): printable(value) for key, value in known.items()} | {
+        "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
+        f"Python {platform.python_version()}",
+        what: datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),
+    }
 
 
 def _policy(scripts: Sequence[str]) -> str:

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import gmwm
-from gmwm._core.files import written
 from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
-from gmwm.report.page import rendered
+from gmwm.report.page import write_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,11 +25,6 @@ _COVERED = ("horizontal", "vertical")
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
     """Write the report of a validation as one HTML file that needs no network.
 
-    Parameters
-    ----------
-    validation : Validation
-    path : path-like
-
     Raises
     ------
     InputError
@@ -39,10 +32,10 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
     """
     study, experiment = validation.study, validation.experiment
     outages = [_outage(validation, i) for i in range(len(study.outages))]
-    text = rendered(
+    return write_page(
+        path,
         "validation.html",
         title=experiment.title,
-        version=gmwm.__version__,
         duration=f"{study.truth.duration:g}",
         rate=f"{1.0 / study.truth.dt:g}",
         runs=study[validation.names[0]].runs,
@@ -60,9 +53,6 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         innovations=[(name, validation.innovations(name)) for name in validation.names],
         models=[(name, models.models) for name, models in experiment.filters.items()],
     )
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
 
 
 def svg(figure: Figure) -> str:

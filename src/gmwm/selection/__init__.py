@@ -1,10 +1,4 @@
 """Which model: a ranking of candidates, what ties, what is chosen."""
 
-from gmwm.selection.select import Selection, select
-from gmwm.selection.ties import wider_ranges
-
-__all__ = [
-    "Selection",
-    "select",
-    "wider_ranges",
-]
+from gmwm.selection.select import Selection as Selection, select as select
+from gmwm.selection.ties import wider_ranges as wider_ranges

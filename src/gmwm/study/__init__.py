@@ -1,34 +1,17 @@
 """The simulation study of Stebler et al. (2012), and a harder case, over the public API."""
 
-from gmwm.study.appendix import converge, convergence_table
-from gmwm.study.choice import choice_study, choice_table
-from gmwm.study.demo import compare, simulated_imu
-from gmwm.study.demo_files import write_demo_files
-from gmwm.study.emulated_logs import FAULTS, emulated_log, sensors
-from gmwm.study.figures import boxplots
-from gmwm.study.navigation import reproduce_figure
-from gmwm.study.runs import run_study
-from gmwm.study.studies import FIGURES, STUDIES, Study
-from gmwm.study.summary import summarise
-from gmwm.study.turns import reproduce_rotation
-
-__all__ = [
-    "FAULTS",
-    "FIGURES",
-    "STUDIES",
-    "Study",
-    "boxplots",
-    "choice_study",
-    "choice_table",
-    "compare",
-    "converge",
-    "convergence_table",
-    "emulated_log",
-    "reproduce_figure",
-    "reproduce_rotation",
-    "run_study",
-    "sensors",
-    "simulated_imu",
-    "summarise",
-    "write_demo_files",
-]
+from gmwm.study.appendix import converge as converge, convergence_table as convergence_table
+from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
+from gmwm.study.demo import compare as compare, simulated_imu as simulated_imu
+from gmwm.study.demo_files import write_demo_files as write_demo_files
+from gmwm.study.emulated_logs import (
+    FAULTS as FAULTS,
+    emulated_log as emulated_log,
+    sensors as sensors,
+)
+from gmwm.study.figures import boxplots as boxplots
+from gmwm.study.navigation import reproduce_figure as reproduce_figure
+from gmwm.study.runs import run_study as run_study
+from gmwm.study.studies import FIGURES as FIGURES, STUDIES as STUDIES, Study as Study
+from gmwm.study.summary import summarise as summarise
+from gmwm.study.turns import reproduce_rotation as reproduce_rotation

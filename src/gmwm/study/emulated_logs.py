@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import (
     Aiding,
@@ -104,7 +103,10 @@ def emulated_log(
     rng = np.random.default_rng(seed)
     finer = _OFF_GRID if "off-grid" in faults else 1
     fine, ideal = _world(vehicle, duration, rate * finer)
-    imu = Imu(1.0 / rate, *(_summed(each, finer) for each in (ideal.rotation, ideal.velocity)))
+    imu = Imu(
+        1.0 / rate,
+        *(each.reshape(-1, finer, 3).sum(axis=1) for each in (ideal.rotation, ideal.velocity)),
+    )
     errors = (truth or sensors()).simulate(imu.n, imu.dt, rng).total
     imu = imu.with_errors(errors[:, :3], errors[:, 3:])
     late = fine.dt if finer > 1 else 0.0
@@ -131,10 +133,6 @@ def emulated_log(
 def _world(vehicle: str, duration: float, rate: float) -> tuple[Trajectory, Imu]:
     truth = VEHICLES[vehicle](duration=duration, dt=1.0 / rate)
     return truth, emulate(truth)
-
-
-def _summed(increments: FloatArray, count: int) -> FloatArray:
-    return increments.reshape(-1, count, 3).sum(axis=1)
 
 
 def _part(imu: Imu, first: int) -> Imu:

@@ -196,10 +196,6 @@ def deviations(
     confidence : float, optional
         Level of the chi-square intervals.
 
-    Returns
-    -------
-    Deviations
-
     Raises
     ------
     InputError

@@ -12,8 +12,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
 from gmwm.readers import Channel
+from gmwm.variance import tuning
 from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
-from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.gaps import Runs
 from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
@@ -58,10 +58,6 @@ def wavelet_variance(
         a lag window (see `gmwm.variance.covariance.empirical`), for ``fit(weights="data")``.
     confidence : float, optional
         Level of the chi-square intervals.
-
-    Returns
-    -------
-    WaveletVariance
 
     Raises
     ------
@@ -129,6 +125,24 @@ def fourth_cumulant(values: FloatArray) -> float:
     """Of the independent part of a series, NaN where samples are missing, u^4."""
     count, square, fourth = difference_powers(values)
     return cumulant_of_powers(square / count, fourth / count, count)
+
+
+def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
+    """Of the independent part of a series, u^4; 0 if not above chance.
+
+    Cumulants of independent samples add up, so that first differences have twice that of the
+    samples.
+
+    Parameters
+    ----------
+    square, fourth : float
+        Mean second and fourth power of the first differences, u^2 and u^4.
+    count : float
+        Number of the first differences.
+    """
+    excess = fourth / square**2 - 3.0 if square > 0.0 else 0.0
+    chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)
+    return 0.5 * square**2 * excess if excess > chance else 0.0
 
 
 def where_of(channel: Channel) -> str:

@@ -93,10 +93,6 @@ def modwt(x: FloatArray, wavelet: str = "haar", levels: int | None = None) -> Mo
     levels : int, optional
         Number of levels J; by default all that have a coefficient free of end effects, at least 1.
 
-    Returns
-    -------
-    Modwt
-
     Raises
     ------
     InputError

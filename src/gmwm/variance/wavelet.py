@@ -185,7 +185,7 @@ class WaveletVariance(Printed):
         if self.wavelet != "haar":
             covariance = self._of_other_wavelet(psd, lines)
         else:
-            covariance = self._of_haar(psd)
+            covariance = self._with_gaps(haar_covariance(psd, self.n, self.dt))
             if lines:
                 covariance = covariance + line_covariance(
                     tuple(lines), psd, self.dt, self.averaging, self.counts
@@ -200,9 +200,6 @@ class WaveletVariance(Printed):
             share = 0.5 / self.averaging
             covariance = covariance + self.fourth_cumulant / self.counts[0] * np.outer(share, share)
         return covariance
-
-    def _of_haar(self, psd: PSD) -> FloatArray:
-        return self._with_gaps(haar_covariance(psd, self.n, self.dt))
 
     def _of_other_wavelet(self, psd: PSD, lines: Sequence[tuple[float, float]]) -> FloatArray:
         from gmwm.variance.covariance.daubechies import wavelet_covariance

@@ -8,7 +8,7 @@ import pytest
 import gmwm
 from gmwm import Health, InputError
 from gmwm._core.notices import SEVERITIES, Notice
-from gmwm.diagnosis.check import _peaks
+from gmwm.diagnosis.spectral import peaks
 from places import SHARED
 
 ADIS = SHARED / "data/adis16405"
@@ -151,7 +151,7 @@ def test_extreme_scales_are_survived(record, scale):
 @pytest.mark.parametrize(("number", "frequency"), [(1, 0.565), (2, 0.568), (3, 0.540), (4, 0.534)])
 def test_line_of_the_accelerometers(number, frequency):
     recording = adis(number, channels={"accel_x": 3})
-    found, _ = _peaks(recording["accel_x"].values, recording.dt)
+    found, _ = peaks(recording["accel_x"].values, recording.dt)
     assert found[0].frequency == pytest.approx(frequency, abs=0.005)
     assert found[0].ratio > 30.0
     assert found[0].amplitude == pytest.approx(0.008, rel=0.25)  # m/s^2

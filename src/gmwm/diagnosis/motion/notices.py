@@ -1,4 +1,4 @@
-"""What is said of a recording that moved."""
+"""Notices about a recording that moved."""
 
 from __future__ import annotations
 

@@ -1,19 +1,12 @@
 """Maximum likelihood, exact, by the spectrum or by expectation-maximization."""
 
-from gmwm.estimate.likelihood.em import EM
-from gmwm.estimate.likelihood.kalman import filtered
-from gmwm.estimate.likelihood.likelihood import Columns, Regression, stacked, whitened
-from gmwm.estimate.likelihood.mle import MLE, Whittle
-from gmwm.estimate.likelihood.scoring import regular_inverse
-
-__all__ = [
-    "EM",
-    "MLE",
-    "Columns",
-    "Regression",
-    "Whittle",
-    "filtered",
-    "regular_inverse",
-    "stacked",
-    "whitened",
-]
+from gmwm.estimate.likelihood.em import EM as EM
+from gmwm.estimate.likelihood.kalman import filtered as filtered
+from gmwm.estimate.likelihood.likelihood import (
+    Columns as Columns,
+    Regression as Regression,
+    stacked as stacked,
+    whitened as whitened,
+)
+from gmwm.estimate.likelihood.mle import MLE as MLE, Whittle as Whittle
+from gmwm.estimate.likelihood.scoring import regular_inverse as regular_inverse

@@ -1,70 +1,37 @@
 """What is estimated from what: parameters as coordinates, moments, their covariance."""
 
 from gmwm.estimate.problem.information import (
-    density,
-    error_growth,
-    frequency_nodes,
-    information_with,
-    slope_dof,
-    spectral_information,
+    density as density,
+    error_growth as error_growth,
+    frequency_nodes as frequency_nodes,
+    information_with as information_with,
+    slope_dof as slope_dof,
+    spectral_information as spectral_information,
 )
 from gmwm.estimate.problem.nonnegative import (
-    objectives_with,
-    orthogonal_to,
-    solve_columns,
-    solve_nonnegative,
+    objectives_with as objectives_with,
+    orthogonal_to as orthogonal_to,
+    solve_columns as solve_columns,
+    solve_nonnegative as solve_nonnegative,
 )
 from gmwm.estimate.problem.parameters import (
-    Coordinates,
-    Term,
-    drift_key,
-    in_model_order,
-    keys_by_term,
-    shape_of,
+    Coordinates as Coordinates,
+    Term as Term,
+    drift_key as drift_key,
+    in_model_order as in_model_order,
+    keys_by_term as keys_by_term,
+    shape_of as shape_of,
 )
 from gmwm.estimate.problem.ramp import (
-    Slope,
-    bias_of_detrending,
-    detrended_covariance,
-    difference_covariance,
-    gls_slope,
-    ols_slope,
-    slope_p_value,
+    Slope as Slope,
+    bias_of_detrending as bias_of_detrending,
+    detrended_covariance as detrended_covariance,
+    difference_covariance as difference_covariance,
+    gls_slope as gls_slope,
+    ols_slope as ols_slope,
+    slope_p_value as slope_p_value,
 )
-from gmwm.estimate.problem.scales import Scales, is_plain
-from gmwm.estimate.problem.simulation import Simulation
-from gmwm.estimate.problem.targets import FittedMoments, Moments
-from gmwm.estimate.problem.whitening import chi_square, weight_root
-
-__all__ = [
-    "Coordinates",
-    "FittedMoments",
-    "Moments",
-    "Scales",
-    "Simulation",
-    "Slope",
-    "Term",
-    "bias_of_detrending",
-    "chi_square",
-    "density",
-    "detrended_covariance",
-    "difference_covariance",
-    "drift_key",
-    "error_growth",
-    "frequency_nodes",
-    "gls_slope",
-    "in_model_order",
-    "information_with",
-    "is_plain",
-    "keys_by_term",
-    "objectives_with",
-    "ols_slope",
-    "orthogonal_to",
-    "shape_of",
-    "slope_dof",
-    "slope_p_value",
-    "solve_columns",
-    "solve_nonnegative",
-    "spectral_information",
-    "weight_root",
-]
+from gmwm.estimate.problem.scales import Scales as Scales, is_plain as is_plain
+from gmwm.estimate.problem.simulation import Simulation as Simulation
+from gmwm.estimate.problem.targets import FittedMoments as FittedMoments, Moments as Moments
+from gmwm.estimate.problem.whitening import chi_square as chi_square, weight_root as weight_root

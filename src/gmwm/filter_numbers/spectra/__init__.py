@@ -1,27 +1,19 @@
 """Spectra that lie above others at every frequency."""
 
 from gmwm.filter_numbers.spectra.dominance import (
-    KINDS,
-    TIGHTEST,
-    Problem,
-    correlation_time,
-    dominating,
-    with_correlation_times,
+    KINDS as KINDS,
+    TIGHTEST as TIGHTEST,
+    Problem as Problem,
+    correlation_time as correlation_time,
+    dominating as dominating,
+    with_correlation_times as with_correlation_times,
 )
-from gmwm.filter_numbers.spectra.propagation import Estimated, standard_errors
-from gmwm.filter_numbers.spectra.region import ParameterRegion, region_targets
-from gmwm.filter_numbers.spectra.target import Target
-
-__all__ = [
-    "KINDS",
-    "TIGHTEST",
-    "Estimated",
-    "ParameterRegion",
-    "Problem",
-    "Target",
-    "correlation_time",
-    "dominating",
-    "region_targets",
-    "standard_errors",
-    "with_correlation_times",
-]
+from gmwm.filter_numbers.spectra.propagation import (
+    Estimated as Estimated,
+    standard_errors as standard_errors,
+)
+from gmwm.filter_numbers.spectra.region import (
+    ParameterRegion as ParameterRegion,
+    region_targets as region_targets,
+)
+from gmwm.filter_numbers.spectra.target import Target as Target

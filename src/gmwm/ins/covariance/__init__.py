@@ -1,8 +1,3 @@
 """Errors of filters predicted without runs, and small models found by them."""
 
-from gmwm.ins.covariance.reduction import FORMS, reduce
-
-__all__ = [
-    "FORMS",
-    "reduce",
-]
+from gmwm.ins.covariance.reduction import reduce as reduce

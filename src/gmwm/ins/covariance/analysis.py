@@ -206,10 +206,6 @@ def covariance_analysis(
     truth, believed : SensorModels
         What the sensors do, and what the filter believes.
 
-    Returns
-    -------
-    Analysis
-
     Notes
     -----
     Exact for small errors: the filter is linearised along the true trajectory, and a notice reports

@@ -137,10 +137,6 @@ def reduce(
     dt : float, optional
         Sampling interval of the IMU in the default scenario, s.
 
-    Returns
-    -------
-    Reduction
-
     Raises
     ------
     InputError

@@ -21,7 +21,7 @@ from gmwm.ins.filter.filter_kernels import PAUSED, run
 from gmwm.ins.filter.measurement_kernels import IS_POSITION, KINDS
 from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
-from gmwm.ins.geometry import matrix_from_rpy
+from gmwm.ins.geometry import matrix_from_rpy, skew
 from gmwm.ins.imu import Imu, SensorModels
 from gmwm.ins.trajectory import NavState, check_latitudes
 
@@ -274,14 +274,6 @@ def _turned(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatA
     return T @ covariance @ np.swapaxes(T, -1, -2)
 
 
-def skew(vector: FloatArray) -> FloatArray:
-    """Matrices of the cross product, (..., 3, 3), of vectors (..., 3)."""
-    x, y, z = np.moveaxis(np.asarray(vector), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
 def navigate(
     imu: Imu,
     initial: NavState,
@@ -315,10 +307,6 @@ def navigate(
         outage.
     second_order : bool, optional
         See `Filter`.
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -126,7 +127,7 @@ class SensorStates:
             output=np.append(self.output, np.zeros(extra)),
             partner=np.append(self.partner, self.m + np.arange(extra)),
             mean=np.append(self.mean, np.zeros(extra)),
-            covariance=_padded(self.covariance, np.diag(np.asarray(sigma, dtype=float) ** 2)),
+            covariance=block_diag(self.covariance, np.diag(np.asarray(sigma, dtype=float) ** 2)),
             phi=np.hstack([self.phi, decay]),
             phi_off=np.hstack([self.phi_off, zeros]),
             gain=np.hstack([self.gain, zeros]),
@@ -234,10 +235,3 @@ def _carried(form: StateSpace, dt: float, k_max: int) -> list[tuple[FloatArray, 
         noise = one @ noise @ one.T + added
         result.append((transition, noise))
     return result
-
-
-def _padded(first: FloatArray, second: FloatArray) -> FloatArray:
-    total = np.zeros((len(first) + len(second),) * 2)
-    total[: len(first), : len(first)] = first
-    total[len(first) :, len(first) :] = second
-    return total

@@ -40,10 +40,6 @@ _CENTRIFUGAL_RATIO = (
 def radii_at(sin_lat: float) -> tuple[float, float]:
     """Radii of curvature of the meridian and of the prime vertical, from the latitude's sine.
 
-    Parameters
-    ----------
-    sin_lat : float
-
     Returns
     -------
     meridian, transverse : float

@@ -211,3 +211,11 @@ def matrix_from_rotation_vector(vectors: FloatArray) -> FloatArray:
     result = np.empty((len(flat), 3, 3))
     _exponentials(flat, result)
     return result.reshape(*np.shape(vectors), 3)
+
+
+def skew(vector: FloatArray) -> FloatArray:
+    """Matrices of the cross product, (..., 3, 3), of vectors (..., 3)."""
+    x, y, z = np.moveaxis(np.asarray(vector), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -19,7 +19,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.ins.geometry import matrix_from_rotation_vector
+from gmwm.ins.geometry import matrix_from_rotation_vector, skew
 from gmwm.ins.imu.emulation import Imu
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.process import block_diagonal
@@ -90,7 +90,7 @@ class _Steps:
         # Integral of exp(-q r) over q from 0 to s: the right Jacobian of s r, times s.
         products = np.multiply.outer(_NODES, _NODES)[:, :, None, None] * rotation
         right = np.einsum("q,sqnij->snij", _WEIGHTS, matrix_from_rotation_vector(-products))
-        inner = part @ _cross(velocity) @ (_NODES[:, None, None, None] * right)
+        inner = part @ skew(velocity) @ (_NODES[:, None, None, None] * right)
         D1 = -np.einsum("s,snij->nij", _WEIGHTS, inner)
         D2 = -np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), inner)
         return cls(matrix_from_rotation_vector(rotation), G1, G2, D1, D2)
@@ -114,10 +114,6 @@ def preintegrate(
         variables of the factor graph, as the biases of a combined IMU factor are. "stationary":
         that which the models have by themselves, zero for random walks; the increments alone then
         make a factor that knows of no states.
-
-    Returns
-    -------
-    Preintegration
 
     Raises
     ------
@@ -150,8 +146,8 @@ def preintegrate(
     for k in range(imu.n):
         G1, G2, u = steps.G1[k], steps.G2[k], imu.velocity[k]
         A[:3, :3] = steps.turn[k].T
-        A[3:6, :3] = -rotation @ _cross(G1 @ u)
-        A[6:9, :3] = -rotation @ _cross(G2 @ u) * dt
+        A[3:6, :3] = -rotation @ skew(G1 @ u)
+        A[6:9, :3] = -rotation @ skew(G2 @ u) * dt
         B[:3, :3] = G1.T * dt
         B[3:6, :3], B[3:6, 3:] = rotation @ steps.D1[k] * dt, rotation @ G1 * dt
         B[6:, :3], B[6:, 3:] = rotation @ steps.D2[k] * dt**2, rotation @ G2 * dt**2
@@ -181,10 +177,3 @@ def _start(start: Start | FloatArray, stationary: FloatArray) -> FloatArray:
             "covariance of theirs"
         )
     return given
-
-
-def _cross(v: FloatArray) -> FloatArray:
-    """Matrices [v cross] of vectors, shape (..., 3) to (..., 3, 3)."""
-    matrix = np.zeros((*v.shape, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return matrix - np.swapaxes(matrix, -1, -2)

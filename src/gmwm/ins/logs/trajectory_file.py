@@ -65,14 +65,6 @@ class Log:
 def read_log(path: Path) -> Log:
     """Read a log of a trajectory.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Log
-
     Raises
     ------
     InputError

@@ -1,4 +1,4 @@
-"""What is navigated: a trajectory, what aids along it, and where sensor errors come from."""
+"""What is navigated: a trajectory, what aids along it, where errors come from, which filters."""
 
 from __future__ import annotations
 
@@ -106,3 +106,28 @@ class Scenario:
         within = [np.arange(o.start, o.end, max(tuning.OUTAGE_EPOCHS, dt)) for o in self.outages]
         ends = [outage.end for outage in self.outages]
         return Outputs.every(self.kept_interval, dt, n, ends, also=np.concatenate([[], *within]))
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Filters that navigate on the same errors.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    source : ErrorSource
+    filters : dict
+        Name -> `SensorModels`.
+    truth : SensorModels or None
+        The models that errors are drawn from; ``None`` for real ones.
+    runs, seed : int
+    title : str
+    """
+
+    scenario: Scenario
+    source: ErrorSource
+    filters: dict[str, SensorModels]
+    truth: SensorModels | None
+    runs: int = 100
+    seed: int = 0
+    title: str = ""

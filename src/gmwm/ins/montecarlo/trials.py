@@ -87,10 +87,6 @@ def monte_carlo(
     progress : callable, optional
         Called as ``progress(done, runs, "")``.
 
-    Returns
-    -------
-    MonteCarlo
-
     Raises
     ------
     InputError

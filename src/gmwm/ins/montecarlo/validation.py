@@ -23,7 +23,6 @@ from gmwm.ins.montecarlo.consistency import (
     innovation_test,
     over_time,
 )
-from gmwm.ins.montecarlo.experiment import Experiment
 from gmwm.ins.montecarlo.filter_errors import FilterErrors
 from gmwm.ins.montecarlo.outage_errors import (
     QUANTITIES,
@@ -33,6 +32,7 @@ from gmwm.ins.montecarlo.outage_errors import (
     pooled_sizes,
     spread,
 )
+from gmwm.ins.montecarlo.scenario import Experiment
 from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
 
 if TYPE_CHECKING:

@@ -1,40 +1,23 @@
 """Studies of navigation as people write them, in YAML."""
 
-from gmwm.ins.spec.document import read_document
-from gmwm.ins.spec.experiment import ReadingSpec, experiment_from
+from gmwm.ins.spec.document import read_document as read_document
+from gmwm.ins.spec.experiment import ReadingSpec as ReadingSpec, experiment_from as experiment_from
 from gmwm.ins.spec.fields import (
-    FileName,
-    Meters,
-    PositiveMeters,
-    PositiveRadians,
-    PositiveSeconds,
-    PositiveSpeed,
-    Radians,
-    Seconds,
-    Spec,
-    Three,
-    number,
-    written,
+    FileName as FileName,
+    Meters as Meters,
+    PositiveMeters as PositiveMeters,
+    PositiveRadians as PositiveRadians,
+    PositiveSeconds as PositiveSeconds,
+    PositiveSpeed as PositiveSpeed,
+    Radians as Radians,
+    Seconds as Seconds,
+    Spec as Spec,
+    Three as Three,
+    number as number,
+    written as written,
 )
-from gmwm.ins.spec.sensor_terms import Models, read_models, sensor_models
-
-__all__ = [
-    "FileName",
-    "Meters",
-    "Models",
-    "PositiveMeters",
-    "PositiveRadians",
-    "PositiveSeconds",
-    "PositiveSpeed",
-    "Radians",
-    "ReadingSpec",
-    "Seconds",
-    "Spec",
-    "Three",
-    "experiment_from",
-    "number",
-    "read_document",
-    "read_models",
-    "sensor_models",
-    "written",
-]
+from gmwm.ins.spec.sensor_terms import (
+    Models as Models,
+    read_models as read_models,
+    sensor_models as sensor_models,
+)

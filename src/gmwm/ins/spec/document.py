@@ -17,10 +17,6 @@ _LARGEST = 1 << 20
 def read_document(path: Path) -> dict[str, Any]:
     """Content of a YAML file; keys without a value are left out.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     InputError

@@ -1,25 +1,19 @@
 """Error-free motion: from files, manoeuvres and missions."""
 
-from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
-from gmwm.ins.trajectory.splines import coefficients, unwrapped_angles, unwrapped_longitudes
-from gmwm.ins.trajectory.trajectory import (
-    HIGHEST_LATITUDE,
-    NavState,
-    Trajectory,
-    check_latitudes,
-    finite_numbers,
+from gmwm.ins.trajectory.missions import (
+    car_drive as car_drive,
+    fixed_wing_loiter as fixed_wing_loiter,
+    helicopter_mapping as helicopter_mapping,
 )
-
-__all__ = [
-    "HIGHEST_LATITUDE",
-    "NavState",
-    "Trajectory",
-    "car_drive",
-    "check_latitudes",
-    "coefficients",
-    "finite_numbers",
-    "fixed_wing_loiter",
-    "helicopter_mapping",
-    "unwrapped_angles",
-    "unwrapped_longitudes",
-]
+from gmwm.ins.trajectory.splines import (
+    coefficients as coefficients,
+    unwrapped_angles as unwrapped_angles,
+    unwrapped_longitudes as unwrapped_longitudes,
+)
+from gmwm.ins.trajectory.trajectory import (
+    HIGHEST_LATITUDE as HIGHEST_LATITUDE,
+    NavState as NavState,
+    Trajectory as Trajectory,
+    check_latitudes as check_latitudes,
+    finite_numbers as finite_numbers,
+)

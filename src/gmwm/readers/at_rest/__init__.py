@@ -1,11 +1,9 @@
 """What sensors at rest read, and what belies it."""
 
 from gmwm.readers.at_rest.rotation import (
-    TurningGravity,
-    block_means,
-    steady_turn,
-    turning_gravity,
+    TurningGravity as TurningGravity,
+    block_means as block_means,
+    steady_turn as steady_turn,
+    turning_gravity as turning_gravity,
 )
-from gmwm.readers.at_rest.sensors import rest_notices
-
-__all__ = ["TurningGravity", "block_means", "rest_notices", "steady_turn", "turning_gravity"]
+from gmwm.readers.at_rest.sensors import rest_notices as rest_notices

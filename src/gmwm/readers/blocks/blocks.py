@@ -15,9 +15,9 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock import agree, is_time_of_day, seconds_of_day
 from gmwm.readers.formats import has_sensors
-from gmwm.readers.reader import read_table, roles_of, tables_of
+from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
-from gmwm.readers.roles import Reference
+from gmwm.readers.roles import Given, Reference, roles_of
 from gmwm.readers.table import Table
 
 
@@ -103,8 +103,9 @@ def read_blocks(
     end: FloatArray | None = None
     of_day = False
     done = 0
-    for arrays, stamps in _segments(table, rate, units or {}, channels, time, rows):
-        found = read_table(_Segment(table, arrays, done), rate, units or {}, channels, time)
+    given = Given(rate, units or {}, channels, time)
+    for arrays, stamps in _segments(table, given, rows):
+        found = part_of(_Segment(table, arrays, done), given).recording
         if first is None:
             first = found
         if stamps is not None:
@@ -113,24 +114,19 @@ def read_blocks(
             since = seconds_of_day(since) if of_day and since is not None else since
             end = stamps[-1:]
         found = _on_the_grid(found, first, since, done)
-        done += next(iter(arrays.values())).size
+        done += _size(arrays)
         yield found
 
 
 def _segments(
-    table: _Divisible,
-    rate: float | None,
-    units: Mapping[str, str],
-    channels: Mapping[str, Reference] | Collection[str] | None,
-    time: Reference | Literal[False] | None,
-    rows: int,
+    table: _Divisible, given: Given, rows: int
 ) -> Iterator[tuple[dict[int, FloatArray], FloatArray | None]]:
-    """Columns of some rows after others; a rest too short to tell a rate is joined to the last."""
-    roles = roles_of(table, units, channels, time)
+    """Columns of some rows after others; a rest of less than half as many is joined to the last."""
+    roles = roles_of(table, given)
     wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
     held: dict[int, FloatArray] | None = None
     for arrays in table.segments(wanted, rows):
-        if held is not None and next(iter(arrays.values())).size < tuning.FEWEST_OF_BLOCK:
+        if held is not None and _is_rest(_size(arrays), _size(held), rows):
             arrays = {i: np.concatenate([held[i], values]) for i, values in arrays.items()}
             held = None
         if held is not None:
@@ -141,11 +137,17 @@ def _segments(
     yield held, None if roles.time is None else held[roles.time]
 
 
+def _is_rest(size: int, held: int, rows: int) -> bool:
+    """Whether so few rows go with those before them, which may not become many for it."""
+    return size < tuning.FEWEST_OF_BLOCK or (2 * size < rows and held <= rows)
+
+
+def _size(arrays: Mapping[int, FloatArray]) -> int:
+    return next(iter(arrays.values())).size
+
+
 def _on_the_grid(
-    found: Recording,
-    first: Recording,
-    since: FloatArray | None,
-    rows: int,
+    found: Recording, first: Recording, since: FloatArray | None, rows: int
 ) -> Recording:
     """A part with the rows that are missing between it and the one before."""
     if not agree(found.rate, first.rate):

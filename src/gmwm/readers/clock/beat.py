@@ -34,10 +34,6 @@ def without_beat(stamps: FloatArray) -> Beat | None:
     Parameters
     ----------
     stamps : (n,) ndarray
-
-    Returns
-    -------
-    Beat or None
     """
     if stamps.size < tuning.FEWEST_SAMPLES:
         return None

@@ -13,8 +13,7 @@ from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock.beat import without_beat
-from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, jumps_of
-from gmwm.readers.clock.shifts import find_shifts
+from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, find_shifts, jumps_of
 from gmwm.readers.clock.uneven import Followed, followed
 
 _UNITS = {
@@ -101,10 +100,6 @@ class Clock:
         ----------
         expected : float, optional
             Rate that the user or the file states, Hz.
-
-        Returns
-        -------
-        Timing
 
         Raises
         ------

@@ -1,16 +1,11 @@
 """One file a format: each gives tables of columns that are not read yet."""
 
-from gmwm.readers.formats.frame import is_frame
-from gmwm.readers.formats.joining import Part, has_sensors, joined, shares, with_temperature
-from gmwm.readers.formats.kinds import is_text, open_tables
-
-__all__ = [
-    "Part",
-    "has_sensors",
-    "is_frame",
-    "is_text",
-    "joined",
-    "open_tables",
-    "shares",
-    "with_temperature",
-]
+from gmwm.readers.formats.frame import is_frame as is_frame
+from gmwm.readers.formats.joining import (
+    Part as Part,
+    has_sensors as has_sensors,
+    joined as joined,
+    shares as shares,
+    with_temperature as with_temperature,
+)
+from gmwm.readers.formats.kinds import is_text as is_text, open_tables as open_tables

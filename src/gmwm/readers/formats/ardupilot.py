@@ -8,28 +8,26 @@ The former are read in blocks: memory holds no more than the columns that are as
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from gmwm._core import memory
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.readers import tuning
 from gmwm.readers.formats.arrays import (
     AnyArray,
     ArrayTable,
     array_of,
-    check_usable,
     damage_named,
 )
 from gmwm.readers.formats.dataflash import Messages, messages
+from gmwm.readers.formats.parts import MessageTable
 from gmwm.readers.formats.topics import Topic, choose_first, left_out
 from gmwm.readers.names import AXES
-from gmwm.readers.table import Table, label
+from gmwm.readers.table import Table
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
@@ -70,62 +68,18 @@ class _Series:
 
 
 @dataclass(frozen=True)
-class DataflashTable:
+class DataflashTable(MessageTable):
     """Messages of one IMU, or of one sensor of it: one a row."""
 
     path: Path
     series: _Series
-    rows: int
-    notices: tuple[Notice, ...] = ()
-    rate: float | None = None
-    tentative: bool = False
 
     @property
     def source(self) -> str:
         """Name of the log."""
         return self.path.name
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the columns."""
-        return tuple(self.series.columns)
-
-    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns; see `Table`.
-
-        Raises
-        ------
-        InputError
-            If the log is damaged, a number is infinite, or there is not enough memory.
-        """
-        memory.require(tuning.BYTES_PER_SAMPLE * self.rows * len(columns), self.source)
-        found = {column: np.empty(self.rows) for column in columns}
-        done = 0
-        for part in self._parts(columns):
-            size = next(iter(part.values())).size
-            for column, values in part.items():
-                found[column][done : done + size] = values
-            done += size
-        return self._checked(found, 0)
-
-    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, ``rows`` or a little more at a time."""
-        held: list[dict[int, FloatArray]] = []
-        count, before = 0, 0
-        for part in self._parts(columns):
-            held.append(part)
-            count += next(iter(part.values())).size
-            if count >= rows:
-                yield self._checked(_joined(columns, held), before)
-                held, count, before = [], 0, before + count
-        if count:
-            yield self._checked(_joined(columns, held), before)
-
-    def where(self, row: int) -> str:
-        """Say which message."""
-        return f"message {row} of {self.series.name} (counted from 0)"
-
-    def _parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+    def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
         fields = list(self.series.columns.values())
         with damage_named(self.source, _damage):
             for found in messages(self.path, (self.series.kind,)):
@@ -134,18 +88,6 @@ class DataflashTable:
                     mine = found["I"] == self.series.instance
                     part = {column: values[mine] for column, values in part.items()}
                 yield part
-
-    def _checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
-        for column, values in found.items():
-            place = f"{self.source}, column {label(self.names, column)}"
-            check_usable(place, values, lambda row: self.where(before + row))
-        return found
-
-
-def _joined(
-    columns: Sequence[int], parts: Sequence[Mapping[int, FloatArray]]
-) -> dict[int, FloatArray]:
-    return {column: np.concatenate([part[column] for part in parts]) for column in columns}
 
 
 def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table, ...]:
@@ -182,7 +124,9 @@ def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table
     for topic in chosen:
         notices = () if tables else left_out(ranks, chosen)
         if topic.name in by_name:
-            tables.append(DataflashTable(path, by_name[topic.name], topic.count, notices))
+            series = by_name[topic.name]
+            names = tuple(series.columns)
+            tables.append(DataflashTable(topic, names, path, series, notices=notices))
         else:
             _, columns = batches[topic.name]
             entries = {name: array_of(values) for name, values in columns.items()}

@@ -8,6 +8,7 @@ rate.
 
 from __future__ import annotations
 
+import mmap
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -119,17 +120,7 @@ class ArrayTable:
         return cls(source, names, arrays, rate, notices=tuple(notices))
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns.
-
-        Parameters
-        ----------
-        columns : sequence of int
-            Their indices.
-
-        Returns
-        -------
-        dict of int to (n,) ndarray
-            NaN where a sample is missing.
+        """Read some columns; see `Table`.
 
         Raises
         ------
@@ -156,6 +147,8 @@ class ArrayTable:
         for begin in range(0, longest, rows):
             part = replace(self, arrays=tuple(array[begin : begin + rows] for array in self.arrays))
             yield part.load(columns)
+            for column in columns:
+                _release(self.arrays[column].like)
 
     def where(self, row: int) -> str:
         """Say which row."""
@@ -219,15 +212,11 @@ def damage_named(source: str, say: Callable[[Exception], str] = _damage) -> Iter
     except PermissionError as error:
         raise InputError(f"{source} cannot be read: check its permissions") from error
     except Exception as error:  # libraries raise a dozen types for damaged bytes
-        if _is_about_objects(error):
+        if isinstance(error, ValueError) and "object" in str(error).lower():
             raise InputError(
                 f"{source} holds Python objects, which are not loaded: save arrays of numbers"
             ) from error
         raise InputError(f"{source} {say(error)}") from error
-
-
-def _is_about_objects(error: Exception) -> bool:
-    return isinstance(error, ValueError) and "object" in str(error).lower()
 
 
 def array_of(array: AnyArray) -> Array:
@@ -316,3 +305,12 @@ def _axes_or_itself(name: str, array: Array) -> list[_Column]:
     if _is_triad(name, array):
         return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]
+
+
+def _release(like: AnyArray) -> None:
+    """Let the memory go in which the pages of a file are mapped that were read."""
+    base: Any = like
+    while isinstance(base, np.ndarray):
+        base = base.base
+    if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):  # not on Windows
+        base.madvise(mmap.MADV_DONTNEED)

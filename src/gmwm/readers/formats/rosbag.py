@@ -17,14 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core import memory
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
-from gmwm.readers import tuning
-from gmwm.readers.formats.arrays import check_usable, damage_named
+from gmwm.readers.formats.arrays import damage_named
 from gmwm.readers.formats.extras import library
+from gmwm.readers.formats.parts import MessageTable
 from gmwm.readers.formats.ros_messages import (
     CDR,
     COVARIANCE_OF,
@@ -36,7 +35,6 @@ from gmwm.readers.formats.ros_messages import (
     decode,
 )
 from gmwm.readers.formats.topics import Topic, choose
-from gmwm.readers.table import label
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds
@@ -85,16 +83,13 @@ class _Bag:
 
 
 @dataclass(frozen=True)
-class BagTable:
-    """A topic of a bag: one message a row.
+class BagTable(MessageTable):
+    """A topic of a bag: one message a row, of its stamp and of numbers in it.
 
     Attributes
     ----------
     bag : _Bag
-    topic : Topic
     message : Message
-    names : tuple of str
-        Of the columns: the stamp, then numbers of the message.
     log : bool
         Whether the stamps are the times at which the messages were recorded.
     origin : int
@@ -102,60 +97,16 @@ class BagTable:
     """
 
     bag: _Bag
-    topic: Topic
     message: Message
-    names: tuple[str, ...]
     log: bool
     origin: int
-    notices: tuple[Notice, ...] = ()
-    tentative: bool = False
-    rate: float | None = None
 
     @property
     def source(self) -> str:
         """Name of the bag."""
         return self.bag.path.name
 
-    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns; see `Table`.
-
-        Raises
-        ------
-        InputError
-            If the bag or a message is damaged, a number is infinite, no message has a stamp, or
-            there is not enough memory.
-        """
-        memory.require(tuning.BYTES_PER_SAMPLE * self.topic.count * len(columns), self.source)
-        result = {column: np.empty(self.topic.count) for column in columns}
-        row = 0
-        for part in self._parts(columns):
-            size = next(iter(part.values())).size
-            room = max(self.topic.count - row, 0)
-            for column, values in part.items():
-                result[column][row : row + size] = values[:room]
-            row += size
-        if not 0 < row <= self.topic.count:
-            raise InputError(
-                f"{self.source}, topic {self.topic.name}: its messages are not as many as its "
-                "index says: get a whole copy, or reindex it"
-            )
-        result = {column: values[:row] for column, values in result.items()}
-        return self._checked(result, 0)
-
-    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, ``rows`` or a little more at a time."""
-        held: list[dict[int, FloatArray]] = []
-        before, row = 0, 0
-        for part in self._parts(columns):
-            held.append(part)
-            row += next(iter(part.values())).size
-            if row - before >= rows:
-                yield self._checked(_joined(columns, held), before)
-                held, before = [], row
-        if held:
-            yield self._checked(_joined(columns, held), before)
-
-    def _parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+    def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
         """Columns of one block of messages after another."""
         wanted = [column for column in columns if column > 0]
         numbers = [self.message.columns[self.names[column]] for column in wanted]
@@ -174,10 +125,8 @@ class BagTable:
                 part = dict(zip(wanted, found, strict=True))
                 yield {0: (stamps - self.origin).astype(float)} | part if 0 in columns else part
 
-    def _checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
-        for column, values in found.items():
-            place = f"{self.source}, column {label(self.names, column)}"
-            check_usable(place, values, lambda row: self.where(before + row))
+    def checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
+        super().checked(found, before)
         if 0 in found and found[0].size > 1 and not np.any(np.diff(found[0])):
             raise InputError(
                 f"{self.source}, topic {self.topic.name}: every header has the same stamp",
@@ -186,18 +135,8 @@ class BagTable:
             )
         return found
 
-    def where(self, row: int) -> str:
-        """Say which message."""
-        return f"message {row} of {self.topic.name} (counted from 0)"
-
     def _place(self, first: int, row: int) -> str:
         return f"{self.source}, {self.where(first + row)}"
-
-
-def _joined(
-    columns: Sequence[int], parts: Sequence[dict[int, FloatArray]]
-) -> dict[int, FloatArray]:
-    return {column: np.concatenate([part[column] for part in parts]) for column in columns}
 
 
 def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, ...]:
@@ -248,11 +187,12 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
         is_log = clock == "log"
         origin = _first_stamp(heads[chosen[0].name], bag, is_log)
     tables = [_table(bag, topic, is_log, origin, found) for topic in chosen]
-    tables += [
-        BagTable(bag, Topic(name, count), _thermometer(name, len(warmth)),
-                 (_STAMPS, _temperature(name, len(warmth))), is_log, origin)
-        for name, count in warmth.items()
-    ]  # fmt: skip
+    for name, count in warmth.items():
+        # By the topic if there are several.
+        prefix = "" if len(warmth) == 1 else name.strip("/").replace("/", "_") + "_"
+        column = f"{prefix}temperature [degC]"
+        message = Message(TEMPERATURE.count, {column: 0})
+        tables.append(BagTable(Topic(name, count), (_STAMPS, column), bag, message, is_log, origin))
     return tuple(tables)
 
 
@@ -268,17 +208,7 @@ def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, 
         text = f"the bag has no {what}: those of {topic.name} are zeros, and only the rest is read"
         action = "record the other sensor too, if you want a model of it"
         notices.append(Notice("sensor-absent", "warning", "", text, {"topic": topic.name}, action))
-    return BagTable(bag, topic, IMU, (_STAMPS, *names), is_log, origin, tuple(notices))
-
-
-def _temperature(topic: str, thermometers: int) -> str:
-    """Name of the column, by the topic if there are several."""
-    prefix = "" if thermometers == 1 else topic.strip("/").replace("/", "_") + "_"
-    return f"{prefix}temperature [degC]"
-
-
-def _thermometer(topic: str, thermometers: int) -> Message:
-    return Message(TEMPERATURE.count, {_temperature(topic, thermometers): 0})
+    return BagTable(topic, (_STAMPS, *names), bag, IMU, is_log, origin, notices=tuple(notices))
 
 
 def _is_ros1(path: Path) -> bool:
@@ -318,21 +248,17 @@ def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> fro
     first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
     found: set[str] = set()
     middle = (reader.start_time + reader.end_time) // 2
+    place = f"{bag.path.name}, a message of {topic}"
     for records in (head, islice(_messages(reader, topic, middle), _SEEN)):
         raw = [message for _, _, message in records]
         for sensor, index in first.items() if raw else ():
             wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
-            where = partial(_somewhere, bag, topic)
-            _, (*axes, covariance) = decode(raw, IMU, wanted, bag.serialization, where)
+            _, (*axes, covariance) = decode(raw, IMU, wanted, bag.serialization, lambda row: place)
             if np.any(np.array(axes)) and not np.all(covariance == -1.0):
                 found.add(sensor)
         if len(found) == len(first):
             break
     return frozenset(found)
-
-
-def _somewhere(bag: _Bag, topic: str, row: int) -> str:
-    return f"{bag.path.name}, a message of {topic}"
 
 
 def _first_stamp(head: Sequence[_Record], bag: _Bag, is_log: bool) -> int:

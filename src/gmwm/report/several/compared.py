@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import os
-import platform
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import gmwm
-from gmwm._core.files import written
 from gmwm._core.notices import worst_first
 from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorComparison
-from gmwm.errors import printable
 from gmwm.estimate import Estimate, Fit
 from gmwm.report.datasheet import Datasheet, read_datasheet
-from gmwm.report.page import rendered, resource
+from gmwm.report.page import origin, write_page
 from gmwm.report.several.multiples import COLOURS, multiple
 from gmwm.report.text import duration_text, number, short
 
@@ -53,10 +48,6 @@ def write_sensor_comparison_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     InputError
@@ -65,9 +56,10 @@ def write_sensor_comparison_report(
     sheet = None
     if datasheet is not None:
         sheet = read_datasheet(datasheet, {name: a.quantity for name, a in comparison.items()})
-    text = rendered(
+    sources = {label: each.source for label, each in comparison.calibrations.items()}
+    return write_page(
+        path,
         "compared.html",
-        style=resource("report.css"),
         comparison=comparison,
         recordings=[
             {
@@ -87,11 +79,8 @@ def write_sensor_comparison_report(
             and any(letter in sheet.of(name, a.quantity) for name, a in comparison.items())
             for letter in _LETTERS
         },
-        provenance=_provenance(comparison, provenance or {}, sheet),
+        provenance=origin(sources | dict(provenance or {}), "comparison of", sheet),
     )
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
 
 
 def _overall(comparison: SensorComparison) -> str:
@@ -217,16 +206,3 @@ def _nees(axis: AxisComparison) -> str:
         return ""
     low, high = f"{min(known):.2g}", f"{max(known):.2g}"
     return low if low == high else f"{low} to {high}"
-
-
-def _provenance(
-    comparison: SensorComparison, given: Mapping[str, str], sheet: Datasheet | None
-) -> dict[str, str]:
-    known = {label: each.source for label, each in comparison.calibrations.items()} | dict(given)
-    if sheet is not None:
-        known["data sheet"] = sheet.name
-    return {printable(key): printable(value) for key, value in known.items()} | {
-        "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
-        f"Python {platform.python_version()}",
-        "comparison of": datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),
-    }

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-import gmwm
-from gmwm._core.files import written
 from gmwm._core.units import factor, field_units
-from gmwm.errors import printable
+from gmwm.errors import InputError, printable
 from gmwm.fleet import (
     CONFIDENCE,
     CONTENT,
@@ -25,7 +23,7 @@ from gmwm.fleet import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.page import rendered, resource
+from gmwm.report.page import write_page
 from gmwm.report.text import duration_text, short
 
 _TITLES = {
@@ -44,20 +42,14 @@ _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     """Write the report of a fleet as one HTML file that needs no network.
 
-    Parameters
-    ----------
-    fleet : Fleet
-    path : path-like
-
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    text = rendered(
+    return write_page(
+        path,
         "fleet.html",
-        style=resource("report.css"),
-        version=gmwm.__version__,
         fleet=fleet,
         notices=[notice for notice in fleet.notices if notice not in fleet.failed.values()],
         about=_about(fleet),
@@ -84,9 +76,6 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         troubled=_troubled(fleet),
         options=_options(fleet),
     )
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
 
 
 def fleet_fragment(fleet: Fleet) -> str:
@@ -160,7 +149,7 @@ def _scale(spread: Spread) -> tuple[str, float]:
         for unit in field_units(plain, spread.quantity)[:1]:
             try:
                 per_si = 1.0 / factor(unit.unit, spread.unit.replace(" s", "*s"))
-            except gmwm.InputError:
+            except InputError:
                 continue
             return unit.unit, per_si
     return spread.unit, 1.0

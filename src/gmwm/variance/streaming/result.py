@@ -8,16 +8,15 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
-from gmwm.variance.analysis import MIN_SAMPLES, check_varies, where_of
+from gmwm.variance.analysis import MIN_SAMPLES, check_varies, cumulant_of_powers, where_of
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.cumulant import cumulant_of_powers
 from gmwm.variance.streaming.gaps import effects, unmasked
 from gmwm.variance.streaming.series import Series
 from gmwm.variance.wavelet import WaveletVariance
 
 
 def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletVariance:
-    """The wavelet variance of what was taken in so far.
+    """The wavelet variance of the samples so far.
 
     Parameters
     ----------

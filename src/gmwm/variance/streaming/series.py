@@ -103,7 +103,7 @@ class Series:
         kernels.absorb(samples, *(getattr(self, name) for name in self._ARRAYS), self._scratch)
 
     def finished(self) -> Self:
-        """A copy of which all that was taken in is worked off."""
+        """A copy of which all samples are worked off."""
         made = type(self)()
         for name in ("state", "sums", "totals", "tallies", "gaps"):
             getattr(made, name)[...] = getattr(self, name)

@@ -106,7 +106,7 @@ class StreamingVariance:
         ------
         InputError
             If it has another number of channels, or holds infinite values or no numbers: nothing
-            of it is taken in then.
+            of it is used then.
         """
         values = checks.real_numbers(block, "the block")
         columns = [values] if values.ndim == 1 else list(np.atleast_2d(values).T)
@@ -174,7 +174,7 @@ class StreamingVariance:
 
     @property
     def n(self) -> int:
-        """Samples per channel that were taken in, missing ones included."""
+        """Samples per channel so far, missing ones included."""
         return self._series[0].n
 
     @property
@@ -188,7 +188,7 @@ class StreamingVariance:
         return self.start + self.n
 
     def result(self) -> Any:
-        """The wavelet variance of what was taken in so far; more may follow.
+        """The wavelet variance of the samples so far; more may follow.
 
         Returns
         -------

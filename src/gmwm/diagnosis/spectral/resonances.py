@@ -11,7 +11,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectrum import Bands, Spectrum
+from gmwm.diagnosis.spectral.spectrum import Bands, Spectrum
 from gmwm.process import Resonance
 
 # Logarithms of frequency over that of the band, of damping and of height; background.

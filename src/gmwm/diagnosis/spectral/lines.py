@@ -12,7 +12,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectrum import POWER_INFLATION, Spectrum
+from gmwm.diagnosis.spectral.spectrum import POWER_INFLATION, Spectrum
 
 _CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
 _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
