@@ -5,11 +5,14 @@ standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
 
     python benchmarks/departures.py false [--runs 60] [--models N+K ...]
     python benchmarks/departures.py power [--runs 20]
+    python benchmarks/departures.py jumps [--runs 20] [--models N+K ...]
 
 "false" selects the model of noise without departures and counts what is found. "power" fits the
 true kinds of noise and a random walk to noise with one departure, which the walk follows, and
 prints the fraction found by size, and in brackets the fraction of fits that would be valid without
-looking for departures.
+looking for departures. "jumps" takes departures off records of a bias that jumps between two
+levels, and of one to four steps of the same size, and prints in how many of them five and more are
+taken off, which makes the fit not valid, and in how many it is valid.
 """
 
 from __future__ import annotations
@@ -90,6 +93,38 @@ def power(runs: int, models: list[str]) -> None:
             print(f"{name:<10} {kind:<15} 50 % {half:.2g}  95 % {most:.2g}   {rows}", flush=True)
 
 
+def jumps(runs: int, models: list[str]) -> None:
+    """Fits that are not valid for the number of departures that were taken off."""
+    for name in models or ("N", "N+K", "N+GM 60 s"):
+        for size in (0.15, 0.4):
+            for dwell in (1200.0, 700.0, 400.0, 200.0):
+                draws = [np.random.default_rng(40_000 + seed) for seed in range(runs)]
+                flips = [np.cumsum(draw.random(LENGTH) < DT / dwell) % 2 for draw in draws]
+                _print_jumps(f"{name}, {size:g}, every {dwell:g} s", name, size, flips)
+            for count in (1, 2, 3, 4):
+                draws = [np.random.default_rng(50_000 + seed) for seed in range(runs)]
+                steps = [
+                    np.sum(
+                        draw.choice([-1.0, 1.0], (count, 1))
+                        * (draw.uniform(0.05, 0.95, (count, 1)) * LENGTH * DT < TIME),
+                        axis=0,
+                    )
+                    for draw in draws
+                ]
+                _print_jumps(f"{name}, {size:g}, {count} steps", name, size, steps)
+
+
+def _print_jumps(label: str, name: str, size: float, curves: list[np.ndarray]) -> None:
+    many = valid = 0
+    for seed, curve in enumerate(curves):
+        x = gmwm.simulate(NOISES[name], LENGTH, DT, 30_000 + seed) + size * SAMPLE * curve
+        recording = gmwm.Recording.from_arrays({"gyro_x": x}, 1.0 / DT, {"gyro": "rad/s"})
+        fit = gmwm.calibrate(recording, still=False, remove_departures=True)["gyro_x"]
+        many += any(notice.code == "departures-many" for notice in fit.notices)
+        valid += fit.valid
+    print(f"{label:<28} five and more in {many} of {len(curves)}, valid {valid}", flush=True)
+
+
 def _reached(sizes: np.ndarray, shares: np.ndarray, part: float) -> float:
     """Size at which a fraction is reached, between sizes along straight lines in the logarithm."""
     above = np.flatnonzero(shares >= part)
@@ -104,7 +139,7 @@ def _reached(sizes: np.ndarray, shares: np.ndarray, part: float) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("study", choices=["false", "power"])
+    parser.add_argument("study", choices=["false", "power", "jumps"])
     parser.add_argument("--runs", type=int, default=0)
     parser.add_argument("--models", nargs="*", default=[])
     given = parser.parse_args()
@@ -112,7 +147,8 @@ def main() -> None:
     if given.study == "false":
         false_alarms(given.runs or 60, given.models)
     else:
-        power(given.runs or 20, given.models)
+        study = power if given.study == "power" else jumps
+        study(given.runs or 20, given.models)
 
 
 if __name__ == "__main__":

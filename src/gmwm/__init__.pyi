@@ -8,7 +8,13 @@ from .calibration import (
     without_departures as without_departures,
 )
 from .comparison import SensorComparison as SensorComparison, compare as compare
-from .diagnosis import Health as Health, Still as Still, find_still as find_still, health as health
+from .diagnosis import (
+    Health as Health,
+    Still as Still,
+    find_still as find_still,
+    health as health,
+    health_stream as health_stream,
+)
 from .errors import (
     FitWarning as FitWarning,
     InputError as InputError,

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.runs import PROCESSES, beside, shared, spare
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
@@ -24,6 +22,7 @@ from gmwm.calibration.channel import (
     model_of,
     mostly_missing,
 )
+from gmwm.calibration.judgement import judged
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -32,21 +31,12 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
-from gmwm.calibration.stages import current, stage
+from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError
+from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read
 from gmwm.variance import MIN_SAMPLES
-
-_SPOILING = {
-    "not-static": ("gyro", "accel"),
-    "tilt": ("accel",),
-    "rate-changes": ("gyro", "accel"),
-}
-"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
-
-_SPOILING_CHANNEL = frozenset({"rounding", "saturation", "stuck", "value-repeated", "variance"})
-"""Codes of issues of a channel that make its fit invalid where they are bad."""
 
 
 def calibrate(
@@ -56,7 +46,7 @@ def calibrate(
     screening: Collection[str] = SCREENING,
     still: bool = True,
     remove_departures: bool = False,
-    jobs: int = 1,
+    jobs: int = PROCESSES,
     progress: Progress | None = None,
 ) -> Calibration:
     """Error model of every channel of a static recording, or of several of one sensor.
@@ -92,8 +82,8 @@ def calibrate(
         at which a step may be left out, and what is left is fitted again, three times at most; what
         their estimated sizes take of the noise is given back to the wavelet variances.
     jobs : int, optional
-        Threads. One is fastest for recordings of usual length, whose fits are small steps that
-        threads of one interpreter do in turns; -1 is one per core.
+        Processes that share the work at most, by default two, -1 one per core; there are never
+        more than cores or channels, and short recordings are worked on by this one alone.
     progress : callable, optional
         Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
 
@@ -109,6 +99,20 @@ def calibrate(
     """
     given = _recordings(recording)
     _check_together(given)
+    size = sum(each.n * len(each.inertial) for each in given)
+    others = spare(jobs, max(len(each.inertial) for each in given))
+    with beside(others if size > tuning.WORTH_PROCESSES else 0, __name__):
+        return _calibrated(given, model, screening, still, remove_departures, progress)
+
+
+def _calibrated(
+    given: list[Recording],
+    model: GivenModels,
+    screening: Collection[str],
+    still: bool,
+    remove_departures: bool,
+    progress: Progress | None,
+) -> Calibration:
     with stage("health"):
         if still and screening:
             given = [part for each in given for part in stretches_at_rest(each)]
@@ -126,50 +130,41 @@ def calibrate(
         name: next((e.extra[name] for e in treated if e.extra.get(name)), ()) for name in alive
     }
     robust = frozenset[str]().union(*(each.robust for each in treated))
-    finished: list[str] = []
-    watch = current()
+    found: dict[str, ChannelModel | Notice] = {}
 
     def report(name: str) -> None:
         if progress is not None:
-            progress(len(finished), len(alive), name)
+            progress(len(found), len(alive), name)
 
-    def one(name: str) -> ChannelModel | Notice:
-        report(name)
-        with watch.running() if watch is not None else nullcontext():
-            found = channel_model(
+    def begun() -> Iterator[_Channel]:
+        for name, channels in alive.items():
+            report(name)
+            yield _Channel(
                 name,
-                lambda removed: [
-                    variance_without(channel, gone, robust=name in robust)
-                    for channel, gone in zip(alive[name], removed, strict=True)
-                ],
+                channels,
+                name in robust,
                 models[name],
                 sources[name],
-                extra=offered[name],
-                removals=tuning.REMOVALS if remove_departures else 0,
+                offered[name],
+                tuning.REMOVALS if remove_departures else 0,
             )
-        finished.append(name)
-        return found
 
-    with ThreadPoolExecutor(jobs if jobs > 0 else os.cpu_count()) as threads:
-        found = dict(zip(alive, (map if jobs == 1 else threads.map)(one, alive), strict=True))
+    for channel, (one, watch) in shared(_Channel.model_found, begun()):
+        found[channel.name] = one
+        if (running := current()) is not None:
+            for name, elapsed in watch.elapsed.items():
+                running.add(name, elapsed, watch.worked[name])
     report("")
+    found = {name: found[name] for name in alive}
     source = ", ".join(each.source for each in given)
     issues = [
         replace(notice, source=each.recording.source) if len(given) > 1 else notice
         for each in treated
         for notice in each.notices
     ]
-    spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
-    if not still:
-        spoiling.pop("not-static", None)  # as the caller says
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
     return calibration_of(
-        {
-            name: each
-            if isinstance(each, Notice)
-            else _judged(each, (*_of_sensor(each, spoiling.values()), *_of_channel(name, issues)))
-            for name, each in found.items()
-        },
+        judged(found, issues, still=still),
         dead,
         with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
         source=source,
@@ -177,6 +172,35 @@ def calibrate(
         n=sum(each.n for each in given),
         left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """A channel whose model is to be found, and how."""
+
+    name: str
+    parts: Sequence[Channel]
+    robust: bool
+    given: Process | Model | None
+    sources: Sequence[str]
+    offered: Sequence[Process]
+    removals: int
+
+    def model_found(self) -> tuple[ChannelModel | Notice, Stopwatch]:
+        """The model, with the time that it took."""
+        with Stopwatch().running() as watch:
+            found = channel_model(
+                self.name,
+                lambda removed: [
+                    variance_without(part, gone, robust=self.robust)
+                    for part, gone in zip(self.parts, removed, strict=True)
+                ],
+                self.given,
+                self.sources,
+                extra=self.offered,
+                removals=self.removals,
+            )
+        return found, watch
 
 
 def _recordings(given: Any) -> list[Any]:
@@ -269,21 +293,3 @@ def _reason_to_skip(channel: Channel) -> Notice | None:
     else:
         return mostly_missing(channel.name, channel.missing, channel.n)
     return Notice(code, "bad", channel.name, text, {"missing": channel.missing})
-
-
-def _of_sensor(found: ChannelModel, spoiling: Iterable[Notice]) -> list[Notice]:
-    """Those issues of the whole recording that concern its sensor."""
-    sensor = found.fit.wv.quantity or "gyro"
-    return [issue for issue in spoiling if sensor in _SPOILING[issue.code]]
-
-
-def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:
-    """The issues of a channel that make its numbers wrong, once each."""
-    bad = (each for each in issues if each.where == name and each.severity == "bad")
-    return list({each.code: each for each in bad if each.code in _SPOILING_CHANNEL}.values())
-
-
-def _judged(found: ChannelModel, spoiling: Iterable[Notice]) -> ChannelModel:
-    """With a fit that is not valid where an issue of its data makes its numbers wrong."""
-    notices = [Notice(e.code, "bad", "", e.text, e.values, e.action) for e in spoiling]
-    return replace(found, fit=replace(found.fit, notices=(*notices, *found.fit.notices)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,10 +14,12 @@ from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Recording
 
 SCREENING = ("events", "lines", "resonances", "outliers")
-"""Samples of shocks and spikes are masked; lines and resonances are terms that a model may have;
-the wavelet variances of channels with more outliers than can be left out are robust."""
+"""Samples of shocks, spikes and lost packets are masked; lines and resonances are terms that a
+model may have; the wavelet variances of channels with more outliers than can be left out are
+robust."""
 
-_ADVICE = ("stuck", "saturation", "temperature", "variance")  # that only the user can follow
+# Codes of advice that only the user can follow.
+_ADVICE = ("stuck", "held", "saturation", "abrupt-end", "temperature", "variance")
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,14 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
     return (first, *named[1:])
 
 
+def check_screening(chosen: Collection[str]) -> None:
+    """Raise InputError if one of those chosen is unknown."""
+    for name in chosen:
+        if name not in SCREENING:
+            known = ", ".join(SCREENING)
+            raise InputError(f"screening for {name!r} is unknown: there are {known}")
+
+
 def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Screened:
     """Examine a recording and mask, offer terms or make variances robust as it needs.
 
@@ -104,10 +114,7 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     InputError
         If one of those chosen is unknown.
     """
-    for name in chosen:
-        if name not in SCREENING:
-            known = ", ".join(SCREENING)
-            raise InputError(f"screening for {name!r} is unknown: there are {known}")
+    check_screening(chosen)
     if not chosen:
         return Screened(recording, {}, notices=recording.notices)
     found = health(recording)
@@ -120,18 +127,49 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
         robust = frozenset(name for name in robust if _is_much(found.events(name), recording.n))
         masked = found.masked(recording, but=robust)
     left_out = frozenset(names) - robust if "events" in chosen else frozenset()
-    issues = [
-        replace(notice, action=_done(notice, robust, left_out), values=_values(notice, left_out))
-        for notice in found.notices
-        if notice not in recording.notices
-    ]
+    fresh = [notice for notice in found.notices if notice not in recording.notices]
     return Screened(
         masked,
-        {name: _terms(found, name, chosen) for name in names},
+        {name: terms_of(found, name, chosen) for name in names},
         robust,
         {name: each for name in names if (each := found.repetition(name)) is not None},
-        (*masked.notices, *issues),
+        (*masked.notices, *with_treatment(fresh, found, left_out, robust)),
     )
+
+
+def with_treatment(
+    notices: Iterable[Notice],
+    found: Health,
+    left_out: Collection[str],
+    robust: Collection[str] = (),
+) -> list[Notice]:
+    """Notices with what is done about each here, which is not what is advised elsewhere.
+
+    Parameters
+    ----------
+    notices : iterable of Notice
+    found : Health
+    left_out : collection of str
+        Channels of which shocks, spikes, outliers and held samples are left out.
+    robust : collection of str, optional
+        Channels that have robust wavelet variances.
+    """
+    treated = []
+    for notice in notices:
+        is_mended = (
+            notice.code == "held"
+            and notice.where in left_out
+            and found.channels[notice.where].held > 0.0
+        )
+        treated.append(
+            replace(
+                notice,
+                action="left out" if is_mended else _done(notice, robust, left_out),
+                values=_values(notice, left_out),
+                severity="warning" if is_mended else notice.severity,
+            )
+        )
+    return treated
 
 
 def _is_much(events: Sequence[tuple[int, int]], n: int) -> bool:
@@ -146,7 +184,6 @@ def _values(notice: Notice, left_out: Collection[str]) -> Mapping[str, Any]:
 
 
 def _done(notice: Notice, robust: Collection[str], left_out: Collection[str]) -> str:
-    """What is done about an issue here, which is not what is advised elsewhere."""
     if notice.code in ("event", "outliers"):
         samples = f", {notice.values['samples']:,.0f} samples" if notice.code == "event" else ""
         if notice.where in left_out:
@@ -161,7 +198,8 @@ def _done(notice: Notice, robust: Collection[str], left_out: Collection[str]) ->
     return notice.action
 
 
-def _terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
+def terms_of(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
+    """Terms for the lines and resonances of a channel, those worth most first."""
     terms: list[Process] = []
     if "lines" in chosen:
         terms += [Sinusoid(frequency=frequency) for frequency, _ in found.lines(channel)]

@@ -14,24 +14,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from threading import Lock
 
 
 @dataclass(frozen=True, eq=False)
 class Stopwatch:
-    """Time by stage, of all threads together.
+    """Time by stage, of all processes together.
 
     Attributes
     ----------
     elapsed : dict
-        Stage -> s by the clock on the wall; stages of several threads run at one time.
+        Stage -> s by the clock on the wall; stages of several processes run at one time.
     worked : dict
         Stage -> s of the processor.
     """
 
     elapsed: dict[str, float] = field(default_factory=dict)
     worked: dict[str, float] = field(default_factory=dict)
-    _lock: Lock = field(default_factory=Lock, repr=False)
 
     @contextmanager
     def running(self) -> Iterator[Stopwatch]:
@@ -43,9 +41,8 @@ class Stopwatch:
             _watch.reset(before)
 
     def add(self, name: str, elapsed: float, worked: float) -> None:
-        with self._lock:
-            self.elapsed[name] = self.elapsed.get(name, 0.0) + elapsed
-            self.worked[name] = self.worked.get(name, 0.0) + worked
+        self.elapsed[name] = self.elapsed.get(name, 0.0) + elapsed
+        self.worked[name] = self.worked.get(name, 0.0) + worked
 
 
 _watch: ContextVar[Stopwatch | None] = ContextVar("watch", default=None)

@@ -103,3 +103,7 @@ FREQUENCIES = 64
 
 MOST_STRETCHES = 20
 """Stretches at rest of one log that are fitted jointly, the longest ones."""
+
+WORTH_PROCESSES = 1_000_000
+"""Samples of all channels together beyond which processes share the work: one takes 1.2 s to start,
+as long as the models of two channels."""

@@ -17,8 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    arguments_of_blocks,
     estimating_options,
+    memory_option,
     models_of_channels,
+    needs_the_whole,
     part_options,
     printing_options,
     read_recording,
@@ -37,15 +40,15 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_WHOLE = ("start", "stop")
-"""Options of reading for which the whole file is read."""
+_LARGE, _CHANNELS = 1 << 20, 6
+"""Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
-    "variance",
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
+    "held", "value-repeated", "variance",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 
@@ -90,12 +93,10 @@ def output_option(default: str) -> Callable[[Any], Any]:
 @click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
               help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
                    "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Threads.")
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+              help="Processes at most; short recordings take one.")  # fmt: skip
 @click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
-@click.option("--memory", type=float, metavar="GB",
-              help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of "
-                   "ArduPilot is read a block at a time, and shocks, lines and motion are not "
-                   "looked for then. By default a quarter of the machine's.")  # fmt: skip
+@memory_option
 @printing_options
 def calibrate(
     files: tuple[Path, ...],
@@ -132,6 +133,12 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
+    if any(file.is_file() and file.stat().st_size > _LARGE for file in files):
+        from gmwm._core.runs import beside, spare
+
+        # Started first, so that it has imported what it needs when there is work for it.
+        others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
+        click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
     from gmwm.report import read_datasheet
@@ -160,7 +167,10 @@ def calibrate(
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
             result = (
-                calibrate_stream(files[0], model, progress=bar, **_of_stream(reading))
+                calibrate_stream(
+                    files[0], model, screening=chosen, still=not everything, progress=bar,
+                    **arguments_of_blocks(reading),
+                )
                 if in_blocks
                 else run(
                     recordings, model, screening=chosen, still=not everything,
@@ -207,21 +217,13 @@ def _recordings(
         try:
             return [read_recording(file, **reading) for file in files], False
         except InputError as error:
-            whole = [name for name in _WHOLE if reading.get(name)]
-            if error.code != "memory" or len(files) > 1 or whole:
+            if error.code != "memory" or len(files) > 1 or needs_the_whole(reading):
                 raise
             too_large = error
     try:
-        return [next(read_blocks(files[0], **_of_stream(reading)))], True
+        return [next(read_blocks(files[0], **arguments_of_blocks(reading)))], True
     except InputError as error:
         raise (too_large if error.code == "not-divisible" else error) from None
-
-
-def _of_stream(reading: Mapping[str, Any]) -> dict[str, Any]:
-    """What `gmwm.calibrate_stream` is given for the options."""
-    from gmwm.cli.options import arguments_of_read
-
-    return arguments_of_read(**{k: v for k, v in reading.items() if k not in _WHOLE})
 
 
 def show(result: Calibration) -> None:

@@ -8,7 +8,16 @@ from typing import Any
 
 import click
 
-from gmwm.cli.options import part_options, printing_options, read_recording, reading_options
+from gmwm.cli.options import (
+    arguments_of_blocks,
+    memory_option,
+    needs_the_whole,
+    part_options,
+    printing_options,
+    read_recording,
+    reading_options,
+)
+from gmwm.errors import InputError
 
 
 @click.command()
@@ -17,24 +26,42 @@ from gmwm.cli.options import part_options, printing_options, read_recording, rea
               help="Write all findings with their numbers, in SI units, to this file.")  # fmt: skip
 @reading_options
 @part_options
+@memory_option
 @printing_options
-def health(file: Path, output: Path | None, as_json: bool, quiet: bool, **reading: Any) -> None:
+def health(
+    file: Path,
+    output: Path | None,
+    memory: float | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
     """Find what is wrong with a recording before it is calibrated.
 
     Motion, gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
     resonances, drift, changes of the noise, dependence between channels; worst first, with what
-    to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate.
+    to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate; one that
+    needs more memory than there may be is examined a stretch at a time.
 
     \b
     Example:
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm._core.files import replaceable
-    from gmwm.diagnosis import health as examine
+    from gmwm._core.memory import limited
+    from gmwm.diagnosis import health as examine, health_stream
 
     if output is not None:
         replaceable(output)
-    found = examine(read_recording(file, **reading))
+    try:
+        with limited(memory):
+            recording = read_recording(file, **reading)
+    except InputError as error:
+        if error.code != "memory" or needs_the_whole(reading):
+            raise
+        found = health_stream(file, **arguments_of_blocks(reading))
+    else:
+        found = examine(recording)
     # The file first: who pipes the table into head must not lose it.
     if output is not None:
         found.save(output)

@@ -21,7 +21,7 @@ HINTS = {
     "heading-unknown": "--heading DEG, or heading: in the file",
     "layout": "--layout LAYOUT, one of those in the help of gmwm calibrate",
     "memory": "--channel gyro_x=COLUMN for each of some channels, or, if there is more, "
-    "--memory GB with gmwm calibrate and GMWM_MEMORY=GB before the others",
+    "--memory GB with gmwm calibrate and health, and GMWM_MEMORY=GB before the others",
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
     "no-rest": "--all to take everything as static",
     "no-stamps": "--clock log",

@@ -25,6 +25,9 @@ _number_options = together(
     click.option("--form", default="N+K", show_default=True,
                  help="N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too."),
     click.option("--shared", is_flag=True, help="The same numbers for all axes of a sensor."),
+    click.option("--tau", metavar="S", callback=lambda _, __, text: _tau(text),
+                 help="Correlation time of the Gauss-Markov process in seconds; \"shared\": the "
+                      "one for all axes that costs least. Each axis has its own by default."),
     click.option("--gyro-bias", type=float, default=0.0, metavar="RAD/S",
                  help="Standard deviation of the turn-on bias of a gyro."),
     click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
@@ -36,6 +39,10 @@ _number_options = together(
 )  # fmt: skip
 
 
+def _tau(text: str | None) -> float | str | None:
+    return text if text in (None, "shared") else seconds("--tau", text or "")[0]
+
+
 @click.command()
 @_number_options
 @click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
@@ -45,8 +52,9 @@ _number_options = together(
               help="Cover the confidence region of this level, e.g. 0.95, and not the estimate "
                    "alone.")  # fmt: skip
 def bound(
-    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    units: str, as_json: bool, horizon: float, level: float | None,
+    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
+    accel_bias: float, output: Path | None, units: str, as_json: bool, horizon: float,
+    level: float | None,
 ) -> None:  # fmt: skip
     """Find the smallest numbers that are never too optimistic.
 
@@ -60,7 +68,7 @@ def bound(
     from gmwm.filter_numbers import bound as run
 
     found = run(
-        Calibration.load(file), form, horizon, level=level, shared=shared,
+        Calibration.load(file), form, horizon, level=level, shared=shared, tau=tau,
         bias_sd={"gyro": gyro_bias, "accel": accel_bias},
     )  # fmt: skip
     show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
@@ -74,8 +82,9 @@ def bound(
               help="Interval of keyframes or scans, in place of outages, for relative "
                    "poses.")  # fmt: skip
 def reduce(
-    file: Path, form: str, shared: bool, gyro_bias: float, accel_bias: float, output: Path | None,
-    units: str, as_json: bool, outages: str, keyframe: float | None,
+    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
+    accel_bias: float, output: Path | None, units: str, as_json: bool, outages: str,
+    keyframe: float | None,
 ) -> None:  # fmt: skip
     """Find the numbers with which a small filter is consistent.
 
@@ -91,7 +100,7 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration, form, times, keyframe=keyframe, shared=shared, progress=bar,
+            calibration, form, times, keyframe=keyframe, shared=shared, tau=tau, progress=bar,
             bias_sd={"gyro": gyro_bias, "accel": accel_bias},
         )  # fmt: skip
     show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))

@@ -96,6 +96,16 @@ printing_options = together(
 """How results are printed."""
 
 
+memory_option = click.option(
+    "--memory", type=float, metavar="GB",
+    help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of ArduPilot is "
+         "read a stretch at a time. By default a quarter of the machine's.",
+)  # fmt: skip
+
+_OF_PARTS = ("start", "stop")
+"""Names of the options of `part_options`."""
+
+
 def read_recording(
     file: Path, start: float | None = None, stop: float | None = None, **options: Any
 ) -> Recording:
@@ -110,6 +120,16 @@ def read_recording(
 
     recording = read(file, **arguments_of_read(**options))
     return recording.part(0.0 if start is None else start, stop)
+
+
+def needs_the_whole(options: Mapping[str, Any]) -> bool:
+    """Whether options ask for what is not done a block at a time."""
+    return any(options.get(name) for name in _OF_PARTS)
+
+
+def arguments_of_blocks(options: Mapping[str, Any]) -> dict[str, Any]:
+    """What `gmwm.readers.read_blocks` is given for the options."""
+    return arguments_of_read(**{k: v for k, v in options.items() if k not in _OF_PARTS})
 
 
 def arguments_of_read(

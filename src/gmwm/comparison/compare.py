@@ -30,8 +30,8 @@ from gmwm.estimate import Fit, JointFit
 from gmwm.readers import Recording, is_frame
 
 _NOT_NOISE = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "stuck", "value-repeated",
-    "variance", *DEPARTURES,
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
+    "held", "value-repeated", "variance", *DEPARTURES,
 )  # fmt: skip
 """Codes of notices of a fit whose curve is not that of noise."""
 

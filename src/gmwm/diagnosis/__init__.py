@@ -1,6 +1,11 @@
 """What is wrong with a recording, before a model is fitted to it."""
 
 from gmwm.diagnosis.check import health as health
+from gmwm.diagnosis.joined import (
+    STRETCH as STRETCH,
+    health_stream as health_stream,
+    joined as joined,
+)
 from gmwm.diagnosis.repeated import thinned as thinned
 from gmwm.diagnosis.result import (
     ChannelHealth as ChannelHealth,

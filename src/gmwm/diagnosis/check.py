@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
+from gmwm._core.runs import shared
 from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import (
@@ -22,12 +24,21 @@ from gmwm.diagnosis.events import event_notice, find_events, with_single_outlier
 from gmwm.diagnosis.innovations import Innovations, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.repeated import interpolation_notice, repetition, repetition_notice, thinned
+from gmwm.diagnosis.repeated import (
+    held_notice,
+    held_share,
+    interpolation_notice,
+    repetition,
+    repetition_notice,
+    thinned,
+)
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
+    abrupt_end_notice,
     dead_notice,
     gap_notices,
+    length_notice,
     repeated_value_notice,
     saturation_notice,
     stuck_notice,
@@ -90,25 +101,36 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     # What is missing is counted anew, channel by channel.
     read = [notice for notice in recording.notices if notice.code != "missing-samples"]
     motion = find_motion(recording)
-    whole = [_length(recording), *motion_notices(motion), *read, *_clock(recording)]
+    whole = [
+        length_notice(recording.n, recording.rate),
+        *motion_notices(motion),
+        *read,
+        *_clock(recording),
+    ]
     if not motion.moves and (vibration := vibration_notice(recording)) is not None:
         whole.append(vibration)
     examined: dict[str, _Examined] = {}
     channels = recording.inertial
-    for channel in channels:
-        if progress is not None:
-            progress(len(examined), len(channels), channel.name)
-        examined[channel.name] = _unrepeated(channel, motion)
+
+    def begun() -> Iterator[Channel]:
+        for channel in channels:
+            if progress is not None:
+                progress(len(examined), len(channels), channel.name)
+            yield channel
+
+    for channel, one in shared(partial(_unrepeated, motion=motion), begun()):
+        examined[channel.name] = one
+    examined = {channel.name: examined[channel.name] for channel in channels}
     if progress is not None:
         progress(len(channels), len(channels), "")
-    shared = gap_notices(channels, recording.dt)
-    shared += crosstalk_notices(
+    between = gap_notices(channels, recording.dt)
+    between += crosstalk_notices(
         {name: one.errors for name, one in examined.items() if one.errors is not None}
     )
-    shared += temperature_notices(recording)
-    notices = worst_first(whole + [found for found in shared if not found.where])
+    between += temperature_notices(recording)
+    notices = worst_first(whole + [found for found in between if not found.where])
     for name, one in examined.items():
-        own = one.notices + [found for found in shared if found.where == name]
+        own = one.notices + [found for found in between if found.where == name]
         if not motion.moves and not any(found.severity in _SEVERE for found in own):
             own.append(_clean(name))
         notices += worst_first(own)
@@ -135,22 +157,6 @@ def _together(recording: Recording, found: Sequence[Health]) -> Health:
         rate=recording.rate,
         n=recording.n,
     )
-
-
-def _length(recording: Recording) -> Notice:
-    length = recording.duration
-    text = f"{recording.n:,} samples at {recording.rate:g} Hz, {length:.6g} s"
-    numbers = {"duration": length, "rate": recording.rate}
-    if length < tuning.LONG_RECORD:
-        return Notice(
-            "length",
-            "note",
-            "",
-            f"{text}, too short for slow errors of minutes and more",
-            numbers,
-            "an hour or more shows them",
-        )
-    return Notice("length", "good", "", text, numbers)
 
 
 def _clock(recording: Recording) -> list[Notice]:
@@ -182,7 +188,7 @@ def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
         (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
         for start, stop in one.facts.events
     )
-    facts = replace(one.facts, events=events, repetition=found)
+    facts = replace(one.facts, events=events, repetition=found, held=0.0)
     # Its prediction errors have no partners of the same time in other channels.
     return _Examined([repetition_notice(channel, found), *one.notices], facts, None)
 
@@ -230,9 +236,15 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     for start, stop in events:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
+    held, chance = held_share(values, step, errors.level)
+    stuck = stuck_notice(name, unit, dt, values, step, errors)
+    if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
+        held = 0.0  # most of what is held is held in a few places
+    noise = quiet[~np.isnan(quiet)]
     found = [
-        stuck_notice(name, unit, dt, values, step, errors),
-        saturation_notice(name, unit, present, quiet[~np.isnan(quiet)], step),
+        held_notice(name, held, chance) if held > 0.0 else stuck,
+        saturation_notice(name, unit, present, noise, step)
+        or abrupt_end_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
@@ -253,6 +265,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         events=events,
         lsb=step,
         outliers=outliers,
+        held=held if chance <= tuning.CHANCE_OF_HELD else 0.0,
     )
     return _Examined(notices, facts, _standardized(errors, usable))
 

@@ -45,7 +45,7 @@ def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
                     severity,
                     "",
                     f"fast noise of {one} and {other} is correlated by {r:.2g}",
-                    {"correlation": r, "samples": float(n)},
+                    {"correlation": r, "samples": float(n), "channels": f"{one}, {other}"},
                     "each channel is modelled for itself; a filter may want their covariance",
                 )
             )

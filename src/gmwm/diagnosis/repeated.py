@@ -1,4 +1,4 @@
-"""Channels of a lower rate than their rows: sample and hold, and linear interpolation."""
+"""Samples that were not measured: sample and hold, lost packets, and linear interpolation."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.resolution import step_size
 from gmwm.diagnosis.result import Repetition
+from gmwm.diagnosis.samples import is_dithered
 from gmwm.readers import Channel
 
 
@@ -94,3 +96,58 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     )
     values_of = {"share": share, "rate": rate}
     return Notice("interpolated", "bad", channel.name, text, values_of, action)
+
+
+def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, float]:
+    """Share of samples that repeat the one before without being measured, and that of chance.
+
+    Where a packet is lost, recorders write the last sample again. Of measured samples, differences
+    of no step are by a power of the ratio more frequent than those of one step by which these are
+    than those of two: 1/3 of a Gaussian law.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+        Samples in their order, NaN where missing.
+    step : float
+        u; 0 if samples are not rounded: then none equals the one before by chance.
+    scatter : float
+        Standard deviation of what cannot be predicted of a sample, u.
+
+    Returns
+    -------
+    tuple of float
+        Zeros if chance, with three standard errors, explains those that repeat.
+    """
+    sizes = np.abs(np.diff(values))
+    sizes = sizes[~np.isnan(sizes)]
+    same = int(np.count_nonzero(sizes == 0.0))
+    width = step or tuning.NEAR * scatter
+    near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
+    if not is_dithered(values[~np.isnan(values)], step) or not min(one, two):
+        return 0.0, 0.0
+    if step == 0.0:
+        # Steps that slowly change their size, by a correction, are a lattice all the same: of noise
+        # without steps half as many are so near.
+        chance, error = float(not one < 4 * near < 4 * one), 0.0
+    else:
+        power = tuning.LAST_RISE
+        chance = 0.5 * one / sizes.size * max(one / two, 1.0) ** power
+        error = float(np.hypot((1.0 + power) / np.sqrt(one), power / np.sqrt(two)))
+    beyond = same - chance * np.exp(3.0 * error) * sizes.size
+    if beyond < max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN):
+        return 0.0, 0.0
+    return same / sizes.size - chance, chance
+
+
+def held_notice(name: str, share: float, chance: float) -> Notice:
+    """Say how many samples repeat the one before."""
+    text = f"{share:.2g} of the samples repeat the one before, where chance explains {chance:.2g}"
+    return Notice(
+        "held",
+        "bad" if share > tuning.HELD_AT_MOST else "warning",
+        name,
+        f"{text}: lost packets, for which the last sample was written again",
+        {"share": share, "chance": chance},
+        "make such samples missing (NaN)",
+    )

@@ -60,6 +60,8 @@ class ChannelHealth:
     outliers : float
         Fraction of the samples that are outliers all over the record; 0 if they are no more than
         noise and some shocks explain.
+    held : float
+        Share of samples that only repeat the one before, where nearly all that do are such; else 0.
     repetition : Repetition or None
         If each sample is written several times; the other numbers are then those of the channel
         at its own rate, events those of the recording.
@@ -70,6 +72,7 @@ class ChannelHealth:
     events: tuple[tuple[int, int], ...] = ()
     lsb: float = 0.0
     outliers: float = 0.0
+    held: float = 0.0
     repetition: Repetition | None = None
 
     @classmethod
@@ -82,6 +85,7 @@ class ChannelHealth:
             events=tuple(content["events"]),
             lsb=content["lsb"],
             outliers=content["outliers"],
+            held=content["held"],
             repetition=repeated and Repetition(repeated["times"], repeated["first"]),
         )
 
@@ -95,7 +99,8 @@ class Health(Document, Printed):
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
-        "infinite", "size", "stuck", "saturation", "repeated-samples", "interpolated", "event",
+        "infinite", "size", "stuck", "held", "saturation", "abrupt-end", "value-repeated",
+        "repeated-samples", "interpolated", "event",
         "outliers", "heavy-tails", "rounding", "line",
         "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
@@ -158,7 +163,7 @@ class Health(Document, Printed):
         return self._channel(channel).outliers
 
     def masked(self, recording: Recording, but: Collection[str] = ()) -> Recording:
-        """The recording with the samples of all events missing.
+        """The recording with the samples of all events, and those that were held, missing.
 
         Parameters
         ----------
@@ -170,7 +175,8 @@ class Health(Document, Printed):
         Returns
         -------
         Recording
-            Its channels are NaN during their own events; a notice counts the samples.
+            Its channels are NaN during their own events, and where they repeat the sample before
+            if that shows a lost one; a notice counts the samples.
 
         Raises
         ------
@@ -186,12 +192,15 @@ class Health(Document, Printed):
         channels, notices = [], list(recording.notices)
         for name, channel in recording.items():
             events = () if channel.is_auxiliary else self.events(name)
-            if events and name not in but:
+            held = not channel.is_auxiliary and self._channel(name).held > 0.0
+            if (events or held) and name not in but:
                 values = np.array(channel.values, dtype=float)
+                if held:
+                    values[1:][np.diff(values) == 0.0] = np.nan
                 for start, stop in events:
                     values[start:stop] = np.nan
                 gone = int(np.count_nonzero(np.isnan(values))) - channel.missing
-                text = f"{gone:,} samples of spikes or shocks left out"
+                text = f"{gone:,} samples of spikes, shocks or lost packets left out"
                 notices.append(Notice("events-left-out", "note", name, text, {"samples": gone}))
                 channel = replace(channel, values=values)
             channels.append(channel)
@@ -283,6 +292,7 @@ class ChannelHealthForm(Form):
     events: Annotated[list[Annotated[tuple[Index, Samples], _OR_LIST]], _OR_LIST]
     lsb: NotNegative
     outliers: Annotated[float, Field(ge=0.0, le=1.0)]
+    held: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     repetition: RepetitionForm | None
 
 

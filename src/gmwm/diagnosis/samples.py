@@ -54,6 +54,23 @@ def _gap_notice(channel: Channel, dt: float) -> Notice | None:
     return Notice("gap", severity, channel.name, text, values, action)
 
 
+def length_notice(n: int, rate: float) -> Notice:
+    """Say how long a recording of n samples is, and whether that is short."""
+    length = n / rate
+    text = f"{n:,} samples at {rate:g} Hz, {length:.6g} s"
+    numbers = {"duration": length, "rate": rate}
+    if length < tuning.LONG_RECORD:
+        return Notice(
+            "length",
+            "note",
+            "",
+            f"{text}, too short for slow errors of minutes and more",
+            numbers,
+            "an hour or more shows them",
+        )
+    return Notice("length", "good", "", text, numbers)
+
+
 def dead_notice(channel: Channel) -> Notice | None:
     """Say that a channel never changes."""
     if channel.missing == channel.n or not channel.is_constant:
@@ -221,6 +238,65 @@ def saturation_notice(
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
         "use a wider range; make such samples missing (NaN) if they are few",
+    )
+
+
+def abrupt_end_notice(
+    name: str, unit: str, values: FloatArray, step: float, scatter: float
+) -> Notice | None:
+    """Find an extreme at which samples end although they are as dense there as before.
+
+    Noise thins out towards its extremes. Numbers that were rectified, wrapped round or sorted out
+    end where they are dense: the outer half of the last samples then holds half of them, where a
+    density that falls to a fifth leaves a third. Each of `PARTS_OF_END` parts of the record with
+    enough samples there has a larger share with a probability of a half at most, however few of
+    them a slow process takes to its extreme (sign test). Steps above half of the scatter are not
+    looked at: they hide how noise ends.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    values : (n,) ndarray
+        Samples outside shocks in their order, none missing.
+    step : float
+        u; 0 if samples are not rounded.
+    scatter : float
+        Standard deviation of what cannot be predicted of a sample, u.
+    """
+    count = max(int(tuning.LAST_OF_END * values.size), tuning.FEWEST_OF_END)
+    if values.size < 4 * count or 2.0 * step > scatter:
+        return None
+    part = np.arange(values.size) * tuning.PARTS_OF_END // values.size
+    found, density = [], 0.0
+    for sign in (1.0, -1.0):
+        end = sign * float(np.max(sign * values))
+        inwards = sign * (end - values)
+        width = min(float(np.partition(inwards, count)[count]), scatter)
+        if step > 0.0:
+            # Both halves have the same number of steps, two at least.
+            width = step * 2.0 * max(np.ceil(0.5 * width / step), 2.0)
+        if width > np.median(inwards):
+            continue
+        half = 0.5 * step if step > 0.0 else 0.0
+        last = np.bincount(part[inwards + half < width], minlength=tuning.PARTS_OF_END)
+        outer = np.bincount(part[inwards + half < 0.5 * width], minlength=tuning.PARTS_OF_END)
+        asked = last >= tuning.FEWEST_OF_PART
+        dense = int(np.count_nonzero(asked & (3 * (outer - 1) >= last)))
+        if binom.sf(dense - 1, int(np.count_nonzero(asked)), 0.5) < 0.5 * tuning.FALSE_ALARM:
+            found.append(end)
+            density += float(np.sum(last)) / values.size / width * float(np.std(values))
+    if not found:
+        return None
+    where = " and ".join(readable(end, unit, digits=5) for end in sorted(found))
+    return Notice(
+        "abrupt-end",
+        "bad" if density > tuning.HARMFUL_END else "warning",
+        name,
+        f"samples end abruptly at {where}, where noise would thin out: rectified, wrapped round "
+        "or sorted out",
+        {"lowest": min(found), "highest": max(found), "density": density},
+        "look for what wraps, cuts or takes absolute values between the sensor and the file",
     )
 
 

@@ -8,6 +8,14 @@ FALSE_ALARM = 1e-3
 LONG_RECORD = 3600.0
 """s: slow errors of inertial sensors have correlation times of minutes."""
 
+ROWS_OF_STRETCH = 1 << 18
+"""Of a recording longer than memory: an hour and a half at 100 Hz, which shows lines and
+resonances nearly as well as the whole; 4 MB a channel, and some ten times as much for the work."""
+
+SAME_PEAK = 0.02
+"""Relative difference of the frequency of one line or resonance in several stretches: lines of
+engines and fans wander by about as much (docs/real-data.md)."""
+
 JITTER, LARGE_JITTER = 0.1, 0.3
 """Root mean square of the steps of time stamps, in sampling intervals, for a note and a warning."""
 
@@ -82,6 +90,20 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
+
+LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
+"""Part of the samples, and samples at least, next to an extreme in which the fall of the density is
+looked for; samples of one of so many parts of the record that show it."""
+
+HARMFUL_END = 0.08
+"""Density at the ends times the standard deviation: of Gaussian noise whose samples beyond 2.1
+standard deviations were sorted out, which makes its density 10 % too small."""
+
+HELD_AT_MOST, CHANCE_OF_HELD, LAST_RISE, NEAR = 0.05, 0.05, 0.75, 0.25
+"""Part of the samples that repeat the one before, and stay, which makes the noise larger by
+that; part that may equal it by chance where such samples are made missing (which makes the noise
+1.6 % smaller). Largest power of a law (t with 2.5 degrees of freedom, rounded to two deviations;
+Laplace's walk 0.65). Of the scatter, a step to compare with where there is none."""
 
 # -- prediction errors ----------------------------------------------------------------------------
 

@@ -232,7 +232,7 @@ def imu_of(
     outlook : dict, optional
         That of `Imu`, where it is known.
     one_tau : bool, optional
-        Whether there is one correlation time in the file: each axis is moved to it.
+        Whether there is one correlation time in the file.
 
     Raises
     ------
@@ -252,6 +252,10 @@ def imu_of(
     if len(horizons) > 1:
         times = ", ".join(f"{each:g} s" for each in horizons)
         raise InputError(f"the numbers are for {times}: give numbers for one horizon")
+    tau = None
+    if one_tau:
+        tau = _common_tau(given, numbers, form)
+        numbers = [numbers_of(each, form, horizon, usual, tau) for each in given]
     # The axes of a file that has one value for them are judged by that.
     together = [
         bound(each, form, horizon=horizons[0], shared=True)
@@ -263,17 +267,7 @@ def imu_of(
     fits = {
         name: fit for each in given if isinstance(each, Calibration) for name, fit in each.items()
     }
-    triads = {each: _triad(each, sources, fits, form, shared) for each in SENSORS}
-    if one_tau:
-        own = {name: one for each in numbers for name, one in each.items()}
-        tau = common_tau([axis for triad in triads.values() for axis in triad.axes])
-        for each, triad in triads.items():
-            moved = [(axis, axis.moved(tau)) for axis in triad.axes]
-            axes = (
-                replace(to, nees=_nees(axis, replace(own[axis.name], model=to.model), fits))
-                for axis, to in moved
-            )
-            triads[each] = replace(triad, axes=tuple(axes))
+    triads = {each: _triad(each, sources, fits, form, shared, tau) for each in SENSORS}
     return Imu(
         triads["gyro"], triads["accel"], form, horizons[0],
         next(one.method for each in numbers for one in each.values()),
@@ -290,6 +284,7 @@ def _triad(
     fits: Mapping[str, Fit],
     form: str,
     shared: bool,
+    tau: float | None,
 ) -> Triad:
     """The axes of a quantity, of what was given, its numbers and those that its axes share."""
     axes: list[Axis] = []
@@ -300,7 +295,7 @@ def _triad(
             rate = numbers.rate
             if isinstance(source, Calibration) and not source.has_one_rate:
                 rate = 1.0 / source[name].wv.dt
-            axes.append(axis_of(name, one, rate, fits.get(name)))
+            axes.append(axis_of(name, one, rate, fits.get(name), tau))
             if together is not None and len(holding) == 1:
                 common = together[name]
     sensor = SENSORS[quantity]
@@ -338,10 +333,13 @@ def _nees(axis: Axis, numbers: FilterNumbers, fits: Mapping[str, Fit]) -> Mappin
     return axis.nees if own == (numbers.model.params, numbers.initial_sd) else {}
 
 
-def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> SensorNumbers:
+def numbers_of(
+    given: Any, form: str, horizon: float | None, usual: float, tau: float | None = None
+) -> SensorNumbers:
     """Numbers of a form: those that bound a calibration, or given ones if they have it.
 
-    Where a calibration has a random walk and the form none, they are those of `gmwm.reduce`.
+    Where a calibration has a random walk and the form none, they are those of `gmwm.reduce`. Those
+    with one correlation time for all axes, where it is given (s), bound the given ones.
 
     Raises
     ------
@@ -349,11 +347,7 @@ def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> Se
         If they have not.
     """
     if isinstance(given, Calibration):
-        time = usual if horizon is None else horizon
-        if form == "N+GM" and any(_walks(fit) for fit in given.values()):
-            # No stationary process bounds a random walk; the best one for outages is found.
-            return reduce(given, form, [share * time for share in tuning.OUTAGES])
-        return bound(given, form, horizon=time)
+        return _found(given, form, usual if horizon is None else horizon, tau)
     if not isinstance(given, SensorNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, or what "
@@ -367,14 +361,47 @@ def numbers_of(given: Any, form: str, horizon: float | None, usual: float) -> Se
             f"the numbers are for {given.horizon:g} s: leave the horizon out, or export the "
             "calibration"
         )
-    return given
+    if tau is None or all(one.tau == (tau,) for one in given.values()):
+        return given
+    moved = _found({name: one.model for name, one in given.items()}, form, given.horizon, tau)
+    axes = {
+        name: replace(one, model=moved[name].model, predicted=()) for name, one in given.items()
+    }
+    return replace(given, axes=axes)
 
 
-def axis_of(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) -> Axis:
+def _found(
+    source: Calibration | Mapping[str, Any], form: str, horizon: float, tau: float | str | None
+) -> SensorNumbers:
+    """Those of `gmwm.bound`, or of `gmwm.reduce` where no number of the form is a bound."""
+    if form == "N+GM" and any(_walks(each) for each in source.values()):
+        # No stationary process bounds a random walk; the best one for outages is found.
+        return reduce(source, form, [share * horizon for share in tuning.OUTAGES], tau=tau)
+    return bound(source, form, horizon=horizon, tau=tau)
+
+
+def _common_tau(given: Sequence[Any], numbers: Sequence[SensorNumbers], form: str) -> float:
+    """The one correlation time for all axes that costs least over them, s."""
+    slow = [one for each in numbers for one in each.values() if one.sigma[0] > 0.0]
+    horizon = numbers[0].horizon
+    taus = {one.tau[0] for one in slow} or {horizon}
+    if len(taus) == 1:
+        return taus.pop()
+    models = {
+        name: one.model if isinstance(one, FilterNumbers) else one
+        for each in given
+        for name, one in each.items()
+    }
+    return next(iter(_found(models, form, horizon, "shared").values())).tau[0]
+
+
+def axis_of(
+    name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None, tau: float | None = None
+) -> Axis:
     """An axis by its numbers, with upper bounds of its fit in place of zeros."""
-    sigma, tau = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
+    sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
     axis = Axis(
-        name, numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate
+        name, numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees), rate
     )
     if fitted is None:
         return axis
@@ -384,7 +411,7 @@ def axis_of(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) 
     if "K" in numbers.form and axis.K <= 0.0:
         axis = replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
     if "GM" in numbers.form and not axis.sigma > 0.0:
-        tau = numbers.horizon
+        tau = numbers.horizon if tau is None else tau
         # The random walk of this K rises at high frequencies as this process does.
         sigma = random_walk(fitted).value * float(np.sqrt(tau / 2.0))
         axis = replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
@@ -394,8 +421,8 @@ def axis_of(name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None) 
     return axis
 
 
-def _walks(fit: Fit) -> bool:
-    return any(term.is_walk for term in fit.model.terms)
+def _walks(axis: Fit | Model) -> bool:
+    return any(term.is_walk for term in (axis.model if isinstance(axis, Fit) else axis).terms)
 
 
 def _outlook(given: Sequence[Any]) -> Outlook:

@@ -43,8 +43,7 @@ def _list(axes: Sequence[Axis], value: Callable[[Axis], float]) -> str:
 
 KFGINS = ImuFile(
     "kfgins", "KF-GINS", "imunoise of kf-gins.yaml",
-    "N, sigma and tau of each axis; there is one tau for all six, and each axis has the sigma "
-    "with which it bounds its own process",
+    "N and sigma of each axis for the one tau of all six, which is the one that costs least",
     "src/kf-gins/gi_engine.cpp: GIEngine::GIEngine, insPropagation; src/kf_gins.cpp: loadConfig",
     _body, form="N+GM", one_tau=True,
     warnings=("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",),

@@ -21,6 +21,9 @@ Several = Calibration | Mapping[str, Process | Model] | Mapping[str, Fit]
 Sd = float | Mapping[str, float]
 """For every axis, or by the name of an axis or its kind (gyro, accel)."""
 
+SHARED = "shared"
+"""The correlation time that costs least, of one for all axes."""
+
 P = ParamSpec("P")
 
 
@@ -159,6 +162,10 @@ class Axes:
         kinds = dict.fromkeys(axis.quantity for axis in self.axes)
         return tuple(tuple(a for a in self.axes if a.quantity == kind) for kind in kinds)
 
+    def sharing(self, shared: bool) -> tuple[tuple[Axis, ...], ...]:
+        """Those that have the same numbers."""
+        return self.groups if shared else tuple((axis,) for axis in self.axes)
+
     def numbers(
         self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> FilterNumbers | SensorNumbers:
@@ -170,15 +177,33 @@ class Axes:
         self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> SensorNumbers:
         """The same as a mapping, of one axis too."""
-        groups = self.groups if shared else tuple((axis,) for axis in self.axes)
         pairs = [
             (axis.name, each)
-            for group in groups
+            for group in self.sharing(shared)
             for axis, each in zip(group, found(group), strict=True)
         ]
         by_name = dict(pairs)
         ordered = {axis.name: by_name[axis.name] for axis in self.axes}
         return SensorNumbers(ordered, self.source, self.rate, self.duration, shared)
+
+
+def given_tau(form: str, tau: float | str | None) -> float | str | None:
+    """A correlation time as users give it, of a form.
+
+    Raises
+    ------
+    InputError
+        If it is none, or the form has none or several.
+    """
+    if tau is None:
+        return None
+    if form not in ("N+GM", "N+K+GM"):
+        raise InputError(
+            f"tau is that of one Gauss-Markov process, the form is {form}: leave tau out, or give "
+            "N+GM or N+K+GM"
+        )
+    mend = f"give a time in seconds, or {SHARED!r}"
+    return SHARED if tau == SHARED else checks.positive("tau", tau, mend)
 
 
 def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> Axis:

@@ -13,7 +13,7 @@ from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, per_axis
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
 from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import (
@@ -22,6 +22,7 @@ from gmwm.filter_numbers.spectra import (
     Estimated,
     Problem,
     Target,
+    correlation_time,
     dominating,
     region_targets,
     standard_errors,
@@ -38,6 +39,7 @@ def bound(
     level: float | None = None,
     bias_sd: Sd = 0.0,
     shared: bool = False,
+    tau: float | str | None = None,
     dt: float | None = None,
 ) -> FilterNumbers | SensorNumbers:
     """The smallest numbers of a form with which a linear filter is never too optimistic.
@@ -59,6 +61,9 @@ def bound(
         ("gyro", "accel") if a mapping.
     shared : bool, optional
         Whether axes of a kind have the same numbers.
+    tau : float or "shared", optional
+        Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
+        least over them. By default each has its own.
     dt : float, optional
         Sampling interval of models that are not fitted, s; 0.01 s by default.
 
@@ -71,7 +76,7 @@ def bound(
     ------
     InputError
         If a parameter is open, a term is known by simulation only, the form cannot dominate the
-        model, or ``level`` is given without a fit.
+        model, ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process.
 
     Notes
     -----
@@ -86,6 +91,7 @@ def bound(
     ``|R| horizon``; notices report them.
     """
     checks.choice("form", form, list(KINDS))
+    tau = given_tau(form, tau)
     horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
     axes = Axes.of(source, dt, bias_sd)
     axes.check_interval("horizon", horizon)
@@ -93,33 +99,35 @@ def bound(
         level = checks.share("level", level, 0.95)
         for axis in axes.axes:
             _fit(axis)
+    if isinstance(tau, str):
+        problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
+        tau = correlation_time(problems, form)
 
     def found(group: tuple[Axis, ...]) -> Sequence[FilterNumbers]:
-        return bound_of(group, form, horizon, level)
+        return bound_of(group, form, horizon, level, tau)
 
     return axes.numbers(found, shared)
 
 
 @lru_cache(maxsize=64)
 def bound_of(
-    group: tuple[Axis, ...], form: str, horizon: float, level: float | None
+    group: tuple[Axis, ...],
+    form: str,
+    horizon: float,
+    level: float | None,
+    tau: float | None = None,
 ) -> tuple[FilterNumbers, ...]:
     """The bound of axes that share their numbers; see `bound`.
 
     A report asks for some of them again, and the exports for those of the report.
     """
-    targets = tuple(Target.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
-    region: list[Target] = []
-    if level is not None:
-        for axis, target in zip(group, targets, strict=True):
-            region += region_targets(target, _fit(axis), level)
-    problem = Problem(targets, horizon, tuple(region))
-    model = dominating(problem, form)
+    problem = _problem(group, horizon, level)
+    model = dominating(problem, form, tau)
     # Errors of a fit that is not valid are not those of its parameters either.
     fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
-    dominated = (*targets, *region)
+    dominated = (*problem.targets, *problem.region)
     sd = max(_start(group, each, model) for each in dominated)
     times = (horizon, 10.0 * horizon)
     errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
@@ -147,8 +155,20 @@ def bound_of(
             quantity=axis.quantity,
             stderr=stderr,
         )
-        for axis, target, found, loose in zip(group, targets, errors, looseness, strict=True)
+        for axis, target, found, loose in zip(
+            group, problem.targets, errors, looseness, strict=True
+        )
     )
+
+
+def _problem(group: Sequence[Axis], horizon: float, level: float | None) -> Problem:
+    """What the numbers that axes share have to dominate."""
+    targets = tuple(Target.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
+    region: list[Target] = []
+    if level is not None:
+        for axis, target in zip(group, targets, strict=True):
+            region += region_targets(target, _fit(axis), level)
+    return Problem(targets, horizon, tuple(region))
 
 
 def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, per_axis
+from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
 from gmwm.filter_numbers.bound import about, predicted
+from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
 from gmwm.process import Model
@@ -31,6 +33,7 @@ def reduce(
     keyframe: float | None = None,
     bias_sd: Sd = 0.0,
     shared: bool = False,
+    tau: float | str | None = None,
     dt: float | None = None,
     progress: Progress | None = None,
 ) -> FilterNumbers | SensorNumbers:
@@ -54,6 +57,9 @@ def reduce(
         ("gyro", "accel") if a mapping.
     shared : bool, optional
         Whether axes of a kind have the same numbers.
+    tau : float or "shared", optional
+        Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
+        least over them. By default each has its own.
     dt : float, optional
         Sampling interval of models that are not fitted, s; 0.01 s by default.
     progress : callable, optional
@@ -68,7 +74,8 @@ def reduce(
     Raises
     ------
     InputError
-        If a parameter is open, a term has no state-space form, or there is no outage.
+        If a parameter is open, a term has no state-space form, there is no outage, or ``tau`` is
+        given without one Gauss-Markov process.
 
     Notes
     -----
@@ -80,6 +87,7 @@ def reduce(
     navigation filter on a trajectory.
     """
     checks.choice("form", form, FORMS)
+    tau = given_tau(form, tau)
     if keyframe is not None:
         outages = (checks.positive("keyframe", keyframe, "give the interval of keyframes in s"),)
     times = sorted({checks.positive("outage", each) for each in outages})
@@ -87,6 +95,8 @@ def reduce(
         raise InputError("outages: give one length at least, s")
     axes = Axes.of(source, dt, bias_sd)
     axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
+    search = _Search(form, times, keyframe is not None)
+    time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau
     done = 0
 
     def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
@@ -94,7 +104,7 @@ def reduce(
         if progress is not None:
             progress(done, len(axes.axes), group[0].name)
         done += len(group)
-        return _reduced(group, form, times, keyframe is not None)
+        return search.numbers(group, time)
 
     result = axes.numbers(found, shared)
     if progress is not None:
@@ -102,50 +112,107 @@ def reduce(
     return result
 
 
-def _reduced(
-    group: Sequence[Axis], form: str, times: Sequence[float], is_relative: bool
-) -> list[FilterNumbers]:
-    longest = times[-1]
-    chains = [axis.between(longest) if is_relative else axis.chain for axis in group]
-    targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
-    start, sd = _start(group, targets, form, longest)
-    names = list(start.params)
-    values = np.array([float(start.params[name] or 0.0) for name in names])
+@dataclass(frozen=True)
+class _Search:
+    """For the numbers of a form that are right after some times without aiding."""
 
-    def scaled(logs: FloatArray) -> Model:
-        return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
+    form: str
+    times: Sequence[float]
+    is_relative: bool
 
-    def cost(logs: FloatArray) -> float:
-        # Finite beyond the farthest too, where a line search may try: differences are taken of it.
-        model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
-        errors = [
-            chain.errors(axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd)
-            for axis, chain in zip(group, chains, strict=True)
+    def chain(self, axis: Axis) -> Chain:
+        return axis.between(self.times[-1]) if self.is_relative else axis.chain
+
+    def numbers(self, group: Sequence[Axis], tau: float | None) -> list[FilterNumbers]:
+        """Those that axes share."""
+        longest = self.times[-1]
+        _, model, sd = self.least(group, tau)
+        times = (*self.times, 10.0 * longest)
+        return [
+            FilterNumbers(
+                form=self.form,
+                model=model,
+                horizon=longest,
+                initial_sd=sd,
+                method="reduce",
+                predicted=predicted(axis, self.chain(axis), model, sd, times),
+                notices=(
+                    *Target.of(axis.model, axis.dt, longest, axis.unit).notices,
+                    *_below(axis, model),
+                    *about(axis, None),
+                ),
+                quantity=axis.quantity,
+            )
+            for axis in group
         ]
-        score = np.mean([each.score() for each in errors], axis=0)
-        # Of all axes together: one that shares its numbers may well be cautious, another bold.
-        uneven = np.log(np.mean([each.nees() for each in errors], axis=0)) ** 2
-        inertia = tuning.INERTIA * float(logs @ logs)
-        return float(np.sum(score + tuning.EVENNESS * uneven)) + inertia
 
-    best = minimize(
-        cost, np.zeros(len(names)), method="BFGS",
-        options={"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS},
-    ).x  # fmt: skip
-    model = scaled(np.clip(best, -tuning.FARTHEST, tuning.FARTHEST))
-    return [
-        FilterNumbers(
-            form=form,
-            model=model,
-            horizon=longest,
-            initial_sd=sd,
-            method="reduce",
-            predicted=predicted(axis, chain, model, sd, (*times, 10.0 * longest)),
-            notices=(*target.notices, *_below(axis, model), *about(axis, None)),
-            quantity=axis.quantity,
+    def correlation_time(self, groups: Sequence[Sequence[Axis]]) -> float:
+        """The one for all that costs least over them, s."""
+
+        def cost(log_tau: float) -> float:
+            return sum(self.least(group, float(np.exp(log_tau)))[0] for group in groups)
+
+        grid = np.log(self.times[-1] * np.array(tuning.SHARED_TAUS))
+        best = int(np.argmin([cost(each) for each in grid]))
+        around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
+        found = minimize_scalar(
+            cost, bounds=around, method="bounded", options={"xatol": tuning.SHARED_TAU_WITHIN}
         )
-        for axis, chain, target in zip(group, chains, targets, strict=True)
-    ]
+        return float(np.exp(found.x))
+
+    def least(self, group: Sequence[Axis], tau: float | None) -> tuple[float, Model, float]:
+        """The least score, the numbers that have it, and the standard deviation at the start."""
+        start, sd = self._start(group, tau)
+        names = [name for name in start.params if tau is None or name != "tau"]
+        values = np.array([float(start.params[name] or 0.0) for name in names])
+
+        def scaled(logs: FloatArray) -> Model:
+            return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
+
+        def cost(logs: FloatArray) -> float:
+            # Finite beyond the farthest too, where a line search may try: it takes differences.
+            model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
+            errors = [
+                self.chain(axis).errors(
+                    axis.model, model, axis.dt, self.times, true_sd=axis.bias_sd, believed_sd=sd
+                )
+                for axis in group
+            ]
+            score = np.mean([each.score() for each in errors], axis=0)
+            # Of all axes together: one that shares its numbers may well be cautious, another bold.
+            uneven = np.log(np.mean([each.nees() for each in errors], axis=0)) ** 2
+            inertia = tuning.INERTIA * float(logs @ logs)
+            return float(np.sum(score + tuning.EVENNESS * uneven)) + inertia
+
+        best = minimize(
+            cost, np.zeros(len(names)), method="BFGS",
+            options={"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS},
+        )  # fmt: skip
+        model = scaled(np.clip(best.x, -tuning.FARTHEST, tuning.FARTHEST))
+        return float(best.fun), model, sd
+
+    def _start(self, group: Sequence[Axis], tau: float | None) -> tuple[Model, float]:
+        """A bound with given correlation times, without zeros; standard deviation at the start.
+
+        Without a walk it lies above the models from the frequency of the longest time on: below, a
+        correlation time shorter than theirs needs a hundred times the variance, too far off for the
+        search.
+        """
+        longest = self.times[-1]
+        targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
+        lowest = 0.0 if "K" in self.form else 0.5 / np.pi / longest
+        problem = Problem(tuple(targets), longest, lowest=lowest)
+        taus = [factor * longest for factor in _TIMES[self.form]] if tau is None else [tau]
+        model = with_correlation_times(problem, self.form, taus)
+        walking = any(term.is_walk for term in model.terms)
+        variance = 0.0
+        for axis, target in zip(group, targets, strict=True):
+            own = axis.bias_sd**2 + target.constant_sd**2
+            if walking:
+                still = Model(tuple(term for term in model.terms if not term.is_walk))
+                own += target.slow_variance(still)
+            variance = max(variance, own)
+        return model, float(np.sqrt(variance))
 
 
 def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:
@@ -159,21 +226,3 @@ def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:
         "without aiding that the numbers are for"
     )
     return (Notice("less-white-noise", "note", "", text, {"share": share}),)
-
-
-def _start(
-    group: Sequence[Axis], targets: Sequence[Target], form: str, longest: float
-) -> tuple[Model, float]:
-    """A bound with given correlation times, without zeros; standard deviation at the start."""
-    problem = Problem(tuple(targets), longest)
-    taus = [factor * longest for factor in _TIMES[form]]
-    model = with_correlation_times(problem, form, taus)
-    walking = any(term.is_walk for term in model.terms)
-    variance = 0.0
-    for axis, target in zip(group, targets, strict=True):
-        own = axis.bias_sd**2 + target.constant_sd**2
-        if walking:
-            still = Model(tuple(term for term in model.terms if not term.is_walk))
-            own += target.slow_variance(still)
-        variance = max(variance, own)
-    return model, float(np.sqrt(variance))

@@ -107,6 +107,13 @@ BELOW = 0.98
 STEPS = 60
 """Of the search, at most."""
 
+SHARED_TAUS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+"""Times the longest outage: correlation times for all axes of which the best is refined. Shorter
+ones are white noise to the end of the outage, longer ones a walk."""
+
+SHARED_TAU_WITHIN = 0.1
+"""Of its logarithm: the score is flat there, to 0.01 of six axes together."""
+
 FARTHEST = 12.0
 """Largest logarithm of a factor on the start: beyond, numbers have no meaning any more."""
 

@@ -128,6 +128,12 @@ LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
 """s, of a constant error of the fixes' stamps that is looked for: leap seconds are more, and leave
 no fix near; and of the fixes left out at both ends beside it."""
 
+STEP_PARTS = 16
+"""Parts of a log between which a step of a clock is looked for before the best is refined."""
+
+STEP_NEAR = 4
+"""Fixes to both sides among which it is looked for again once its size is known."""
+
 LARGEST_ARM = 5.0
 """m, usual length of a lever arm that was left out: 1 sigma."""
 

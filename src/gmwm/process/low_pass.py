@@ -21,7 +21,15 @@ from gmwm._core.typing import FloatArray
 from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import HALF_PANEL, PANEL_POLE, WIDER, panel_weights, quadrature, rounded
+from gmwm.process.spectral import (
+    HALF_PANEL,
+    PANEL_POLE,
+    TOGETHER,
+    WIDER,
+    node_weights,
+    panel_weights,
+    rounded,
+)
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
@@ -236,8 +244,9 @@ def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatA
     """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
     found = low_pass_haar(*shape, dt, *on_panels(averaging))
     if not found.size:
-        log_tangent, weight = _nodes(averaging)
-        found = weight @ _gain(*shape, log_tangent, dt) / dt
+        parts = (averaging[i : i + TOGETHER] for i in range(0, len(averaging), TOGETHER))
+        nodes = [_nodes(part) for part in parts]
+        found = np.concatenate([weight @ _gain(*shape, x, dt) / dt for x, weight in nodes])
     curve: FloatArray = frozen(found)
     return curve
 
@@ -245,11 +254,11 @@ def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatA
 Weights = tuple[FloatArray, FloatArray]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _nodes(averaging: tuple[float, ...]) -> Weights:
     """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
-    found = quadrature(rounded(averaging))
-    return np.log(np.tan(np.pi * found.frequency)), 2.0 * found.gain * found.weight
+    frequency, weight = node_weights(rounded(averaging))
+    return np.log(np.tan(np.pi * frequency)), weight
 
 
 def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:

@@ -149,6 +149,12 @@ def _gains(averaging: Sequence[float], frequency: FloatArray) -> tuple[FloatArra
     return gain, resolved
 
 
+def node_weights(averaging: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Nodes (K,) in cycles per sample, and the weights (J, K) of a spectrum there."""
+    frequency, weight = _nodes(max(averaging))
+    return frequency, 2.0 * weight * _gains(averaging, frequency)[0]
+
+
 @lru_cache(maxsize=32)
 def quadrature(averaging: tuple[float, ...]) -> Quadrature:
     """The quadrature for averaging times of ``averaging`` samples each."""
@@ -237,14 +243,16 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
         frequency, weight = _nodes(max(averaging))
         panels = Panels.of(np.log(np.tan(np.pi * frequency)))
         parts = [
-            panels.gathered(2.0 * weight * _gains(averaging[i : i + _TOGETHER], frequency)[0])
-            for i in range(0, len(averaging), _TOGETHER)
+            panels.gathered(2.0 * weight * _gains(averaging[i : i + TOGETHER], frequency)[0])
+            for i in range(0, len(averaging), TOGETHER)
         ]
         gathered = np.concatenate(parts)
     return panels.log_tangent.ravel(), gathered.reshape(len(averaging), -1)
 
 
-_TOGETHER = 16
+TOGETHER = 16
+"""Averaging times of which weights at all nodes are in memory: 2 MB."""
+
 _SMOOTH = 1e-10
 _TAIL = (
     2.0

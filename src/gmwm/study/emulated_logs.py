@@ -30,9 +30,12 @@ VEHICLES: dict[str, Callable[..., Trajectory]] = {
     "loiter": fixed_wing_loiter,
 }
 
-FAULTS = ("coloured", "stamps", "lever arm", "off-grid", "one far", "outliers", "mounting")
-"""Coloured GNSS; stamps 0.2 s late; lever arm left out; fixes between samples; one fix 500 m off;
-3 % outliers of 50 m; IMU turned by 90 deg about its vertical axis."""
+FAULTS = (
+    "coloured", "stamps", "clock step", "lever arm", "off-grid", "one far", "outliers", "mounting",
+)  # fmt: skip
+"""Coloured GNSS; stamps 0.2 s late; stamps a second late from the middle on; lever arm left out;
+fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU turned by 90 deg about its
+vertical axis."""
 
 LEVER_ARM = (1.0, 0.3, -1.0)
 _DEGREE_HOUR, _MICRO_G = np.radians(1.0 / 3600.0), 9.80665e-6
@@ -114,7 +117,8 @@ def emulated_log(
     ).noisy(rng)  # fmt: skip
     aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
     by = late + (0.2 if "stamps" in faults else 0.0)
-    aiding = replace(aiding, fixes=tuple(_later(each, by, duration) for each in aiding.fixes))
+    step = 1.0 if "clock step" in faults else 0.0
+    aiding = replace(aiding, fixes=tuple(_later(each, by, step, duration) for each in aiding.fixes))
     aiding = _with_outliers(aiding, faults, rng)
     if "lever arm" in faults:
         aiding = replace(aiding, lever_arm=(0.0, 0.0, 0.0))
@@ -135,8 +139,9 @@ def _part(imu: Imu, first: int) -> Imu:
     return Imu(imu.dt, imu.rotation[first:], imu.velocity[first:])
 
 
-def _later(fixes: Fixes, by: float, duration: float) -> Fixes:
-    later = replace(fixes, time=fixes.time + by)
+def _later(fixes: Fixes, by: float, step: float, duration: float) -> Fixes:
+    """With stamps as much later, and once more from the middle on."""
+    later = replace(fixes, time=fixes.time + by + step * (fixes.time > 0.5 * duration))
     return later.part(later.time <= duration)
 
 

@@ -129,6 +129,13 @@ def reproduce_rotation(
     text, paths
         What to print, and the files that were written.
     """
+    for recording in recordings:
+        missing = [axis for axis in AXES if axis not in recording.names]
+        if missing:
+            raise InputError(
+                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
+                f"{', '.join(AXES)}"
+            )
     rotation = rotate(
         "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
         jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,

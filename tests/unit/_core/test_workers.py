@@ -1,12 +1,13 @@
 """Whoever does the work, and whoever of them ends, every item is done once."""
 
 import os
+import pickle
 import signal
 
 import pytest
 
 from gmwm import InputError
-from gmwm._core.runs import results
+from gmwm._core.runs import beside, results, shared, spare
 
 
 class Square:
@@ -46,3 +47,53 @@ def test_a_lost_item_is_an_error_by_default():
     with pytest.raises(InputError, match="3 processes ended at 'a b'") as caught:
         _refused("a b")
     assert caught.value.code == "worker-lost"
+
+
+def test_this_process_shares_the_work_and_does_what_another_could_not(tmp_path):
+    """One that is killed, and what cannot be sent; it takes the next item as it ends one."""
+    work, drawn = Square(tmp_path, once=(1,)), []
+
+    def items():
+        for number in (1, *range(2, 9)):
+            drawn.append(number)
+            yield number
+
+    with beside(1, "math"), beside(1, "math"):
+        found = shared(work, items())
+        assert next(found)[0] == 2 and drawn[:2] == [1, 2]  # the first one was sent
+        assert dict(found) == {n: n**2 for n in (1, *range(3, 9))}
+    with beside(1, "math"):
+        unsent = dict(shared(Unsendable(), (3, 4)))
+    assert unsent == {3: os.getpid(), 4: os.getpid()}
+    assert dict(shared(work, iter((3, 2)))) == {3: 9, 2: 4}
+
+
+class Unsendable:
+    """Tells which process does the work, and cannot be sent to another."""
+
+    def __reduce__(self):
+        raise pickle.PicklingError
+
+    def __call__(self, number):
+        return os.getpid()
+
+
+def test_processes_end_with_an_interrupt(tmp_path):
+    def pids():
+        return {path.name.partition("-")[2] for path in tmp_path.iterdir()} - {str(os.getpid())}
+
+    with pytest.raises(KeyboardInterrupt), beside(1, "math"):
+        dict(shared(Square(tmp_path), range(50)))
+        other = int(min(pids()))
+        os.kill(other, 0)
+        raise KeyboardInterrupt
+    with pytest.raises(ProcessLookupError):
+        os.kill(other, 0)
+
+
+def test_there_are_never_more_processes_than_cores_or_items(monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    assert [spare(jobs, 3) for jobs in (1, 2, 9, -1)] == [0, 1, 2, 2]
+    assert spare(9, 8) == 3
+    with pytest.raises(InputError, match="jobs = 0"):
+        spare(0, 3)

@@ -19,6 +19,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm._core.notices import Notice
+from gmwm.calibration import Stopwatch, tuning
 from places import SHARED
 
 DT = 0.01
@@ -241,6 +242,18 @@ def test_progress_hears_of_every_channel_once_and_threads_change_nothing(recordi
     assert sorted(name for *_, name in heard[:-1]) == sorted(result.fits)
     assert heard[-1] == (len(result.fits), len(result.fits), "")
     assert_same(result, mapped)
+
+
+@pytest.mark.slow
+def test_processes_change_no_bit(recording, mapped, monkeypatch):
+    monkeypatch.setattr(tuning, "WORTH_PROCESSES", 0)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    with Stopwatch().running() as watch:
+        shared = gmwm.calibrate(recording, MODELS)
+    assert_same(shared, mapped)
+    assert shared.to_dict() == mapped.to_dict()
+    assert set(watch.elapsed) == {"health", "variance", "model", "departures"}
+    assert not any(fit.covariance.flags.writeable for fit in shared.values())
 
 
 # -- files ----------------------------------------------------------------------------------------

@@ -21,6 +21,18 @@ def zeros(share):
     return values
 
 
+def held(share, step=0.0, n=N):
+    """Some samples at random are written again in place of the next, as of lost packets."""
+    rng = np.random.default_rng(2)
+    values = clean(1)[:n] if not step else rounded(clean(1)[:n], step * SD)
+    last = np.where(rng.random(n) < share, 0, np.arange(n))
+    return values[np.maximum.accumulate(last)]
+
+
+def rounded(noise, step):
+    return step * np.round(noise / step)
+
+
 def shaken(envelope):
     return clean(1) * envelope(np.arange(N) / 100.0)
 
@@ -38,6 +50,13 @@ SPOILT = {
         "stuck", "samples_change",
         np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50)),
     ),
+    "rectified": ("abrupt-end", "within_range", np.abs(clean(1))),
+    "rectified, in steps": ("abrupt-end", "within_range", np.abs(rounded(clean(1), 0.1 * SD))),
+    "wrapped round at 1.5 sd": (
+        "abrupt-end", "within_range", (clean(1) + 1.5 * SD) % (3.0 * SD) - 1.5 * SD
+    ),
+    "uniform": ("abrupt-end", "within_range", SD * np.random.default_rng(1).random(N)),
+    "10 % held, steps of 0.4 sd": ("held", "samples_measured", held(0.1, 0.4)),
     "swells to 2 sd and dies": (
         "variance", "noise_steady", shaken(lambda t: 1.0 + np.sin(np.pi * t / 60.0) ** 2)
     ),
@@ -70,8 +89,23 @@ def test_a_spoilt_channel_is_not_valid_and_the_others_are(kind):
     assert all(found["gyro_y"].reasons.values())
 
 
-def rounded(noise, step):
-    return step * np.round(noise / step)
+@pytest.mark.parametrize(("share", "step"), [(0.05, 0.0), (0.2, 0.0), (0.1, 0.15)])
+def test_samples_of_lost_packets_are_left_out(share, step):
+    rec = gmwm.Recording.from_arrays({"gyro_x": held(share, step)}, 100.0, {"gyro": "rad/s"})
+    found = gmwm.calibrate(rec, WhiteNoise())
+    (notice,) = [n for n in found.notices if n.code == "held"]
+    assert notice.severity == "warning"
+    assert notice.values["share"] == pytest.approx(share, rel=0.1)
+    assert found["gyro_x"].valid
+    # Chance makes some of the samples equal that are made missing; left in, N is 1 + share.
+    error = 4.0 / np.sqrt(2.0 * N) + 0.4 * step**2
+    assert found["gyro_x"].params["N"] / (0.1 * SD) == pytest.approx(1.0, abs=error)
+
+
+def test_lost_packets_that_are_left_in_spoil_the_channel():
+    rec = gmwm.Recording.from_arrays({"gyro_x": held(0.1)}, 100.0, {"gyro": "rad/s"})
+    found = gmwm.calibrate(rec, WhiteNoise(), screening=("lines",))
+    assert not found["gyro_x"].reasons["samples_measured"]
 
 
 RNG = np.random.default_rng(7)
@@ -90,6 +124,11 @@ SOUND = {
     "Student's t with 2.5 degrees of freedom": SD * RNG.standard_t(2.5, N),
     "a Gauss-Markov process": gmwm.GaussMarkov(SD, 0.5).simulate(N, 0.01, 1),
     "low-passed": lfilter(np.ones(8) / 8.0, [1.0], clean(5)),
+    "a sum of two uniform ones": SD * (RNG.random(N) + RNG.random(N)),
+    "a strong line": clean(5) + 10 * SD * np.sin(np.arange(N) * 0.7),
+    "a walk": np.cumsum(clean(5)),
+    "a walk in steps": rounded(np.cumsum(clean(5)), 0.5 * SD),
+    "single precision": np.float32(9.8 + clean(5)).astype(float),
     "a resonance": (WhiteNoise(1e-5) + gmwm.Resonance(SD, 10.0, 0.01)).simulate(N, 0.01, 1),
     "quantization noise": gmwm.QuantizationNoise(SD * 0.01).simulate(N, 0.01, 1),
 }  # fmt: skip

@@ -25,7 +25,7 @@ def file(tmp_path_factory):
 
 
 def test_models_are_those_of_the_whole(file):
-    found = gmwm.calibrate_stream(file, MODEL, rate=100, units=UNITS, rows=3000)
+    found = gmwm.calibrate_stream(file, MODEL, screening=(), rate=100, units=UNITS, rows=3000)
     whole = gmwm.calibrate(gmwm.read(file, rate=100, units=UNITS), MODEL, screening=())
     assert list(found) == list(whole) == ["gyro_x", "gyro_y"]
     for name, fit in whole.items():
@@ -35,6 +35,88 @@ def test_models_are_those_of_the_whole(file):
     assert found.n == 20_000
     assert [notice.code for notice in found.notices if notice.severity == "warning"] == ["streamed"]
     assert not found.is_examined
+
+
+@pytest.fixture(scope="module")
+def spoilt(tmp_path_factory):
+    """A line in both channels, and shocks in one, over four stretches."""
+    rng = np.random.default_rng(4)
+    n = 80_000
+    x = rng.normal(size=(n, 2)) * 1e-3
+    x += 1e-3 * np.sin(2.0 * np.pi * 7.3 * 0.01 * np.arange(n))[:, None]
+    for at in (30_000, 30_500, 70_000):
+        x[at : at + 20, 0] += 0.5
+    path = tmp_path_factory.mktemp("spoilt") / "spoilt.npy"
+    np.save(path, x)
+    return path
+
+
+READING = {"rate": 100, "units": UNITS, "channels": {"gyro_x": 0, "gyro_y": 1}, "rows": 20_000}
+
+
+def test_shocks_and_lines_are_found_stretch_by_stretch(spoilt):
+    found = gmwm.health_stream(spoilt, **READING)
+    assert found.n == 80_000 and found.events("gyro_y") == ()
+    for at in (30_000, 30_500, 70_000):
+        assert any(start <= at and stop >= at + 20 for start, stop in found.events("gyro_x"))
+    (event,) = found.of("gyro_x", "event")
+    assert event.values["count"] == 3 and event.values["stretches"] == 2
+    assert event.values["stretch_start"] in (200.0, 600.0)
+    for name in ("gyro_x", "gyro_y"):
+        (line,) = found.of(name, "line")
+        assert line.values["frequency"] == pytest.approx(7.3, rel=1e-3)
+        ((frequency, amplitude),) = found.lines(name)
+        assert frequency == pytest.approx(7.3, rel=1e-3)
+        assert amplitude == pytest.approx(1e-3, rel=0.05)
+    (length,) = found.of(code="length")
+    assert length.values["duration"] == 800.0
+    assert gmwm.Health.from_dict(found.to_dict()).events("gyro_x") == found.events("gyro_x")
+
+
+def test_a_stream_is_screened_as_a_recording_is(spoilt):
+    reading = {key: value for key, value in READING.items() if key != "rows"}
+    found = gmwm.calibrate_stream(spoilt, **READING)
+    whole = gmwm.calibrate(gmwm.read(spoilt, **reading))
+    for name, fit in whole.items():
+        assert found[name].valid and fit.valid
+        assert found[name].params.keys() == fit.params.keys()
+        for key, error in fit.stderr.items():
+            assert abs(found[name].params[key] - fit.params[key]) < 0.1 * error
+    assert found.is_examined
+    assert found.left_out["gyro_x"] == gmwm.health_stream(spoilt, **READING).events("gyro_x")
+    (line,) = [n for n in found.notices if n.code == "line" and n.where == "gyro_y"]
+    assert line.action == "a term of the model"
+    (event,) = [n for n in found.notices if n.code == "event"]
+    assert event.values["left_out"]
+    # As it is, shocks and lines are in the noise.
+    raw = gmwm.calibrate_stream(spoilt, MODEL, screening=(), **READING)
+    assert raw["gyro_x"].params["N"] > 2.0 * found["gyro_x"].params["N"]
+
+
+def test_a_channel_that_is_written_twice_or_moved_is_not_silent(tmp_path):
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=(60_000, 2)) * 1e-3
+    x[:, 1] = np.repeat(x[:30_000, 1], 2)
+    np.save(tmp_path / "twice.npy", x)
+    found = gmwm.calibrate_stream(tmp_path / "twice.npy", MODEL, **READING)
+    assert list(found) == ["gyro_x"]
+    assert found.skipped["gyro_y"].code == "repeated-samples"
+    x[45_000:47_000] += np.sin(0.01 * np.arange(2_000))[:, None]
+    np.save(tmp_path / "moved.npy", x[:, :1])
+    reading = {**READING, "channels": {"gyro_x": 0}}
+    moved = gmwm.calibrate_stream(tmp_path / "moved.npy", MODEL, **reading)
+    assert not moved["gyro_x"].valid
+    assert "not-static" in [notice.code for notice in moved.notices]
+    static = gmwm.calibrate_stream(tmp_path / "moved.npy", MODEL, still=False, **reading)
+    assert "not-static" not in [notice.code for notice in static["gyro_x"].notices]
+    with pytest.raises(InputError, match="screening for 'x' is unknown"):
+        gmwm.calibrate_stream(tmp_path / "moved.npy", MODEL, screening=("x",), **reading)
+
+
+def test_health_of_one_stretch_is_that_of_the_whole(spoilt):
+    reading = {key: value for key, value in READING.items() if key != "rows"}
+    whole = gmwm.health(gmwm.read(spoilt, **reading))
+    assert str(gmwm.health_stream(spoilt, **reading)) == str(whole)
 
 
 @pytest.mark.parametrize("size", [0.3, 10.0])
@@ -63,6 +145,18 @@ def test_the_command_reads_blocks_beyond_its_memory(file, tmp_path):
     assert sorted(stored["channels"]) == ["gyro_x", "gyro_y"]
     assert (tmp_path / "out" / "report.html").exists()
     refused = CliRunner().invoke(cli, [*asked, "--memory", "0.0005", "--start", "1"])
+    assert isinstance(refused.exception, InputError)
+    assert refused.exception.code == "memory"
+
+
+def test_health_beyond_memory_is_that_of_stretches(spoilt):
+    asked = ["health", str(spoilt), "--rate", "100", "--gyro-unit", "rad/s",
+             "--channel", "gyro_x=0", "--channel", "gyro_y=1", "--json"]  # fmt: skip
+    whole = json.loads(CliRunner().invoke(cli, asked).output)
+    asked += ["--memory", "0.001"]
+    found = json.loads(CliRunner().invoke(cli, asked).output)
+    assert found == whole  # one stretch of it
+    refused = CliRunner().invoke(cli, [*asked, "--start", "10"])
     assert isinstance(refused.exception, InputError)
     assert refused.exception.code == "memory"
 

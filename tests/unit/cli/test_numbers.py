@@ -40,14 +40,24 @@ def test_bound_prints_and_saves_what_python_gives(run, calibration, tmp_path):
 def test_options_reach_the_bound(run, calibration):
     code, printed, _ = run(
         "bound", calibration, "--form", "N+K+GM", "--level", 0.9, "--shared", "--gyro-bias", 0.01,
-        "--json",
+        "--tau", 2.5, "--json",
     )  # fmt: skip
     assert code == 0
     found = SensorNumbers.from_dict(json.loads(printed))
     assert found.shared
     assert found["gyro_x"].form == "N+K+GM"
+    assert found["gyro_x"].tau == (2.5,)
     assert found["gyro_x"].initial_sd >= 0.01 > found["accel_x"].initial_sd
     assert not any(n.code == "uncertainty-not-covered" for n in found.notices)
+
+
+def test_one_correlation_time_may_be_asked_for(run, calibration):
+    _, printed, _ = run("bound", calibration, "--form", "N+GM", "--tau", "shared", "--json")
+    found = SensorNumbers.from_dict(json.loads(printed))
+    assert found["gyro_x"].tau == found["accel_x"].tau
+    code, _, error = run("bound", calibration, "--form", "N+GM", "--tau", "one")
+    assert code == 2
+    assert "--tau one: write seconds" in error
 
 
 def test_the_bias_at_switch_on_is_asked_for(run, calibration):

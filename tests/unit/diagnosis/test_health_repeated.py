@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import gmwm
+from gmwm.diagnosis.repeated import held_share
 
 
 def held(times, n, seed=1, first=0, step=0.0):
@@ -97,3 +99,40 @@ def test_noise_is_not_interpolated(step):
     for values in (noise, np.cumsum(noise), noise + np.sin(np.arange(noise.size) / 9.0)):
         rec = gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "deg/s"})
         assert not gmwm.health(rec).of(code="interpolated")
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("law", ["normal", "laplace"])
+def test_chance_explains_equal_neighbours_of_rounded_noise(step, law):
+    for seed in range(10):
+        noise = getattr(np.random.default_rng(seed), law)(size=5000)
+        for values in (noise, np.cumsum(noise), lfilter(np.ones(4), [1.0], noise)):
+            assert held_share(np.rint(values / step) * step, step, 1.0) == (0.0, 0.0)
+        # As if the temperature changed a sensitivity: hardly two samples are of one lattice.
+        drifting = np.rint(noise / step) * step * (1.0 + 0.05 * np.sin(np.arange(5000) / 800.0))
+        share, _ = held_share(drifting, 0.0, 1.0)
+        assert share < 0.01
+
+
+@pytest.mark.parametrize(("step", "error"), [(0.0, 0.01), (0.1, 0.02), (0.5, 0.04)])
+def test_the_share_of_samples_written_again_is_found(step, error):
+    rng = np.random.default_rng(4)
+    noise = rng.normal(size=5000)
+    last = np.where(rng.random(5000) < 0.15, 0, np.arange(5000))
+    values = (np.rint(noise / step) * step if step else noise)[np.maximum.accumulate(last)]
+    share, chance = held_share(values, step, 1.0)
+    assert share == pytest.approx(0.15, abs=error)
+    assert chance == pytest.approx(0.85 * step / np.sqrt(4.0 * np.pi), abs=0.01)
+
+
+def test_a_sensor_that_is_held_keeps_the_samples_that_were_measured(record):
+    noise = np.random.default_rng(5).normal(size=5000)
+    values = noise.copy()
+    values[100:5000:40] = values[99:4999:40]
+    rec = record(gyro_x=values, gyro_y=noise)
+    found = gmwm.health(rec)
+    masked = found.masked(rec)
+    gone = np.isnan(masked["gyro_x"].values)
+    assert np.array_equal(np.flatnonzero(gone), np.arange(100, 5000, 40))
+    assert masked["gyro_y"].is_complete
+    assert found.channels["gyro_x"].held == pytest.approx(123 / 4999)

@@ -5,6 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
+from gmwm.diagnosis.samples import abrupt_end_notice
 
 SEEDS = range(60)
 
@@ -103,3 +104,40 @@ def test_every_other_sample_missing_is_survived(record):
     x[::2] = np.nan
     found = gmwm.health(record(gyro_x=x))
     assert "length" in kinds(found, "gyro_x")
+
+
+STEPS = (0.0, 0.1, 0.3, 1.0, 3.0)
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_noise_that_thins_out_has_no_abrupt_end(step):
+    rng = np.random.default_rng(8)
+    time = np.arange(5000)
+    laws = {
+        "gyro_x": rng.normal(size=5000),
+        "gyro_y": rng.standard_t(3, 5000),
+        "gyro_z": rng.laplace(size=5000) + 0.1 * np.cumsum(rng.normal(size=5000)),
+        "accel_x": np.cumsum(rng.normal(size=5000)),
+        "accel_y": rng.normal(size=5000) + 30.0 * np.sin(time / 40.0),
+        "accel_z": rng.normal(size=5000) + 0.01 * time,
+    }
+    for name, x in laws.items():
+        x = np.rint(x / step + 0.2) * step if step else x
+        assert abrupt_end_notice(name, "u", x, step, 1.0) is None
+
+
+@pytest.mark.parametrize("step", STEPS[:2])
+def test_the_ends_at_which_samples_are_cut_are_named(step):
+    x = white(100_000, 9) + 0.3 * np.sin(np.arange(100_000) / 500.0)
+
+    def ends(values):
+        found = abrupt_end_notice("gyro_x", "u", values, step, 1.0)
+        return found.severity, found.values["lowest"], found.values["highest"]
+
+    x = np.rint(x / step) * step if step else x
+    near = pytest.approx
+    assert ends(np.abs(x)) == ("bad", near(0.0, abs=1e-3), near(0.0, abs=1e-3))
+    assert ends((x + 1.5) % 3.0) == ("bad", near(0.0, abs=1e-3), near(3.0 - step, abs=1e-3))
+    assert ends(x[x < 1.45]) == ("bad", near(1.45, abs=0.06), near(1.45, abs=0.06))
+    # Samples that are sorted out beyond 2.2 deviations make the noise a tenth smaller at most.
+    assert ends(x[x < 2.25])[0] == "warning"

@@ -335,23 +335,24 @@ def test_kfgins(q):
     else:
         white, unit = np.array(noise["vrw"]) / 60.0, 1e-5
         sd, start = np.array(noise["abstd"]) * unit, np.array(content["initbastd"]) * unit
-    assert white**2 == pytest.approx(np.square(N[q]), rel=1e-5)
     # gi_engine.cpp: Qc = 2/tau sd^2, F = -1/tau, Phi = 1 + F dt, Qd = (Phi Q Phi' + Q) dt/2
     for i in range(3):
         phi, density = 1.0 - DT / tau, 2.0 / tau * sd[i] ** 2
         drive = 0.5 * (phi**2 + 1.0) * density * DT
         variance = simulated_bias(phi, drive, 0.0, round(5.0 * tau / DT))
         assert variance == pytest.approx(sd[i] ** 2, rel=1e-3)
-        # There is one tau: the process bounds that of the axis at all frequencies.
+        # There is one tau: the numbers bound those of the axis at all frequencies.
         f = np.logspace(-6, 1, 200)
-        spectrum = gmwm.GaussMarkov(sd[i], tau).psd(f, DT)
-        own = gmwm.GaussMarkov(SIGMA[q][i], TAU[q][i]).psd(f, DT)
-        assert np.all(spectrum >= own * (1.0 - 1e-5))
+        held = white[i] ** 2 + gmwm.GaussMarkov(sd[i], tau).psd(f, DT)
+        own = N[q][i] ** 2 + gmwm.GaussMarkov(SIGMA[q][i], TAU[q][i]).psd(f, DT)
+        assert np.all(held >= own * (1.0 - 1e-5))
+        assert np.min(held / own) < 1.0 + 1e-4
     initial = [numbers("N+GM")[f"{q}_{axis}"].initial_sd for axis in "xyz"]
     assert start == pytest.approx(np.hypot(sd, initial), rel=1e-5)
-    # As tight as one tau for all allows: the extremes pay the same.
-    taus = [*TAU["gyro"], *TAU["accel"]]
-    assert tau == pytest.approx(sqrt(min(taus) * max(taus)), rel=1e-5)
+    # As tight as one tau for all allows.
+    models = {name: each.model for name, each in numbers("N+GM").items()}
+    least = gmwm.bound(models, "N+GM", tau="shared")
+    assert tau == pytest.approx(least["gyro_x"].tau[0], rel=1e-5)
 
 
 def test_pyins():

@@ -1,5 +1,7 @@
 """Bounds: never too optimistic, no looser than need be, and honest about what they leave out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
+from gmwm.filter_numbers import judged
 from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.spectra import (
     Estimated,
@@ -65,11 +68,36 @@ def test_nor_after_a_long_time_with_aiding(name):
     assert worst_direction(TRUTHS[name], numbers, 1200.0) < WORST
 
 
+@pytest.mark.parametrize("tau", [None, 30.0])
 @pytest.mark.parametrize("name", STATIONARY)
-def test_nor_with_a_gauss_markov_process(name):
-    numbers = gmwm.bound(TRUTHS[name], "N+GM", 60.0)
+def test_nor_with_a_gauss_markov_process(name, tau):
+    numbers = gmwm.bound(TRUTHS[name], "N+GM", 60.0, tau=tau)
     assert numbers.initial_sd == 0.0
     assert worst_direction(TRUTHS[name], numbers, 60.0, every_fix=True) < WORST
+    if tau is not None:
+        assert numbers.tau == (tau,)
+
+
+def test_one_correlation_time_for_all_axes_is_the_one_that_costs_least():
+    truths = {f"gyro_{i}": TRUTHS[name] for i, name in enumerate(("one", "two", "three"))}
+    own = gmwm.bound(truths, "N+GM")
+    shared = gmwm.bound(truths, "N+GM", tau="shared")
+    (tau,) = {each.tau[0] for each in shared.values()}
+    for name, each in shared.items():
+        assert worst_direction(truths[name], each, 60.0, every_fix=True) < WORST
+        # N and sigma are found anew: a wider sigma alone costs far more.
+        other = own[name]
+        wide = other.sigma[0] * np.sqrt(max(tau / other.tau[0], other.tau[0] / tau))
+        wider = replace(other, model=WhiteNoise(other.N) + GaussMarkov(float(wide), tau))
+        assert judged(truths[name], wider).nees[60.0] < each.nees[60.0]
+
+    def cost(tau):
+        found = gmwm.bound(truths, "N+GM", tau=tau)
+        problems = (Problem((Target.of(truth, DT, 60.0),), 60.0) for truth in truths.values())
+        pairs = zip(problems, found.values(), strict=True)
+        return sum(problem.cost(term) for problem, each in pairs for term in each.model.terms)
+
+    assert cost(tau) < min(cost(0.8 * tau), cost(1.25 * tau))
 
 
 @pytest.mark.parametrize("name", TRUTHS)

@@ -16,6 +16,7 @@ OUTAGES = (10.0, 30.0, 60.0)
 SENSORS = {
     "one": ONE,
     "three": TRUTHS["three"],
+    "walk and one": WhiteNoise(7e-4) + RandomWalk(1.4e-5) + GaussMarkov(1.6e-4, 40.0),
     "other three": WhiteNoise(3e-4)
     + GaussMarkov(5e-4, 1.0)
     + GaussMarkov(2e-4, 40.0)
@@ -71,6 +72,15 @@ def test_a_search_of_another_kind_finds_little_more():
     options = {"initial_simplex": simplex, "maxfev": 100, "fatol": 1e-4, "xatol": 1e-2}
     again = minimize(cost, np.zeros(3), method="Nelder-Mead", options=options)
     assert cost(np.zeros(3)) - again.fun < 0.02
+
+
+def test_axes_may_share_a_correlation_time():
+    truths = {"gyro_z": SENSORS["walk and one"], "accel_x": ONE}
+    shared = gmwm.reduce(truths, "N+GM", tau="shared")
+    assert len({each.tau for each in shared.values()}) == 1
+    for each in shared.values():
+        assert all(0.9 < each.nees[time] < 1.1 for time in OUTAGES)
+    assert gmwm.reduce({"gyro_z": ONE}, "N+GM", tau=50.0)["gyro_z"].tau == (50.0,)
 
 
 def test_a_model_that_has_the_form_comes_back():
@@ -133,6 +143,9 @@ def test_a_turn_on_bias_is_part_of_the_start():
         ({"outages": ()}, "outages: give one length at least"),
         ({"outages": (10.0, -1.0)}, r"outage = -1\.0"),
         ({"outages": (10.0, 0.001)}, "outages = 0.001 s: give two sampling intervals or more"),
+        ({"tau": 60.0}, r"tau is that of one Gauss-Markov process, the form is N\+K"),
+        ({"form": "N+GM", "tau": "one"}, "tau = 'one'.*give a time in seconds, or 'shared'"),
+        ({"form": "N+GM", "tau": -1.0}, r"tau = -1\.0: give a time in seconds, or 'shared'"),
         ({"keyframe": 0.001}, "keyframe = 0.001 s: give two sampling intervals or more"),
         ({"bias_sd": float("nan")}, "bias_sd = nan"),
     ],

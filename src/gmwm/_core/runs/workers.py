@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import CancelledError
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from functools import cache
-from threading import Thread
+from contextvars import ContextVar
+from functools import cache, partial
+from importlib import import_module
+from multiprocessing import current_process
+from pickle import PicklingError
+from queue import SimpleQueue
+from threading import Lock, Thread
 from time import sleep
 from typing import Any, TypeVar
 
@@ -30,6 +35,9 @@ Done = Generator[tuple[T, R], None, None]
 
 ENDED = 3
 """Processes that may end at an item, before it is taken for the cause; Dask's own number."""
+
+PROCESSES = 2
+"""That share the work on one recording by default: each takes 200 MB."""
 
 _TOGETHER = 2  # times that an item may be among those at which a process ended; then it goes alone
 _WAITING = 2  # items that a process is given: the one at work, and the next
@@ -66,6 +74,101 @@ def results(
     if cluster is not None:
         return _on_cluster(work, items, cluster, given_up)
     return _here(work, items, jobs, given_up)
+
+
+def spare(jobs: int, items: int) -> int:
+    """How many processes beside this one are of use, of which ``jobs`` are to share the work.
+
+    Parameters
+    ----------
+    jobs : int
+        -1 for one a core.
+    items : int
+        That can be worked on side by side.
+    """
+    if current_process().name != "MainProcess":  # whoever started it has shared the cores out
+        return 0
+    cores = os.cpu_count() or 1
+    return max(min(cores if jobs == -1 else checks.whole("jobs", jobs, 1), cores, items) - 1, 0)
+
+
+_beside: ContextVar[tuple[Any, int]] = ContextVar("beside", default=(None, 0))
+"""The pool, and how many processes it has."""
+
+
+@contextmanager
+def beside(others: int, module: str) -> Iterator[None]:
+    """Processes for `shared` that end with the block, unless there are some already.
+
+    They import what they need while this process does something else.
+    """
+    if not others or _beside.get()[1]:
+        yield
+        return
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    try:
+        # None: they do not end while they wait for work, only with this block or this process.
+        pool = ProcessPoolExecutor(max_workers=others, timeout=None)
+        for _ in range(others):
+            pool.submit(_in_worker, import_module, module, os.getpid())
+    except (ImportError, OSError):  # a machine without semaphores, or one that lets none be started
+        yield
+        return
+    token = _beside.set((pool, others))
+    try:
+        yield
+    finally:
+        _beside.reset(token)
+        pool.shutdown(kill_workers=True)
+
+
+def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
+    """Do the work of every item, in any order, in this process and in those `beside` it.
+
+    Items, none of which is None, are drawn as work on them begins, in any thread. What cannot be
+    sent to a process, or was sent to one that ended, is done here.
+    """
+    left, lock, sent, received = iter(items), Lock(), 0, 0
+    pool, others = _beside.get()
+    ended: SimpleQueue[tuple[T, Future[tuple[T, R]] | None]] = SimpleQueue()
+
+    def drawn(to_send: bool) -> T | None:
+        nonlocal sent
+        with lock:
+            item = next(left, None)
+            sent += to_send and item is not None
+            return item
+
+    def send() -> None:
+        if (item := drawn(True)) is None:
+            return
+        try:
+            future = pool.submit(_in_worker, work, item, os.getpid())
+        except RuntimeError:  # a process ended: the pool is of no use
+            ended.put((item, None))
+        else:
+            future.add_done_callback(partial(receive, item))
+
+    def receive(item: T, future: Future[tuple[T, R]]) -> None:
+        ended.put((item, future))
+        send()
+
+    for _ in range(others):
+        send()
+    while True:
+        if ended.empty():
+            if (own := drawn(False)) is not None:
+                yield own, work(own)
+                continue
+            if received == sent:
+                return
+        item, future = ended.get()
+        received += 1
+        if future is None or isinstance(future.exception(), BrokenProcessPool | PicklingError):
+            yield item, work(item)
+        else:
+            yield item, future.result()[1]
 
 
 def _refused(item: Any) -> Any:

@@ -36,7 +36,9 @@ REASONS = {
     "rate-changes": "rate_constant",
     "rounding": "resolution_fine",
     "saturation": "within_range",
+    "abrupt-end": "within_range",
     "stuck": "samples_change",
+    "held": "samples_measured",
     "value-repeated": "samples_measured",
     "variance": "noise_steady",
     "step": "stationary",
@@ -203,8 +205,9 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
     discrepancy : float
         Relative error of the variances that was allowed for.
     failed : bool
-        Whether the chi-square test failed. If not, a misfit is bad that one in twenty right models
-        has at any level, and else a warning.
+        Whether the chi-square test failed. If not, a misfit is bad that fewer than one in twenty
+        right models have at any level: of six axes with right models nearly one would have a
+        smaller one, which is chance.
     """
     beyond = goodness.beyond_chance
     if beyond is None:
@@ -214,14 +217,14 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
     share = f"{100.0 * abs(misfit):.2g} %"
     if goodness.is_poor:
         side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
-        text = (
-            f"predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
-            f"model's Allan deviation, by {abs(residual):.2g} standard errors"
-        )
+        text = f"the data lie {share} {side} the model's Allan deviation"
         if failed or goodness.largest_p < tuning.POOR_P:
+            text = f"predictions over {tau:.3g} s are too {scale}: there {text}, by "
+            text += f"{abs(residual):.2g} standard errors"
             return [Notice("misfit", "bad", "", text, values)]
-        text += f", which {100.0 * goodness.largest_p:.0f} % of right models have at some level"
-        return [Notice("misfit", "warning", "", text, values)]
+        chance = f"{100.0 * goodness.largest_p:.0f} % of right models are missed as clearly"
+        text = f"at tau = {tau:.3g} s {text}, which is no more than chance: {chance} somewhere"
+        return [Notice("misfit", "note", "", text, values)]
     text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
     text += ", which the intervals allow for" if discrepancy > 0.0 else ""
     return [Notice("misfit", "note", "", text, values)]

@@ -4,6 +4,7 @@ from gmwm.filter_numbers.spectra.dominance import (
     KINDS as KINDS,
     TIGHTEST as TIGHTEST,
     Problem as Problem,
+    correlation_time as correlation_time,
     dominating as dominating,
     with_correlation_times as with_correlation_times,
 )

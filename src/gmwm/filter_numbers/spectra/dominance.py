@@ -42,11 +42,14 @@ class Problem:
     region : tuple of Target
         What has to be dominated, where that is not the targets alone, but all that lies between
         these.
+    lowest : float
+        Frequency from which on they are dominated, Hz; by default all are.
     """
 
     targets: tuple[Target, ...]
     horizon: float
     region: tuple[Target, ...] = ()
+    lowest: float = 0.0
     f: FloatArray = field(init=False)
     need: FloatArray = field(init=False)
     _averaging: FloatArray = field(init=False)
@@ -75,7 +78,8 @@ class Problem:
 
     def frequencies(self, points: int) -> FloatArray:
         """Those of all targets, some a decade; Hz."""
-        return np.unique(np.concatenate([t.frequencies(points) for t in self.dominated]))
+        f = np.unique(np.concatenate([t.frequencies(points) for t in self.dominated]))
+        return f[f >= self.lowest]
 
     def largest(self, f: FloatArray) -> FloatArray:
         """Largest of the spectra at frequencies (Hz), u^2/Hz."""
@@ -88,13 +92,15 @@ class Problem:
         return float(np.mean(variance / self._allan))
 
 
-def dominating(problem: Problem, form: str) -> Model:
+def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """The smallest model of a form whose spectrum lies above those of a problem.
 
     Parameters
     ----------
     problem : Problem
     form : {"N+K", "N+GM", "N+K+GM"}
+    tau : float, optional
+        Correlation time of the Gauss-Markov process, s; that of the smallest model by default.
 
     Raises
     ------
@@ -107,38 +113,54 @@ def dominating(problem: Problem, form: str) -> Model:
             f"{form} cannot dominate a model that walks off: its spectrum rises without limit "
             "towards zero frequency; use N+K or N+K+GM"
         )
-    plain: list[Process] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in kinds)
-    columns = columns_of(problem, plain)
+    plain = _plain(form)
     if "G" not in kinds:
-        return _scaled(problem, plain, solved(problem, columns)[0])
+        return _scaled(problem, plain, solved(problem, columns_of(problem, plain))[0])
+    tau = correlation_time([problem], form) if tau is None else tau
+    shares = _with_slow(problem, columns_of(problem, plain), [GaussMarkov(1.0, tau)])
+    return _scaled(problem, [*plain, GaussMarkov(1.0, tau)], shares[0])
 
-    def at(log_taus: FloatArray) -> tuple[list[Process], FloatArray]:
-        """Gauss-Markov processes of unit amplitude, and the shares with each of them."""
-        gauss: list[Process] = [GaussMarkov(1.0, float(tau)) for tau in np.exp(log_taus)]
-        slow = columns_of(problem, gauss).T[:, :, None]
-        fast = np.broadcast_to(columns, (len(gauss), *columns.shape))
-        return gauss, solved(problem, np.concatenate([fast, slow], axis=2))
 
-    grid = _correlation_times(problem)
-    costs = np.sum(at(grid)[1], axis=1)
+def correlation_time(problems: Sequence[Problem], form: str) -> float:
+    """The one for all of several problems that costs least over them, s."""
+    fast = [columns_of(problem, _plain(form)) for problem in problems]
+
+    def costs(log_taus: FloatArray) -> FloatArray:
+        gauss = [GaussMarkov(1.0, float(tau)) for tau in np.exp(log_taus)]
+        shares = [
+            _with_slow(each, columns, gauss) for each, columns in zip(problems, fast, strict=True)
+        ]
+        return np.asarray(np.sum(shares, axis=(0, 2)))
+
+    grid = np.unique(np.concatenate([_correlation_times(problem) for problem in problems]))
+    found = costs(grid)
     # Of several that are as good, the shortest: a slower one would only have a larger variance.
-    best = int(np.argmax(costs <= np.min(costs) * (1.0 + tuning.AS_GOOD)))
-    chosen = grid[best]
+    best = int(np.argmax(found <= np.min(found) * (1.0 + tuning.AS_GOOD)))
     around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
-    found = minimize_scalar(
-        lambda x: float(np.sum(at(np.array([x]))[1])), bounds=around, method="bounded",
+    refined = minimize_scalar(
+        lambda x: float(costs(np.array([x]))[0]), bounds=around, method="bounded",
         options={"xatol": 1e-3},
     )  # fmt: skip
-    if found.fun < costs[best] * (1.0 - tuning.AS_GOOD):
-        chosen = found.x
-    gauss, shares = at(np.array([chosen]))
-    return _scaled(problem, plain + gauss, shares[0])
+    is_less = refined.fun < found[best] * (1.0 - tuning.AS_GOOD)
+    return float(np.exp(refined.x if is_less else grid[best]))
+
+
+def _plain(form: str) -> list[Process]:
+    """What a form has beside a Gauss-Markov process, of unit amplitude."""
+    return [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in KINDS[form])
+
+
+def _with_slow(problem: Problem, fast: FloatArray, gauss: Sequence[Process]) -> FloatArray:
+    """Shares of the plain processes, by their columns, and of each of some slow ones with them."""
+    slow = columns_of(problem, gauss).T[:, :, None]
+    each = np.broadcast_to(fast, (len(gauss), *fast.shape))
+    return solved(problem, np.concatenate([each, slow], axis=2))
 
 
 def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -> Model:
     """The smallest model of a form that dominates with given correlation times, without zeros.
 
-    A spectrum without a limit at zero frequency is dominated down to the lowest frequency.
+    A spectrum without a limit at zero frequency is dominated from the lowest frequency on.
     """
     processes: list[Process] = [WhiteNoise(1.0)]
     if "K" in form.split("+"):

@@ -9,7 +9,7 @@ innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom. Control* 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 
@@ -19,8 +19,9 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.replay import Replay
+from gmwm.ins.filter import KINDS
 
-TESTS = 14
+TESTS = 15
 """Ways in which a log can contradict a filter, or be explained better: each gets its share of the
 probability of a false alarm."""
 
@@ -142,6 +143,68 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
         )  # fmt: skip
 
 
+def clock_step(base: Replay) -> Candidate | None:
+    """Stamps that are off by a constant from some fix on: a clock was set, or samples were lost.
+
+    The fix is looked for between parts of the log and where the innovations are largest, then
+    nearer and nearer.
+    """
+    positions = base.aiding.of("position")
+    if positions is None or positions.time.size < tuning.STEP_PARTS:
+        return None
+    time = positions.time
+
+    def at(i: int) -> Constant:
+        since = 0.5 * float(time[i - 1] + time[i])
+        return replace(_CLOCK, code="clock-step", change=lambda r, x: r.later(-float(x[0]), since))
+
+    def promised(i: int) -> float:
+        column = _columns(base, partial(at(i).change, base), _steps((_CLOCK,)), np.zeros(1))
+        return _step(base, column, (_CLOCK,), np.zeros(1))[2]
+
+    def gain(i: int, by: FloatArray) -> float:
+        return difference(at(i).change(base, by), base) if 0 < i < time.size else -np.inf
+
+    sizes = np.nan_to_num(base.innovations.nis[base.innovations.kind == KINDS["position"]])
+    far = np.flatnonzero(sizes > chi2.isf(LEVEL / sizes.size, 3))
+    parts = np.linspace(0, time.size, tuning.STEP_PARTS + 1)[1:-1]
+    starts = {1, *(int(i) for i in (*parts, *far[:1], np.argmax(sizes)) if 0 < i < time.size)}
+    gains = {i: promised(i) for i in sorted(starts)}
+    start = max(gains, key=gains.__getitem__)
+    if start == 1:
+        return None  # a constant offset is as good
+
+    def refined() -> tuple[Explanation, ...]:
+        best, by = start, np.zeros(1)
+        for reach in (time.size // tuning.STEP_PARTS, tuning.STEP_NEAR):
+            # By the step that fits there, which is wrong as long as the place is.
+            fitted = _fitted(base, base, (at(best),))
+            if not fitted:
+                return ()
+            by = np.array(list(fitted[0].values.values()))
+            while reach > 0:
+                nearer = max((best, best - reach, best + reach), key=lambda i: gain(i, by))
+                reach, best = reach // 2 if nearer == best else reach, nearer
+        (step,) = _fitted(base, base, (at(best),))
+
+        def edge(outside: int) -> int:
+            """The farthest fix that is as good for a start of the step: it may stand there."""
+            inside = best
+            while abs(outside - inside) > 1:
+                middle = (inside + outside) // 2
+                is_good = gain(middle, by) > step.gain - tuning.AMBIGUOUS
+                inside, outside = (middle, outside) if is_good else (inside, middle)
+            return inside
+
+        first, last = edge(0), edge(time.size)
+        if first == 1:
+            return ()
+        values = {**step.values, "after": float(time[first - 1]), "before": float(time[last])}
+        return (replace(step, cost=cost(1, time.size), values=values),)
+
+    return Candidate(frozenset({"clock-step"}), gains[start], refined)
+
+
 def far_heading(base: Replay) -> Candidate:
     """A heading that is wrong by much, as of an IMU that is mounted rotated."""
     angles = np.arange(1, tuning.HEADINGS) * (2.0 * np.pi / tuning.HEADINGS)
@@ -164,13 +227,13 @@ def wrong_signs(base: Replay) -> Iterator[Candidate]:
     for kind in ("gyro", "accel"):
         ways = list(product((1.0, -1.0), repeat=3))
         tried = [base.with_signs(kind, signs) for signs in ways]
-        gains = np.array([difference(each, base) for each in tried])
-        best = int(np.argmax(gains))
-        alike = np.array(ways)[gains > gains[best] - tuning.AMBIGUOUS]
+        likelihoods = np.array([each.log_likelihood for each in tried])
+        best = int(np.argmax(likelihoods))
+        alike = np.array(ways)[likelihoods >= likelihoods[best] - tuning.AMBIGUOUS]
         shown = np.where(np.all(alike == alike[0], axis=0), alike[0], 0.0)
         values = dict(zip(("x", "y", "z"), shown.tolist(), strict=True))
         change = partial(Replay.with_signs, kind=kind, signs=ways[best])
-        gain, price = float(gains[best]), cost(1, len(ways))
+        gain, price = difference(tried[best], base), cost(1, len(ways))
         found = Explanation("axis-signs", kind, change, tried[best], gain, price, values)
         yield Candidate(frozenset({"axis-signs"}), gain, partial(tuple, (found,)))
 
@@ -193,7 +256,7 @@ def _fitted(
         columns = _columns(here, changed, _steps(errors), theta)
         move, covariance, promised = _step(here, columns, errors, theta)
         tried = theta + move
-        if errors[0] is _CLOCK:
+        if errors[0].names == _CLOCK.names:
             tried[0] = np.clip(tried[0], -tuning.LARGEST_OFFSET, tuning.LARGEST_OFFSET)
         new = changed(tried)
         if not new.log_likelihood > here.log_likelihood:

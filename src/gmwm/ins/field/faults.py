@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from gmwm.ins.field.explanations import (
     LEVEL,
     Candidate,
     Explanation,
+    clock_step,
     constant_errors,
     cost,
     far_heading,
@@ -108,9 +109,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
         sizes = [here.test(kind).nis.value for kind in here.kinds()]
         if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
             found += [far_heading(here), *wrong_signs(here)]
-        slow = coloured(here)
-        if slow is not None:
-            found.append(slow)
+        found += [each for each in (clock_step(here), coloured(here)) if each is not None]
         found += [*fix_noise(here), *sensor_noise(here)]
     return [each for each in found if not each.codes & known]
 
@@ -153,10 +152,14 @@ _MOTION = {
 }
 
 
-def fault_notice(fault: Explanation) -> Notice:
-    """A fault as a notice: ``values`` holds what was estimated, SI, and standard errors."""
+def fault_notice(fault: Explanation, start: float = 0.0) -> Notice:
+    """A fault as a notice: ``values`` holds what was estimated, SI, and standard errors.
+
+    A step lies between times of a clock that shows ``start`` where the filter starts, s.
+    """
     values = {**fault.values, **{f"{name} error": each for name, each in fault.errors.items()}}
-    text, action = _WORDS[fault.code](fault)
+    values |= {name: values[name] + start for name in ("after", "before") if name in values}
+    text, action = _WORDS[fault.code](replace(fault, values=values))
     return Notice(fault.code, _severity(fault), fault.where, text, values, action)
 
 
@@ -193,6 +196,17 @@ def _time(fault: Explanation) -> tuple[str, str]:
         f"(standard error {fault.errors['time offset']:.1g} s)"
     )
     return text, "subtract it from their times" if offset > 0.0 else "add it to their times"
+
+
+def _step(fault: Explanation) -> tuple[str, str]:
+    offset, late = fault.values["time offset"], fault.values["time offset"] > 0.0
+    return (
+        f"between {fault.values['after']:.10g} s and {fault.values['before']:.10g} s the stamps of "
+        f"the fixes jump by {abs(offset):.3g} s {'forward' if late else 'back'} against the IMU "
+        f"(standard error {fault.errors['time offset']:.1g} s): a clock was set, or the IMU lost "
+        "samples",
+        f"{'subtract it from' if late else 'add it to'} their times from there on",
+    )
 
 
 def _arm(fault: Explanation) -> tuple[str, str]:
@@ -300,6 +314,7 @@ def _times(factor: float) -> str:
 
 _WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {
     "time-offset": _time,
+    "clock-step": _step,
     "lever-arm": _arm,
     "heading": _heading,
     "axis-signs": _signs,

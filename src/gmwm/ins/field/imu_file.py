@@ -253,7 +253,8 @@ def _fill(record: _Record) -> tuple[Notice, ...]:
                 raise InputError(
                     f"{record.source}: sample {begin + 1:,} of {name}, "
                     f"{begin * record.dt:.6g} s after the first, is missing, {end - begin:,} in "
-                    f"a row: up to {most} between others are filled; use the part before or after"
+                    f"a row: up to {most} between others are filled; use the part before or after, "
+                    "or take the step out of the times if a clock was set there"
                 )
             samples[begin:end] = np.interp(hole, [begin - 1, end], samples[[begin - 1, end]])
         rows.append(missing)

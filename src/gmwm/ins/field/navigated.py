@@ -128,7 +128,8 @@ class Navigated:
     @property
     def fault_notices(self) -> tuple[Notice, ...]:
         """Faults that were found, by code and values; what this motion would show of others."""
-        return tuple(map(fault_notice, self.faults.found))
+        start = float(self.clock(np.zeros(1))[0])
+        return tuple(fault_notice(each, start) for each in self.faults.found)
 
     @property
     def kinds(self) -> tuple[str, ...]:

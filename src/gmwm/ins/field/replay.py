@@ -111,12 +111,18 @@ class Replay:
 
     # -- other assumptions ------------------------------------------------------------------------
 
-    def later(self, seconds: float) -> Replay:
-        """Fixes with stamps as much later, the one that made the initial state too."""
-        fixes = tuple(replace(each, time=each.time + seconds) for each in self.aiding.fixes)
-        return replace(
-            self, state=self._where_at(-seconds), aiding=replace(self.aiding, fixes=fixes)
-        )
+    def later(self, seconds: float, since: float = -np.inf) -> Replay:
+        """Fixes with stamps as much later: all, with the one that made the initial state, or those
+        from a time on.
+        """
+        fixes = []
+        for each in self.aiding.fixes:
+            time = each.time + np.where(each.time >= since, seconds, 0.0)
+            order = np.argsort(time, kind="stable")
+            value, sd = each.value[order], each.sd[order]
+            fixes.append(replace(each, time=time[order], value=value, sd=sd))
+        state = self.state if since > -np.inf else self._where_at(-seconds)
+        return replace(self, state=state, aiding=replace(self.aiding, fixes=tuple(fixes)))
 
     def _where_at(self, seconds: float) -> NavState:
         """The initial state some time later; earlier if negative."""

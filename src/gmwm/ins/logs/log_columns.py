@@ -200,5 +200,6 @@ def check_rising(table: CsvTable, column: int, stamps: FloatArray) -> None:
         row = int(bad[0]) + 1
         what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
         raise InputError(
-            f"{place(table, column, row)}: time stamp {stamps[row]:.15g} {what}: take such rows out"
+            f"{place(table, column, row)}: time stamp {stamps[row]:.15g} {what}: take such rows "
+            "out or, if a clock was set there, the step"
         )

@@ -114,19 +114,19 @@ def read_blocks(
             since = seconds_of_day(since) if of_day and since is not None else since
             end = stamps[-1:]
         found = _on_the_grid(found, first, since, done)
-        done += next(iter(arrays.values())).size
+        done += _size(arrays)
         yield found
 
 
 def _segments(
     table: _Divisible, given: Given, rows: int
 ) -> Iterator[tuple[dict[int, FloatArray], FloatArray | None]]:
-    """Columns of some rows after others; a rest too short to tell a rate is joined to the last."""
+    """Columns of some rows after others; a rest of less than half as many is joined to the last."""
     roles = roles_of(table, given)
     wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
     held: dict[int, FloatArray] | None = None
     for arrays in table.segments(wanted, rows):
-        if held is not None and next(iter(arrays.values())).size < tuning.FEWEST_OF_BLOCK:
+        if held is not None and _is_rest(_size(arrays), _size(held), rows):
             arrays = {i: np.concatenate([held[i], values]) for i, values in arrays.items()}
             held = None
         if held is not None:
@@ -135,6 +135,15 @@ def _segments(
     if held is None:
         raise InputError(f"{table.source} holds no samples: record longer")
     yield held, None if roles.time is None else held[roles.time]
+
+
+def _is_rest(size: int, held: int, rows: int) -> bool:
+    """Whether so few rows go with those before them, which may not become many for it."""
+    return size < tuning.FEWEST_OF_BLOCK or (2 * size < rows and held <= rows)
+
+
+def _size(arrays: Mapping[int, FloatArray]) -> int:
+    return next(iter(arrays.values())).size
 
 
 def _on_the_grid(

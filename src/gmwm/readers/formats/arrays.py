@@ -8,6 +8,7 @@ rate.
 
 from __future__ import annotations
 
+import mmap
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -146,6 +147,8 @@ class ArrayTable:
         for begin in range(0, longest, rows):
             part = replace(self, arrays=tuple(array[begin : begin + rows] for array in self.arrays))
             yield part.load(columns)
+            for column in columns:
+                _release(self.arrays[column].like)
 
     def where(self, row: int) -> str:
         """Say which row."""
@@ -302,3 +305,12 @@ def _axes_or_itself(name: str, array: Array) -> list[_Column]:
     if _is_triad(name, array):
         return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]
+
+
+def _release(like: AnyArray) -> None:
+    """Let the memory go in which the pages of a file are mapped that were read."""
+    base: Any = like
+    while isinstance(base, np.ndarray):
+        base = base.base
+    if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):  # not on Windows
+        base.madvise(mmap.MADV_DONTNEED)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,9 @@ class StreamedRecording:
     notices: tuple[Notice, ...]
 
 
-def stream(path: Any, **reading: Any) -> StreamedRecording:
+def stream(
+    path: Any, *, prepare: Callable[[Recording], Recording] | None = None, **reading: Any
+) -> StreamedRecording:
     """Wavelet variances of a file of any length, read once, a block at a time.
 
     Parameters
@@ -50,6 +53,8 @@ def stream(path: Any, **reading: Any) -> StreamedRecording:
     path : str, path or table
         Delimited text, NPY, Parquet, Feather, a topic of a bag, `IMU` of ArduPilot or a binary
         layout; or a table in memory.
+    prepare : callable, optional
+        Called with each block: gives the samples of it that count, as `Health.masked` does.
     **reading
         The arguments of `gmwm.read`; ``rows`` of a block.
 
@@ -69,9 +74,11 @@ def stream(path: Any, **reading: Any) -> StreamedRecording:
     units = {c.name: c.unit if c.unit in SI_UNIT.values() else "" for c in first.inertial}
     variance = StreamingVariance(first.dt, units)
     missing = dict.fromkeys(names, 0)
-    _add(first, variance, missing)
-    for part in parts:
-        _add(part, variance, missing)
+    for part in chain([first], parts):
+        for name in names:
+            missing[name] += part[name].missing
+        used = part if prepare is None else prepare(part)
+        variance.update(np.stack([used[name].values for name in names], axis=1))
     results = variance.results()
     return StreamedRecording(
         variances={k: v for k, v in results.items() if isinstance(v, WaveletVariance)},
@@ -85,9 +92,3 @@ def stream(path: Any, **reading: Any) -> StreamedRecording:
         n=variance.n,
         notices=notices_of_blocks(first, missing, variance.n),
     )
-
-
-def _add(part: Recording, variance: StreamingVariance, missing: dict[str, int]) -> None:
-    for name in missing:
-        missing[name] += part[name].missing
-    variance.update(np.stack([part[name].values for name in missing], axis=1))

@@ -199,10 +199,11 @@ class TestEveryMethod:
         right = gmwm.fit(WhiteNoise() + GaussMarkov(), wv)
         assert right.valid and walk.goodness.loses_to(right.goodness)
 
-    def test_such_a_level_that_chance_makes_is_a_warning(self):
+    def test_such_a_level_that_chance_makes_is_a_note(self):
         fit = gmwm.fit(WhiteNoise(), WhiteNoise(1e-4).simulate(4000, 0.1, 14), dt=0.1)
         (notice,) = (each for each in fit.notices if each.code == "misfit")
-        assert notice.severity == "warning" and fit.goodness.is_poor and fit.valid
+        assert notice.severity == "note" and fit.goodness.is_poor and fit.valid
+        assert "chance" in notice.text
         assert 0.05 < fit.goodness.largest_p < 0.2
 
     def test_levels_are_judged_without_the_discrepancy_beyond_the_finest(self):

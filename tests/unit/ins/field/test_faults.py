@@ -61,6 +61,41 @@ def test_stamps_that_are_late_in_a_start_in_motion():
     assert navigated.faults.alternatives == ("lever-arm",)
 
 
+@pytest.mark.parametrize("vehicle", ["car", "loiter"])
+def test_a_clock_that_is_set_in_the_middle(vehicle):
+    """The sensor models, which are right, were blamed, or coloured fixes."""
+    log, _ = emulated_log(213, vehicle, duration=DURATION, rate=10.0, faults=("clock step",))
+    navigated = Navigated.of(replace(log, start=1000.0))
+    (fault,) = navigated.fault_notices
+    assert navigated.verdict.code == fault.code == "clock-step"
+    assert navigated.faults.explained
+    assert within(fault, "time offset", 1.0) < 0.05
+    # On the clock of the files; a car that stands there does not show when.
+    assert fault.values["after"] <= 1000.0 + DURATION / 2 < fault.values["before"]
+    assert fault.values["before"] - fault.values["after"] < (3.0 if vehicle != "car" else 30.0)
+
+
+def test_two_steps_of_a_clock_that_goes_back():
+    """Fixes half a second apart keep their order."""
+    log, _ = emulated_log(214, "helicopter", duration=DURATION, rate=10.0)
+
+    def stepped(fixes):
+        back = 0.4 * (fixes.time > 60.0) + 0.4 * (fixes.time > 110.0)
+        return replace(fixes, time=fixes.time - back)
+
+    log = replace(log, aiding=replace(log.aiding, fixes=tuple(map(stepped, log.aiding.fixes))))
+    first, second = Navigated.of(log).fault_notices
+    assert first.code == second.code == "clock-step"
+    for fault in (first, second):
+        within(fault, "time offset", -0.4)
+
+
+def test_a_filter_that_diverges_under_every_sign_shows_none():
+    """A fix 500 m off, without velocities: this ended in an error."""
+    navigated = found(7105, "one far", vehicle="loiter", velocity=True)
+    assert codes(navigated) == ["outliers"]
+
+
 @pytest.mark.parametrize(
     ("vehicle", "seed", "rate"),
     [("car", 202, 10.0), ("helicopter", 202, 10.0), ("helicopter", 1000, 20.0)],

@@ -1,0 +1,198 @@
+"""The health of a recording from that of its stretches, for recordings longer than memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.notices import SEVERITIES, Notice, worst_first
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.check import health
+from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
+from gmwm.diagnosis.samples import length_notice
+from gmwm.errors import InputError
+from gmwm.readers import read_blocks
+
+STRETCH = tuning.ROWS_OF_STRETCH
+
+_LARGEST = {"event": "height", "gap": "missing", "line": "amplitude", "resonance": "sigma"}
+"""The number by which one notice stands for those of its code in all stretches."""
+
+_ADDED = ("count", "samples", "missing")
+"""Numbers of these notices that are sums over stretches."""
+
+_SUMS = ("event", "gap", "saturation")
+
+
+@dataclass(frozen=True)
+class _Noticed:
+    """A notice, and the sample at which its stretch begins."""
+
+    notice: Notice
+    start: int
+
+
+def health_stream(path: Any, **reading: Any) -> Health:
+    """Find what is wrong with a recording that is longer than memory, read a stretch at a time.
+
+    Each stretch, of half a million samples, is examined as `gmwm.health` does; a notice stands for
+    those of one kind in all of them. A line or resonance is one of the channel if half of the
+    stretches have it. What changes from one stretch to the next only is not seen: slow drift,
+    tilt and temperature, for which `gmwm.calibrate_stream` looks beside the noise.
+
+    Parameters
+    ----------
+    path : str, path or table
+        As in `gmwm.stream`.
+    **reading
+        The arguments of `gmwm.read`; ``rows`` of a stretch.
+
+    Returns
+    -------
+    Health
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used, or not a block at a time.
+    """
+    reading.setdefault("rows", STRETCH)
+    return joined([health(part) for part in read_blocks(path, **reading)])
+
+
+def joined(found: Sequence[Health]) -> Health:
+    """The health of a recording from that of its consecutive stretches.
+
+    Parameters
+    ----------
+    found : sequence of Health
+
+    Returns
+    -------
+    Health
+        Itself, of one stretch.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not found:
+        raise InputError("there is no stretch to join: give one at least")
+    if len(found) == 1:
+        return found[0]
+    ends = np.cumsum([each.n for each in found]).tolist()
+    starts = [0, *ends[:-1]]
+    rate, names = found[0].rate, tuple(found[0].channels)
+    groups = _groups(found, starts)
+    notices = [_one_of(group, len(found), rate) for group in groups if not _falls(group, found)]
+    whole = [length_notice(ends[-1], rate), *(each for each in notices if not each.where)]
+    own = [each for name in names for each in worst_first([n for n in notices if n.where == name])]
+    return Health(
+        notices=(*worst_first(whole), *own),
+        channels={name: _facts([each.channels[name] for each in found], starts) for name in names},
+        source=found[0].source,
+        rate=rate,
+        n=ends[-1],
+    )
+
+
+def _groups(found: Sequence[Health], starts: Sequence[int]) -> list[list[_Noticed]]:
+    """Notices of one kind and place, in the order in which they are first made."""
+    groups: list[list[_Noticed]] = []
+    for each, start in zip(found, starts, strict=True):
+        for notice in each.notices:
+            group = next((group for group in groups if _alike(group[0].notice, notice)), None)
+            if group is None:
+                groups.append(group := [])
+            group.append(_Noticed(notice, start))
+    return groups
+
+
+def _alike(one: Notice, other: Notice) -> bool:
+    if (one.code, one.where) != (other.code, other.where):
+        return False
+    # Others than the strongest lines are counted together.
+    if one.code not in ("line", "resonance") or ("count" in one.values) != (
+        "count" in other.values
+    ):
+        return one.values.get("channels") == other.values.get("channels")
+    return "count" in one.values or _same(one.values["frequency"], other.values["frequency"])
+
+
+def _same(one: float, other: float) -> bool:
+    return abs(one / other - 1.0) < tuning.SAME_PEAK
+
+
+def _falls(group: Sequence[_Noticed], found: Sequence[Health]) -> bool:
+    """Whether nothing is left of it: a length, or a channel that is clean elsewhere only."""
+    code = group[0].notice.code
+    return code == "length" or (code == "clean" and len(group) < len(found))
+
+
+def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
+    """The worst notice of a group, with how many stretches have one."""
+    first = group[0].notice
+    at = len({each.start for each in group})
+    if at == stretches and all(each.notice.text == first.text for each in group):
+        return first
+    key = _LARGEST.get(first.code)
+
+    def rank(each: _Noticed) -> tuple[int, float]:
+        size = abs(float(each.notice.values.get(key, 0.0))) if key else 0.0
+        return SEVERITIES.index(each.notice.severity), -size
+
+    worst = min(group, key=rank)
+    start = worst.start / rate
+    text = (
+        f"{worst.notice.text} (stretch from {start:.6g} s, from which times count; {at} of "
+        f"{stretches} stretches have such)"
+    )
+    values = {**worst.notice.values, "stretch_start": start, "stretches": float(at)}
+    if first.code in _SUMS:
+        known = [name for name in _ADDED if name in values]
+        values |= {
+            name: sum(float(each.notice.values.get(name, 0.0)) for each in group) for name in known
+        }
+    return replace(worst.notice, text=text, values=values)
+
+
+def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHealth:
+    steps = [part.lsb for part in parts if part.lsb > 0.0]
+    times = [
+        Repetition(part.repetition.times, (start + part.repetition.first) % part.repetition.times)
+        for part, start in zip(parts, starts, strict=True)
+        if part.repetition is not None
+    ]
+    return ChannelHealth(
+        lines=tuple(_lasting([part.lines for part in parts])),
+        resonances=tuple(_lasting([part.resonances for part in parts])),
+        events=tuple(
+            (start + first, start + stop)
+            for part, start in zip(parts, starts, strict=True)
+            for first, stop in part.events
+        ),
+        lsb=min(steps, default=0.0),
+        outliers=float(np.mean([part.outliers for part in parts])),
+        held=float(np.mean([part.held for part in parts])),
+        repetition=times[0] if times else None,
+    )
+
+
+def _lasting(parts: Sequence[Sequence[tuple[float, float]]]) -> Iterator[tuple[float, float]]:
+    """Peaks of half of the stretches at least, with their mean frequency and second number."""
+    left = [[*peaks] for peaks in parts]
+    for peaks in left:
+        while peaks:
+            frequency, _ = peaks[0]
+            group = []
+            for others in left:
+                near = next((each for each in others if _same(each[0], frequency)), None)
+                if near is not None:
+                    others.remove(near)
+                    group.append(near)
+            if 2 * len(group) >= len(parts):
+                yield tuple(np.mean(group, axis=0).tolist())
