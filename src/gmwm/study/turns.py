@@ -55,7 +55,6 @@ def rotate(
         Where calibrations and finished runs are kept, so that work that was interrupted goes on.
     runs : int, optional
         Most stretches of each recording; by default all that do not overlap.
-    seed, jobs : int, optional
     earlier : {"resume", "replace", "refuse"}, optional
         What to do with what the folder holds.
     progress : callable, optional

@@ -97,10 +97,8 @@ def decode(
     ----------
     raw : sequence of bytes
         Messages as they are stored.
-    message : Message
     wanted : sequence of int
         Which of the numbers behind the header.
-    serialization : Serialization
     where : callable
         Index of a message -> where it is.
 
