@@ -22,8 +22,8 @@ from gmwm.errors import InputError
 _Bytes = npt.NDArray[np.uint8]
 _Integers = npt.NDArray[np.int64]
 
-ORIENTATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION = 0, 13, 25
-"""First number of each part of `sensor_msgs/Imu`; its covariance follows."""
+ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
+"""First number of these parts of `sensor_msgs/Imu`; their covariances follow."""
 
 
 @dataclass(frozen=True)
