@@ -56,7 +56,7 @@ def white_density(fitted: Fit) -> float:
     """
     tau = np.array([1.0, 2.0]) * max(tuning.REFERENCE_TIME, 4.0 * fitted.wv.dt)
     total = 0.0
-    low = tuning.LOW_FREQUENCY / tau[0] * np.array([1.0, 0.5])
+    low = tuning.LOW_FREQUENCY / tau
     for term in fitted.model.terms:
         if term.is_line:
             continue

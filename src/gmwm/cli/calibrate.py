@@ -251,7 +251,7 @@ def _is_shown(notice: Notice) -> bool:
     """How the file was read, and what may spoil the estimates; the report has the rest."""
     from gmwm.readers import READING
 
-    if notice.code in (*READING, "events-left-out"):
+    if notice.code in (*READING, "events-left-out", "streamed"):
         return True
     if notice.code == "length":
         return notice.severity != "good"

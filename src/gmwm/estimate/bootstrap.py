@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from gmwm._core.forms import Form
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Bootstrap(Document):
     """Estimates from simulated data.
 

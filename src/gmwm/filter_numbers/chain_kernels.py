@@ -65,6 +65,7 @@ def settle(
             J[n - 1] = 0.0
             J[:, n - 1] = 0.0
         if fix < out_P.shape[0]:
-            out_P[fix] = P[:n, :n]
-            out_J[fix] = J[:n, :n]
+            for i in range(n):
+                for j in range(n):
+                    out_P[fix, i, j], out_J[fix, i, j] = P[i, j], J[i, j]
     return P, J

@@ -102,6 +102,10 @@ HEADING_SD = math.radians(2.0)
 CHORD = 5.0
 """s between two fixes whose line is taken for a course: a turn is slower."""
 
+CHORD_ASIDE = 0.3
+"""Of its length, within which the fixes between lie, and the next one: starting from rest leaves a
+quarter, an outlier at one end two fifths or more."""
+
 COMPASS_SD = math.radians(5.0)
 """rad, beyond which the Earth's rotation gives no heading: a filter is linear up to some 10 deg."""
 

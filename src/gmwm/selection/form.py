@@ -17,7 +17,7 @@ class CandidateForm(Form):
     criterion: float
     objective: NotNegative
     chi_square: NotNegative
-    n_parameters: Annotated[int, Field(ge=0)]
+    n_parameters: Annotated[int, Field(ge=1)]
     dof: int
 
 

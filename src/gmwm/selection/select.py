@@ -12,7 +12,7 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError
-from gmwm.estimate import Data, Fit, JointFit, are_several, estimate
+from gmwm.estimate import Data, Fit, are_several, estimate
 from gmwm.estimate.result import fit_joint
 from gmwm.process import GaussMarkov, Model, Process, WhiteNoise
 from gmwm.selection import tuning
@@ -147,9 +147,7 @@ class Selection(Document, Printed):
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
         ranking = tuple(map(Candidate.from_dict, content["ranking"]))
-        fitted = content["fit"]
-        kind = JointFit if fitted["schema"] == JointFit.SCHEMA else Fit
-        return cls(ranking, ranking[content["chosen"]], kind.from_dict(fitted))
+        return cls(ranking, ranking[content["chosen"]], Fit.from_dict(content["fit"]))
 
     def __repr__(self) -> str:
         return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"

@@ -136,7 +136,8 @@ def coarse_moments(
             own = min(width, high - first)
             for r in range(rows):
                 place = start + r * _ROW + first
-                tile[r * own : (r + 1) * own] = integral[place : place + own]
+                for i in range(own):
+                    tile[r * own + i] = integral[place + i]
             for level in range(averaging.size):
                 m = averaging[level]
                 shift = m // _ROW * own

@@ -225,7 +225,7 @@ class Levels:
 
     def coefficients(self, *, level: bool = False) -> Iterator[FloatArray]:
         """The coefficients of each level, over all runs; without the series' line if ``level``."""
-        line = self.slope * (np.arange(self.runs.n) - 0.5 * (self.runs.n - 1)) if level else 0.0
+        line = self.slope * np.arange(self.runs.n) if level else 0.0
         if self.wavelet != "haar":
             yield from self._other_coefficients(self.values - line)
             return

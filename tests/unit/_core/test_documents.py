@@ -70,6 +70,7 @@ CASES = [
     ("health", "channels.gyro_x.events", [[5, 4]], "no interval of samples"),
     ("health", "channels.gyro_x.lines", [[1.0]], "channels.gyro_x.lines.0"),
     ("selection", "chosen", 99, "the chosen model is not in the ranking"),
+    ("selection", "ranking.0.n_parameters", 0, "ranking.0.n_parameters = 0"),
     ("selection", "ranking.0.dof", None, "ranking.0.dof = None"),
     ("bootstrap", "draws", [[1.0], [2.0]], "draws are not one value a key"),
     ("bound", "dt_s", -1.0, "dt_s = -1.0"),
@@ -159,3 +160,11 @@ def test_a_pipe_is_refused_before_it_is_opened(tmp_path):
         gmwm.load(path)
     with pytest.raises(InputError, match="pipe is a pipe or a device: write its content to a file"):
         gmwm.read(path)
+
+
+def test_the_chosen_model_is_one_of_the_ranking(stored, tmp_path):
+    content = stored["selection"].to_dict()
+    content["chosen"] = len(content["ranking"])
+    path = tmp_path / "stored.json"
+    path.write_text(json.dumps(content))
+    assert "the chosen model is not in the ranking" in refusal(path)

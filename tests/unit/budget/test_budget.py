@@ -363,3 +363,10 @@ def test_the_command_refuses(run, calibration, tmp_path):
         assert (code, printed) == (2, "")
         assert words in told
         assert told.count("\n") == 1
+
+
+def test_the_rows_of_both_axes_together_are_named_by_what_they_are(budget):
+    blocks = {part.split()[0]: part.splitlines()[-1] for part in str(budget).split("\n\n")[1:4]}
+    assert blocks["attitude"].split()[0] == "tilt"
+    for quantity in ("velocity", "position"):
+        assert blocks[quantity].strip().startswith("horizontal, radial")

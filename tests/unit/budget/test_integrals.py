@@ -389,3 +389,8 @@ def test_many_times_are_the_same_as_one_after_the_other():
         together = integral_rms(process, times, 0.02, known_start=False)
         apart = np.stack([rms(process, t, 0.02) for t in times], axis=1)
         np.testing.assert_allclose(together, apart, rtol=1e-6)
+
+
+def test_nothing_has_added_up_at_the_first_sample_of_a_noise_that_starts_at_zero():
+    found = integral_rms(BiasInstability(0.3), [0.05, 0.1], 0.05, known_start=False)
+    assert np.all(found[:, 0] == 0.0) and np.all(found[:, 1] > 0.0)

@@ -56,6 +56,7 @@ def test_a_step_is_found_with_its_size(size, seed):
         ("transient", np.exp(-TIME / 600.0), 600.0),
         ("drift-at-start", np.maximum(1.0 - TIME / 900.0, 0.0), 900.0),
         ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0), 1500.0),
+        ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0), 1500.0),
     ],
 )
 def test_other_departures_are_found(kind, curve, time):

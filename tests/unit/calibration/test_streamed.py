@@ -32,7 +32,7 @@ def test_models_are_those_of_the_whole(file):
         for key, error in fit.stderr.items():
             assert abs(found[name].params[key] - fit.params[key]) < 0.02 * error
     assert found.skipped.keys() == {"accel_z"}
-    assert found.n == 20_000
+    assert (found.n, found.rate) == (20_000, pytest.approx(100.0))
     assert [notice.code for notice in found.notices if notice.severity == "warning"] == ["streamed"]
     assert not found.is_examined
 

@@ -6,7 +6,7 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, Resonance, WhiteNoise
-from gmwm.diagnosis.events import find_events
+from gmwm.diagnosis.events import _LISTED, find_events
 from gmwm.diagnosis.innovations import innovations
 from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
@@ -149,3 +149,12 @@ def test_masking_another_recording_is_refused(record):
     for other in (record(gyro_y=np.zeros(600)), record(gyro_x=np.zeros(601))):
         with pytest.raises(InputError, match=r"is not the one that was examined"):
             found.masked(other)
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 6])
+def test_a_few_other_events_are_listed(record, count):
+    x = noise("white", 20_000, 6)
+    x[2000 * np.arange(1, count + 1)] += 20.0
+    (notice,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "event")
+    assert notice.values["count"] == count
+    assert ("others at" in notice.text) == (1 < count <= _LISTED + 1)

@@ -9,6 +9,7 @@ import pytest
 
 import gmwm
 from gmwm.diagnosis import find_still, rest_of
+from gmwm.diagnosis.still.loudness import loudness
 from gmwm.errors import InputError
 from gmwm.process import Resonance, WhiteNoise
 
@@ -197,3 +198,13 @@ def test_a_log_without_rest_is_refused_with_the_longest_stretch():
     assert caught.value.code == "no-rest"
     one = replace(recording, channels=recording.channels[:1])
     assert gmwm.calibrate(one, WhiteNoise(), still=False).n == recording.n
+
+
+def test_a_short_lull_does_not_make_the_rest_loud():
+    """Four seconds at a third of the noise are no level to compare with, forty are one."""
+    noise = np.random.default_rng(3).chisquare(24, (800, 1)) / 24.0
+    for blocks, found in ((16, 0), (160, 640)):
+        scatter = noise.copy()
+        scatter[:blocks] *= 0.1
+        loud = loudness(scatter, np.zeros(1)).loud
+        assert np.count_nonzero(loud) == pytest.approx(found, abs=5)

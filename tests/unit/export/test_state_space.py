@@ -115,3 +115,10 @@ def test_the_file_and_the_arrays_hold_the_same(tmp_path):
 def test_numbers_without_a_rate_have_no_samples():
     with pytest.raises(InputError, match="hold no sampling rate"):
         gmwm.export(numbers("N+K", rate=float("nan")), "state-space")
+
+
+def test_white_noise_alone_has_no_state():
+    found = channel(gmwm.process.as_model(WhiteNoise(2.0)), DT, "gyro")
+    for matrices in (found["discrete"], found["continuous"]):
+        assert matrices["F"].shape == matrices["P0"].shape == (0, 0)
+        assert matrices["H"].shape == (1, 0) and matrices["Q"].shape[0] == 0

@@ -203,7 +203,9 @@ def test_a_short_step(timed):
     assert found["gyro_x"].is_complete
 
 
-@pytest.mark.parametrize(("value", "astray"), [(0.48, 0), (0.2, 1), (-3.0, 1), (30.0, 1)])
+@pytest.mark.parametrize(
+    ("value", "astray"), [(0.48, 0), (0.465, 0), (0.455, 1), (0.2, 1), (-3.0, 1), (30.0, 1)]
+)
 def test_one_wild_stamp_does_no_harm(timed, value, astray):
     stamps = 0.01 * np.arange(80)
     stamps[49] = value

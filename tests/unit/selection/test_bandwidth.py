@@ -84,3 +84,15 @@ def test_a_moving_average_is_found_by_its_window(monkeypatch):
     assert found.free == AveragedNoise(window=0.07)
     monkeypatch.setattr(tuning, "BANDWIDTH_GAIN", 1e6)
     assert sensor_bandwidth(wv, (), 7.0) is None
+
+
+def test_a_bandwidth_pays_for_its_size_and_its_shape(monkeypatch):
+    # A filter that is hardly one gains between one and two times the price of both parameters.
+    wv = gmwm.wavelet_variance(filtered([1.0, 0.187], [1.0], 1, n=20_000), dt=DT)
+    gains = {}
+    for gain in (tuning.BANDWIDTH_GAIN, 0.5 * tuning.BANDWIDTH_GAIN):
+        monkeypatch.setattr(tuning, "BANDWIDTH_GAIN", gain)
+        gains[gain] = sensor_bandwidth(wv, (), 7.0)
+    taken, half = gains.values()
+    assert taken is None
+    assert half is not None and half.n_shapes == 1

@@ -8,6 +8,8 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.problem import Slope
+from gmwm.selection.ranking import candidate_of
+from gmwm.selection.select import _chosen
 from gmwm.selection.ties import ramp_or_walk
 
 
@@ -45,3 +47,13 @@ def test_ramp_or_walk_names_the_slow_term():
     slow = replace(fit, model=WhiteNoise(1e-3) + GaussMarkov(1e-4, 500.0))
     assert "Gauss-Markov term of tau = 500 s" in ramp_or_walk(slow, Slope(1e-7, 1e-16)).text
     assert "too slow" in ramp_or_walk(fit, Slope(1e-7, 1e-16)).text
+
+
+def test_where_no_candidate_is_supported_the_part_that_is_takes_its_place():
+    wv = gmwm.wavelet_variance(
+        (WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)).simulate(8192, 1.0, 3), dt=1.0
+    )
+    too_large = gmwm.fit(WhiteNoise() + GaussMarkov() + RandomWalk(), wv)
+    assert not too_large.valid
+    candidate, fit = _chosen((candidate_of(too_large),), wv)
+    assert fit.valid and candidate.model.title() == "white noise + Gauss-Markov"

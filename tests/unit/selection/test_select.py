@@ -1,5 +1,6 @@
 """Model choice: the right size where the data can tell, nothing invented where they cannot."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
@@ -187,3 +188,14 @@ def test_a_ramp_that_no_walk_explains_is_chosen():
     for seed in range(2):
         selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
         assert selection.model.title() == "white noise + rate ramp"
+
+
+def test_a_model_of_several_recordings_is_loaded_with_all_of_them():
+    parts = [
+        gmwm.wavelet_variance(WhiteNoise(1.0).simulate(500, 1.0, seed), dt=1.0) for seed in (1, 2)
+    ]
+    selection = gmwm.select(parts, max_gauss_markov=0)
+    again = type(selection).from_dict(json.loads(json.dumps(selection.to_dict())))
+    assert [part.params for part in again.fit.parts] == [
+        part.params for part in selection.fit.parts
+    ]

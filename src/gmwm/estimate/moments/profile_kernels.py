@@ -68,6 +68,7 @@ def projected(
     at = 0
     for k in range(x.size):
         if x[k] > 0.0:
-            present[:, at] = columns[:, k]
+            for i in range(rows):
+                present[i, at] = columns[i, k]
             at += 1
     return orthogonal_to(weighted, present)

@@ -2,7 +2,8 @@
 
 Levenberg's and Marquardt's method with a region of trust, as Moré (1978, *Numerical Analysis*,
 Lecture Notes in Mathematics 630, 105-116) has it and MINPACK's ``lmder`` does it. A step takes some
-20 microseconds, of which Python would make a fifth of a millisecond.
+20 microseconds, of which Python would make a fifth of a millisecond. Loops stand in place of
+expressions of whole arrays and of slices, which take numba seconds to compile.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ def _curves(
         found = shaped_curve(kinds[s], _shape(z, s, terms, shapes), levels)
         if found.size == 0:
             return False, curves
-        curves[:, places[s]] = found
+        for j in range(found.size):
+            curves[j, places[s]] = found[j]
     return True, curves
 
 
@@ -70,9 +72,14 @@ def _slopes(
     for s in range(kinds.size):
         closed = shaped_slope(kinds[s], _shape(z, s, terms, shapes), levels)
         if closed.size:
-            slopes[:, first[s]] = closed
+            for j in range(rows):
+                slopes[j, first[s]] = closed[j]
             continue
-        for at in range(first[s], first[s] + np.sum(free[s])):
+        at = first[s] - 1
+        for k in range(free.shape[1]):
+            if not free[s, k]:
+                continue
+            at += 1
             moved[at] = z[at] + _STEP
             above = shaped_curve(kinds[s], _shape(moved, s, terms, shapes), levels)
             moved[at] = z[at] - _STEP
@@ -80,7 +87,8 @@ def _slopes(
             moved[at] = z[at]
             if above.size == 0 or below.size == 0:
                 return False, slopes
-            slopes[:, at] = (above - below) / (2.0 * _STEP)
+            for j in range(rows):
+                slopes[j, at] = (above[j] - below[j]) / (2.0 * _STEP)
     return True, slopes
 
 
@@ -117,7 +125,8 @@ def _triangular(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, Floa
         a[k, k] = norm
     r = np.zeros((count, count))
     for k in range(count):
-        r[k, k:] = a[k, k:]
+        for j in range(k, count):
+            r[k, j] = a[k, j]
     return r, b[:count]
 
 
@@ -138,10 +147,11 @@ def _back(r: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @compiled()
-def _forward(r: FloatArray, b: FloatArray) -> FloatArray:
-    """R'^-1 b."""
-    x = b.copy()
-    for k in range(b.size):
+def _forward(r: FloatArray, scale: FloatArray, step: FloatArray, length: float) -> FloatArray:
+    """R'^-1 D^2 x / |D x|."""
+    x = np.zeros(step.size)
+    for k in range(step.size):
+        x[k] = scale[k] * (scale[k] * step[k]) / length
         for j in range(k):
             x[k] -= r[j, k] * x[j]
         x[k] /= r[k, k]
@@ -157,13 +167,41 @@ def _norm(x: FloatArray) -> float:
 
 
 @compiled()
+def _length(scale: FloatArray, x: FloatArray) -> float:
+    total = 0.0
+    for k in range(x.size):
+        total += (scale[k] * x[k]) * (scale[k] * x[k])
+    return math.sqrt(total)
+
+
+@compiled()
+def _moved_by(r: FloatArray, x: FloatArray) -> float:
+    """|R x|."""
+    total = 0.0
+    for k in range(x.size):
+        row = 0.0
+        for j in range(k, x.size):
+            row += r[k, j] * x[j]
+        total += row * row
+    return math.sqrt(total)
+
+
+@compiled()
+def _inside(z: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    found = z.copy()
+    for k in range(z.size):
+        found[k] = min(max(z[k], low[k]), high[k])
+    return found
+
+
+@compiled()
 def _damped(
     r: FloatArray, b: FloatArray, scale: FloatArray, radius: float, damping: float, is_full: bool
 ) -> tuple[FloatArray, float]:
     """The step of least squares within a radius, and the damping that keeps it there (Moré)."""
     count = b.size
     x = _back(r, b)
-    length = _norm(scale * x)
+    length = _length(scale, x)
     beyond = length - radius
     if beyond <= _NEAR * radius:
         return x, 0.0
@@ -173,7 +211,7 @@ def _damped(
             if r[k, k] == 0.0:
                 is_full = False
     if is_full:
-        least = beyond / radius / _norm(_forward(r, scale * (scale * x) / length)) ** 2
+        least = beyond / radius / _norm(_forward(r, scale, x, length)) ** 2
     gradient = np.zeros(count)
     for k in range(count):
         for j in range(k + 1):
@@ -190,21 +228,20 @@ def _damped(
     for rounds in range(10):
         if damping == 0.0:
             damping = max(_TINY, 0.001 * most)
-        stacked[:] = 0.0
-        right[:] = 0.0
-        stacked[:count] = r
-        right[:count] = b
         for k in range(count):
+            right[k] = b[k]
+            for j in range(count):
+                stacked[k, j] = r[k, j]
             stacked[count + k, k] = math.sqrt(damping) * scale[k]
         s, c = _triangular(stacked, right)
         x = _back(s, c)
-        length = _norm(scale * x)
+        length = _length(scale, x)
         before, beyond = beyond, length - radius
         if abs(beyond) <= _NEAR * radius or rounds == 9:
             break
         if least == 0.0 and beyond <= before and before < 0.0:
             break
-        correction = beyond / radius / _norm(_forward(s, scale * (scale * x) / length)) ** 2
+        correction = beyond / radius / _norm(_forward(s, scale, x, length)) ** 2
         if beyond > 0.0:
             least = max(least, damping)
         elif beyond < 0.0:
@@ -254,7 +291,7 @@ def refined(
     rows, count = target.size, z.size
     z = z.copy()
     nothing = np.zeros(0)
-    known, curves = _curves(np.minimum(np.maximum(z, low), high), terms, shapes, fixed, levels)
+    known, curves = _curves(_inside(z, low, high), terms, shapes, fixed, levels)
     if not known:
         return False, z, nothing, 0.0
     columns, x, residual = profiled(root, curves, linear, given, target)
@@ -263,42 +300,55 @@ def refined(
     scale = np.zeros(count)
     is_first, is_over = True, False
     while not is_over:
-        inside = np.minimum(np.maximum(z, low), high)
+        inside = _inside(z, low, high)
         known, slopes = _slopes(inside, terms, shapes, rows, levels)
         if not known:
             return False, z, nothing, 0.0
-        jacobian = projected(root, columns, x, slopes, x[owners])
-        lengths = np.zeros(count)
+        lengths, along, factor = np.zeros(count), np.zeros(count), np.zeros(count)
         for k in range(count):
-            lengths[k] = _norm(jacobian[:, k])
+            factor[k] = x[owners[k]]
+        jacobian = projected(root, columns, x, slopes, factor)
+        for k in range(count):
+            for j in range(rows):
+                lengths[k] += jacobian[j, k] * jacobian[j, k]
+                along[k] += jacobian[j, k] * residual[j]
+            lengths[k] = math.sqrt(lengths[k])
         if is_first:
             for k in range(count):
                 scale[k] = lengths[k] if lengths[k] > 0.0 else 1.0
-            length = _norm(scale * z)
+            length = _length(scale, z)
             radius = _FACTOR * length if length > 0.0 else _FACTOR
         steepest = 0.0
         if norm > 0.0:
             for k in range(count):
                 if lengths[k] > 0.0:
-                    along = np.sum(jacobian[:, k] * residual)
-                    steepest = max(steepest, abs(along) / (norm * lengths[k]))
+                    steepest = max(steepest, abs(along[k]) / (norm * lengths[k]))
         if steepest <= gtol:
             break
-        scale = np.maximum(scale, lengths)
         # Coordinates that change nothing stay where they are.
-        active = np.flatnonzero(lengths > 0.0)
-        is_full = active.size == count
-        r, b = _triangular(jacobian[:, active], residual)
-        own = scale[active]
+        size = 0
+        for k in range(count):
+            scale[k] = max(scale[k], lengths[k])
+            size += lengths[k] > 0.0
+        is_full = size == count
+        active, own, moving = np.zeros(size, np.int64), np.zeros(size), np.zeros((rows, size))
+        at = 0
+        for k in range(count):
+            if lengths[k] > 0.0:
+                active[at], own[at] = k, scale[k]
+                for j in range(rows):
+                    moving[j, at] = jacobian[j, k]
+                at += 1
+        r, b = _triangular(moving, residual)
         while True:
             step, damping = _damped(r, b, own, radius, damping, is_full)
             moved = z.copy()
             for k in range(active.size):
                 moved[active[k]] += step[k]
-            size = _norm(own * step)
+            step_length = _length(own, step)
             if is_first:
-                radius = min(radius, size)
-            inside = np.minimum(np.maximum(moved, low), high)
+                radius = min(radius, step_length)
+            inside = _inside(moved, low, high)
             known, curves = _curves(inside, terms, shapes, fixed, levels)
             if not known:
                 return False, z, nothing, 0.0
@@ -306,7 +356,7 @@ def refined(
             evaluations += 1
             new_norm = _norm(new_residual)
             gained = 1.0 - (new_norm / norm) ** 2 if _NEAR * new_norm < norm else -1.0
-            straight, damped = _norm(r @ step) / norm, math.sqrt(damping) * size / norm
+            straight, damped = _moved_by(r, step) / norm, math.sqrt(damping) * step_length / norm
             expected = straight**2 + 2.0 * damped**2
             slope = -(straight**2 + damped**2)
             ratio = gained / expected if expected != 0.0 else 0.0
@@ -314,17 +364,17 @@ def refined(
                 part = 0.5 if gained >= 0.0 else 0.5 * slope / (slope + 0.5 * gained)
                 if _NEAR * new_norm >= norm or part < 0.1:
                     part = 0.1
-                radius = part * min(radius, size / 0.1)
+                radius = part * min(radius, step_length / 0.1)
                 damping /= part
             elif damping == 0.0 or ratio >= 0.75:
-                radius = size / 0.5
+                radius = step_length / 0.5
                 damping *= 0.5
             if ratio >= 1e-4:
                 z, columns, x, residual, norm = moved, new_columns, new_x, new_residual, new_norm
-                length = _norm(scale * z)
+                length = _length(scale, z)
                 is_first = False
             is_small = abs(gained) <= ftol and expected <= ftol and 0.5 * ratio <= 1.0
             is_over = is_small or radius <= xtol * length or evaluations >= most or norm == 0.0
             if is_over or ratio >= 1e-4:
                 break
-    return True, np.minimum(np.maximum(z, low), high), x, norm**2
+    return True, _inside(z, low, high), x, norm**2

@@ -113,7 +113,7 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
     rejected = np.zeros(count, dtype=np.bool_)
     basis, upper = np.zeros((most, rows)), np.zeros((most, most))
     rest = np.zeros((most + 1, rows))
-    size = 0
+    size = np.int64(0)  # numba compiles a callee anew for a literal number
     residual = y.copy()
     length = 0.0
     for i in range(rows):
@@ -156,13 +156,13 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
                 break
             for p in range(size):
                 x[order[p]] += step * (solution[p] - x[order[p]])
-            kept, first = 0, size
+            kept, first = np.int64(0), size
             for p in range(size):
                 j = order[p]
                 if p == at or x[j] <= 0.0:
                     x[j] = 0.0
                     is_passive[j] = False
-                    first = min(first, p)
+                    first = min(first, np.int64(p))
                 else:
                     order[kept] = j
                     kept += 1
@@ -213,7 +213,10 @@ def solve_columns(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, Float
 def _each(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
     rows, count = columns.shape
     together = np.empty((rows, count + 1))
-    together[:, :count] = _unit(columns)[0]
+    unit = _unit(columns)[0]
+    for i in range(rows):
+        for j in range(count):
+            together[i, j] = unit[i, j]
     others = _unit(candidates)[0]
     result = np.zeros(candidates.shape[1])
     for g in range(result.size):

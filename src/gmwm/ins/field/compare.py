@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.distributions import norm
+from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice
 from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
@@ -140,7 +140,8 @@ class Comparison:
     def _beyond(self) -> float:
         """How much more than what matters the logarithm of a ratio must be to be found."""
         error = max(pair.error for pair in self.pairs.values())
-        return error * float(norm.isf(tuning.ACCURACY_LEVEL) + norm.ppf(tuning.POWER))
+        least = student.isf(tuning.ACCURACY_LEVEL, len(self.outages) - 1)
+        return error * float(least + norm.ppf(tuning.POWER))
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types."""

@@ -115,11 +115,21 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
 
 
 def _best(candidates: list[Candidate]) -> list[tuple[Explanation, ...]]:
-    """The most probable explanations, best first."""
+    """The most probable explanations, best first; a fault of the log before one of the sensors that
+    is hardly more probable.
+    """
     promising = [each for each in candidates if each.gain > cost(1)]
     promising = sorted(promising, key=lambda each: -each.gain)[: tuning.REFINED]
     refined = [each.refined() for each in promising]
-    return sorted((each for each in refined if each), key=lambda each: -each[0].excess)
+    found = sorted((each for each in refined if each), key=lambda each: -each[0].excess)
+    if not found:
+        return []
+    least = max(found[0][0].excess - tuning.AMBIGUOUS, 0.0)
+
+    def is_second(each: tuple[Explanation, ...]) -> bool:
+        return each[0].code.startswith("sensor-") or not each[0].excess > least
+
+    return sorted(found, key=is_second)
 
 
 def _cleaned_again(

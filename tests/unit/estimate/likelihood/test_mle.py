@@ -23,6 +23,7 @@ from gmwm import (
 from gmwm.errors import InputError
 from gmwm.estimate import METHODS
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, defined
+from gmwm.estimate.likelihood.mle import _rescaled
 from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.likelihood.starts import candidates
 from gmwm.estimate.result.fit import Fit
@@ -510,3 +511,13 @@ def test_hardly_any_sample_is_refused():
         with pytest.raises(InputError, match="infinite samples, the first at index 1"):
             gmwm.fit(WhiteNoise(), x, 1.0, method=method)
         x[1] = np.nan
+
+
+@pytest.mark.parametrize("given", [0.5, None], ids=["given", "open"])
+def test_a_start_has_the_likelihood_that_it_is_chosen_by(given):
+    """All variances are scaled together, but not where one of them is given."""
+    x = (WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)).simulate(500, 1.0, 1)
+    model = as_model(WhiteNoise(given) + GaussMarkov(tau=20.0))
+    series = Series.of(model, as_channel(x, 1.0), None, gaps=True)
+    height, moved = _rescaled(series.start, series)
+    assert height == pytest.approx(defined(KalmanLikelihood(series.columns), moved), rel=1e-9)

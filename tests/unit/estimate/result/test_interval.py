@@ -7,6 +7,7 @@ from scipy.stats import chi2, norm
 
 from gmwm import GaussMarkov, Model, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.estimate.problem.information import error_growth
+from gmwm.estimate.result.estimate import estimates_of
 from gmwm.estimate.result.interval import confidence_interval
 from gmwm.process.parameter import Parameter
 
@@ -94,3 +95,11 @@ def test_a_walk_that_stands_out_more_is_known_better():
 def test_a_line_has_no_growth():
     model = WhiteNoise(N=1.0) + Sinusoid(amplitude=0.5, frequency=0.1)
     assert error_growth(model, ["N", "sinusoid_amplitude"], 1000, 1.0) == {}
+
+
+@pytest.mark.parametrize(("sigma", "kind"), [(0.0, "undefined"), (1.0, "fixed")])
+def test_a_given_shape_is_fixed_where_its_term_is_there(sigma, kind):
+    model = WhiteNoise(1.0) + GaussMarkov(sigma, 10.0)
+    rows = {row.key: row for row in estimates_of(model, "", {"N": 0.1}, {"N": (0.9, 1.1)}, {})}
+    assert rows["tau"].kind == kind
+    assert rows["N"].kind == "estimated"

@@ -1,6 +1,7 @@
 """One model for several recordings."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy.stats import kstest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.result import fit_joint
 from gmwm.variance.pooled import PooledVariance
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)
@@ -124,3 +126,17 @@ def test_what_does_not_belong_together_is_refused():
         gmwm.fit(WhiteNoise() + RateRamp(), [one, one])
     with pytest.raises(gmwm.InputError, match="no recording"):
         PooledVariance.of([])
+
+
+def test_a_recording_may_determine_more_than_all_of_them_together():
+    """A walk is not significant in all recordings together: the other parameters are compared."""
+    model, parts = (
+        WhiteNoise() + RandomWalk(),
+        recordings([3000, 3000], 5, WhiteNoise(1.0) + RandomWalk(0.05)),
+    )
+    whole = gmwm.fit(model, PooledVariance.of(parts))
+    bounded = replace(whole, upper_bounds={"K": 0.1})
+    joint = fit_joint(model, parts, gmwm.fit, bounded)
+    assert all("K" not in part.upper_bounds for part in joint.parts)
+    assert 0.0 < joint.equality_p <= 1.0
+    assert joint.spread.keys() == {"N"}

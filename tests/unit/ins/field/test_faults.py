@@ -135,6 +135,13 @@ def test_coloured_fixes():
     assert 10.0 < fault.values["tau"] < 300.0
 
 
+def test_a_fault_of_the_log_comes_before_one_of_the_sensors_that_is_as_probable():
+    """White noise of the gyros times 88 was named, and coloured fixes beside it."""
+    navigated = found(7111, "coloured", vehicle="loiter", velocity=False)
+    assert codes(navigated) == ["coloured"]
+    assert navigated.faults.alternatives == ("sensor-white-noise",)
+
+
 def test_fixes_between_samples_are_no_fault():
     assert found(204, "off-grid").verdict.code == "consistent"
 
@@ -143,6 +150,14 @@ def test_one_fix_far_off():
     (fault,) = found(205, "one far").fault_notices
     assert (fault.code, fault.where) == ("outliers", "position")
     assert fault.values["count"] == 1.0
+
+
+@pytest.mark.parametrize(("vehicle", "seed"), [("helicopter", 7113), ("car", 7109)])
+def test_outliers_give_no_course(vehicle, seed):
+    """Of positions alone: the filter started from the line to an outlier, and was lost."""
+    navigated = found(seed, "outliers", vehicle=vehicle, velocity=False)
+    assert codes(navigated) == ["outliers"]
+    assert navigated.faults.explained
 
 
 def test_outliers_are_counted():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from gmwm.errors import InputError
 from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
+from gmwm.ins.field.replay import innovation_sizes
+from gmwm.ins.filter.aiding import KINDS
 from gmwm.ins.geometry.earth import ned_difference
 from gmwm.ins.spec.sensor_terms import sensor_models
 
@@ -314,3 +317,12 @@ def test_the_longest_time_without_a_fix_ends_at_a_fix_between_two_samples(tmp_pa
     assert found.hole.distance is not None
     assert found.hole.end - found.hole.start == pytest.approx(20.0)
     assert "nan" not in str(found)
+
+
+def test_innovations_of_one_kind_are_judged_by_themselves():
+    kind = np.array([KINDS["position"], KINDS["velocity"]] * 50)
+    standard = np.random.default_rng(1).standard_normal((100, 3))
+    for name in ("position", "velocity"):
+        wild = np.where((kind != KINDS[name])[:, None], 30.0, 1.0) * standard
+        one, other = (SimpleNamespace(kind=kind, standard=each) for each in (standard, wild))
+        assert innovation_sizes(one, name) == innovation_sizes(other, name)

@@ -104,3 +104,8 @@ def test_shapes_are_kept() -> None:
     assert offset(one, np.zeros((4, 3))).shape == (4, 3)
     assert offset(many, np.zeros(3)).shape == (4, 3)
     np.testing.assert_array_equal(offset(many, np.zeros(3)), many)
+
+
+def test_the_way_to_a_place_far_below_is_that_at_half_of_the_height() -> None:
+    here, ned = np.array([0.7, 0.2, 12_000.0]), np.array([20_000.0, -30_000.0, 11_000.0])
+    np.testing.assert_allclose(ned_difference(offset(here, ned), here), ned, rtol=1e-6)

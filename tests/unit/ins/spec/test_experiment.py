@@ -158,3 +158,10 @@ def test_every_key_is_documented() -> None:
     example = page.split("As a file:")[1].split("```")[1]
     for name in MeasuredSpec.model_fields:
         assert f"\n{name}:" in example
+
+
+def test_a_key_that_is_there_twice_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text("trajectory: car\nrate: 100\nrate: 200\n", "utf-8")
+    with pytest.raises(InputError, match="line 3: 'rate' is there twice"):
+        read_document(path)

@@ -74,20 +74,31 @@ def _from_velocity(aiding: Aiding, start: float) -> tuple[float, float, float, f
 
 
 def _from_chord(aiding: Aiding, start: float) -> tuple[float, float, float, float] | None:
-    """Course between two fixes that are near in time and far apart."""
+    """Course between two fixes that are near in time and far apart.
+
+    Those between them and the next one lie on the way, or one of the two is an outlier; if no other
+    are far apart, the first are taken all the same.
+    """
     positions = positions_of(aiding)
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     begins = np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED))
+    first = None
     for i in begins:
         for j in range(i + 1, time.size):
             if time[j] - time[i] > tuning.CHORD:
                 break
-            north, east, _ = ned_difference(positions.value[j], positions.value[i])
-            length, error = np.hypot(north, east), np.hypot(sd[i], sd[j])
+            way = ned_difference(positions.value[i : j + 2], positions.value[i])[:, :2]
+            (north, east), error = way[j - i], np.hypot(sd[i], sd[j])
+            length = float(np.hypot(north, east))
             if length > tuning.COURSE_RATIO * error:
                 course = float(np.arctan2(east, north))
-                return course, float(error / length), float(time[i]), float(time[j])
-    return None
+                found = course, float(error / length), float(time[i]), float(time[j])
+                share = (time[i : j + 2] - time[i]) / (time[j] - time[i])
+                aside = np.hypot(*(way - share[:, None] * way[j - i]).T)
+                if j + 1 < time.size and np.max(aside) < tuning.CHORD_ASIDE * length:
+                    return found
+                first = first or found
+    return first
 
 
 def compass(
