@@ -31,7 +31,6 @@ def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) ->
         Of the channel, SI.
     sign : bool, optional
         Whether a plus is written.
-    digits : int, optional
     """
     for name in _UNITS.get(unit, (unit,)):
         shown = value if name == unit else value / factor(name, unit)

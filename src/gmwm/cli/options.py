@@ -242,7 +242,6 @@ def models_of_channels(
     ----------
     given : mapping of str to Model
         See `written_models`.
-    channels : sequence of str
 
     Returns
     -------

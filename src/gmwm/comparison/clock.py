@@ -141,7 +141,6 @@ def clock_ratio(
 
     Parameters
     ----------
-    first, second : sequence of Feature
     densities : mapping of str to float
         Channel -> N of the second recording over N of the first.
     """

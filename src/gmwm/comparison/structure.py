@@ -151,7 +151,6 @@ def axis_numbers(
         Of the channel.
     fits : mapping of str to Fit
         Recording -> its own fit.
-    joint : Fit or None
     horizon : float
         s.
     """

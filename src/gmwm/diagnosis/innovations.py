@@ -8,6 +8,7 @@ random walk or a resonance; outliers are clipped before it is fitted.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -42,7 +43,7 @@ class Innovations:
     scale: FloatArray
     rounding: float
 
-    @property
+    @cached_property
     def level(self) -> float:
         """Usual standard deviation, u."""
         return float(np.median(self.scale[self.known]))

@@ -52,11 +52,8 @@ def deviation(
         Averaging times, s.
     value, lower, upper : (J,) ndarray
         Deviations and the ends of their intervals, in ``unit``.
-    unit : str
     interval : str, optional
         Level of the intervals, for the legend.
-    title : str, optional
-    ax : matplotlib.axes.Axes, optional
     """
     import matplotlib.pyplot as plt
 
@@ -148,7 +145,6 @@ def curves(
 
     Parameters
     ----------
-    ax : matplotlib.axes.Axes
     tau : (J,) ndarray
         Averaging times, s.
     total : (J,) ndarray
@@ -208,8 +204,6 @@ def residuals(
         In standard errors; NaN where there is none.
     misfit : (J,) ndarray
         Relative difference of the deviations, written in per cent at each stem.
-    title : str, optional
-    ax : matplotlib.axes.Axes, optional
     """
     import matplotlib.pyplot as plt
 
@@ -270,7 +264,6 @@ def boxes(
         Quantity -> method -> estimates.
     truths : mapping of str to float
         Quantity -> true value.
-    title : str, optional
     """
     import matplotlib.pyplot as plt
 

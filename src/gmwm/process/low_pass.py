@@ -226,7 +226,6 @@ def low_pass_haar(
 
     Parameters
     ----------
-    bandwidth, order, damping, dt : float
     wide, narrow : (points, weights)
         Of panels, see `on_panels`.
     """

@@ -23,8 +23,6 @@ def channel_units(
 
     Parameters
     ----------
-    table : Table
-    roles : Roles
     units : mapping of str to str
         What the user gave, by sensor or by channel; the latter goes first.
     lacks_rate : bool, optional

@@ -23,7 +23,6 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
 
     Parameters
     ----------
-    layout : Layout
     source : str
         Name of the file.
     head : bytes

@@ -30,7 +30,6 @@ def blocks(
 
     Parameters
     ----------
-    path : Path
     offset : int, optional
         Bytes (after decompression) to leave out at the beginning.
     line : int, optional

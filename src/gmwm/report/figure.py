@@ -89,12 +89,10 @@ def deviation_figure(
 
     Parameters
     ----------
-    fitted : Fit
     filter_numbers : (float, float), optional
         N and K of the curve that the sliders move, SI.
     rivals : sequence of Model, optional
         That describe the data as well: drawn faintly.
-    sheet : Datasheet, optional
     """
     wv, factor = fitted.wv, per_si("u", fitted)
     tau, components = dense_curves(fitted)

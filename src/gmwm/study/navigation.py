@@ -147,8 +147,6 @@ def experiment(
     Parameters
     ----------
     vehicle : {"helicopter", "car"}
-    calibrated : Calibrated
-    runs, seed : int
     recordings : sequence of Recording, optional
         The one that was calibrated, and those whose errors are navigated with; by default errors
         of Table VI are drawn.
@@ -180,7 +178,6 @@ def aligned(models: SensorModels, start: Mapping[str, float]) -> SensorModels:
 
     Parameters
     ----------
-    models : SensorModels
     start : mapping of str to float
         Axis -> scatter of the means over a minute of the recording that was calibrated. What a
         model's stationary terms do not explain of it is the standard deviation of a constant, or

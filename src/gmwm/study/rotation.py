@@ -286,8 +286,6 @@ def crossed_weights(
         Of each of the n recordings, S at most.
     calibrated : (n,) ndarray or None
         Weights of those that are calibrated, if they are not drawn.
-    draws : int
-    rng : numpy.random.Generator
     """
     n = len(stretches)
     even = np.full(n, 1.0 / n)

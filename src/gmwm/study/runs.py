@@ -29,7 +29,6 @@ def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str,
     ----------
     name : str
         Of the study.
-    methods : sequence of str
     seed, run : int
         Together the seed of the series.
 

@@ -55,7 +55,6 @@ def rotate(
         Where calibrations and finished runs are kept, so that work that was interrupted goes on.
     runs : int, optional
         Most stretches of each recording; by default all that do not overlap.
-    seed, jobs : int, optional
     earlier : {"resume", "replace", "refuse"}, optional
         What to do with what the folder holds.
     progress : callable, optional
@@ -129,6 +128,13 @@ def reproduce_rotation(
     text, paths
         What to print, and the files that were written.
     """
+    for recording in recordings:
+        missing = [axis for axis in AXES if axis not in recording.names]
+        if missing:
+            raise InputError(
+                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
+                f"{', '.join(AXES)}"
+            )
     rotation = rotate(
         "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
         jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,

@@ -161,7 +161,6 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
     ----------
     integral : (n + 1,) ndarray
         Cumulative sum of the series, starting with 0.
-    start, stop : int
     m : int
         Averaging time in samples.
     """

@@ -160,7 +160,6 @@ def coefficients(
     ----------
     values : (n,) array_like
         Finite numbers.
-    wavelet : str
     levels : int, optional
         At most so many; by default all that have such a coefficient. A short series has fewer.
 

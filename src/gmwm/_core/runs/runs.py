@@ -55,7 +55,6 @@ def do_runs(
     ----------
     work : callable
         Can be pickled.
-    runs : int
     study : mapping
         What runs depend on, in JSON types. Those of another study are never mixed in.
     folder : Path, optional

@@ -55,7 +55,6 @@ def results(
 
     Parameters
     ----------
-    work : callable
     items : sequence
         Hashable and different.
     jobs : int, optional

@@ -5,5 +5,6 @@ from gmwm.diagnosis.motion.motion import (
     Move as Move,
     find_motion as find_motion,
     is_moved_with as is_moved_with,
+    remembered as remembered,
 )
 from gmwm.diagnosis.motion.notices import motion_notices as motion_notices

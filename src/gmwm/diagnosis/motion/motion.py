@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from itertools import pairwise
+from typing import TypeVar
 from weakref import ref
 
 import numpy as np
@@ -14,6 +16,8 @@ from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
 from gmwm.readers import AXES, Channel, Recording, block_means, steady_turn, turning_gravity
+
+T = TypeVar("T")
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _LIMIT = {"gyro": tuning.TURNS, "accel": tuning.TILTS * _GRAVITY}
@@ -93,6 +97,25 @@ class Motion:
         )
 
 
+def remembered(examine: Callable[[Recording], T]) -> Callable[[Recording], T]:
+    """Keep what is found of the recording that was examined last: what is done about it asks again.
+
+    It goes with the recording.
+    """
+    latest: list[tuple[ref[Recording], T]] = []
+
+    @wraps(examine)
+    def found(recording: Recording) -> T:
+        known = next(iter(latest), None)  # one look: threads may examine others meanwhile
+        if known is None or known[0]() is not recording:
+            known = ref(recording, lambda _: latest.clear()), examine(recording)
+            latest[:] = [known]
+        return known[1]
+
+    return found
+
+
+@remembered
 def find_motion(recording: Recording) -> Motion:
     """Find the stretches in which a recording is static.
 
@@ -111,19 +134,6 @@ def find_motion(recording: Recording) -> Motion:
     Motion
         Without moves if it is static, or too short to be examined.
     """
-    known = _latest.get(id(recording))
-    if known is None or known[0]() is not recording:
-        known = ref(recording), _found(recording)
-        _latest.clear()
-        _latest[id(recording)] = known
-    return known[1]
-
-
-_latest: dict[int, tuple[ref[Recording], Motion]] = {}
-"""The recording that was examined last, and its motion: what is done about it asks again."""
-
-
-def _found(recording: Recording) -> Motion:
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)
     if recording.n < tuning.FEWEST_BLOCKS * size:

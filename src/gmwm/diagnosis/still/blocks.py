@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import is_moved_with
+from gmwm.diagnosis.motion import is_moved_with, remembered
 from gmwm.diagnosis.resolution import step_size
 from gmwm.diagnosis.still.loudness import Loudness, loudness
 from gmwm.readers import Channel, Recording
@@ -79,6 +79,7 @@ def vibration_notice(recording: Recording) -> Notice | None:
     return Notice("vibration", "warning", "", text, values, action)
 
 
+@remembered
 def blocks_of(recording: Recording) -> Blocks | None:
     """The blocks of a recording; None if there are too few, or no channel to be seen in."""
     size = max(round(tuning.STILL_BLOCK * recording.rate), tuning.FEWEST_OF_MOTION)

@@ -192,7 +192,6 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
 
     Parameters
     ----------
-    models : SensorModels
     form : {"N+K", "N+GM"}
     longest : float
         Longest outage, s.

@@ -23,7 +23,6 @@ def measurement_row(
 
     Parameters
     ----------
-    kind, component : int
     C, v : ndarray
         Attitude and velocity.
     rate : (3,) ndarray

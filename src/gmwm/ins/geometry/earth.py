@@ -62,7 +62,6 @@ def gravity_at(sin_lat: float, h: float) -> float:
 
     Parameters
     ----------
-    sin_lat : float
     h : float
         Height above the ellipsoid, m.
 

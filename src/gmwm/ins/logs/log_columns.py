@@ -62,7 +62,6 @@ def find_columns(
 
     Parameters
     ----------
-    table : CsvTable
     quantities : callable
         What a column of a name holds; empty if it is something else.
     needed : sequence of str
@@ -126,8 +125,6 @@ def angle_factor(table: CsvTable, column: int, quantity: str, common: str | None
 
     Parameters
     ----------
-    table : CsvTable
-    column : int
     quantity : str
         For the message.
     common : {"rad", "deg", None}

@@ -102,9 +102,6 @@ def judged(
 
     Parameters
     ----------
-    solution : Solution
-    truth : Trajectory
-    errors : SensorErrors
     outputs : Outputs
         The K epochs that were asked for.
     """

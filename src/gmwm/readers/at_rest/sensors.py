@@ -38,7 +38,6 @@ def rest_notices(
 
     Parameters
     ----------
-    recording : Recording
     unit_of : mapping of str to str
         Unit of each channel in the file.
     given : mapping of str to str

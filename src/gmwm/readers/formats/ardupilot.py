@@ -95,7 +95,6 @@ def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table
 
     Parameters
     ----------
-    path : path
     topics : sequence of str
         Those to read, e.g. ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of
         `IMU`, else those of `GYR` and `ACC`, else the batches, if there is one IMU.

@@ -129,7 +129,6 @@ def messages(path: Path, wanted: Collection[str]) -> Iterator[Messages]:
 
     Parameters
     ----------
-    path : path
     wanted : collection of str
         Names of the kinds.
 

@@ -87,7 +87,6 @@ def open_tables(
 
     Parameters
     ----------
-    data : path or table
     topics : sequence of str, optional
         Those to read, of a log that has several.
     clock : {"header", "log"}, optional

@@ -22,8 +22,8 @@ from gmwm.errors import InputError
 _Bytes = npt.NDArray[np.uint8]
 _Integers = npt.NDArray[np.int64]
 
-ORIENTATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION = 0, 13, 25
-"""First number of each part of `sensor_msgs/Imu`; its covariance follows."""
+ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
+"""First number of these parts of `sensor_msgs/Imu`; their covariances follow."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,8 @@ def decode(
     ----------
     raw : sequence of bytes
         Messages as they are stored.
-    message : Message
     wanted : sequence of int
         Which of the numbers behind the header.
-    serialization : Serialization
     where : callable
         Index of a message -> where it is.
 

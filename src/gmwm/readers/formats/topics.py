@@ -41,7 +41,6 @@ def choose(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple
         Name of the file, for messages.
     topics : sequence of Topic
         One at least.
-    wanted : sequence of str
 
     Raises
     ------

@@ -44,7 +44,6 @@ def open_ulog(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable
 
     Parameters
     ----------
-    path : path
     topics : sequence of str
         Those to read, e.g. ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO
         topics.

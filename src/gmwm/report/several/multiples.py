@@ -48,12 +48,10 @@ def multiple(
 
     Parameters
     ----------
-    axis : AxisComparison
     labels : sequence of str
         Of all recordings, whose places are their colours.
     out : sequence of Fit
         Of recordings that are not compared, drawn faintly.
-    sheet : Datasheet or None
     """
     fits = [*axis.fits.values(), *out]
     unit, factor = shown_unit(fits[0].wv.quantity, fits[0].wv.unit, "field")

@@ -215,18 +215,30 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
     return 4.0 * integral
 
 
+@lru_cache(maxsize=2)  # the spectra of a search are rough in the same places; 2 MB each
+def _chosen(
+    averaging: tuple[float, ...], panels: bytes
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Frequencies, weights and gains of the nodes of some panels, and the weights of `_excess`."""
+    grid, starts = quadrature(averaging), _pairs(averaging).panels.starts
+    width = np.diff(starts, append=grid.frequency.size)
+    nodes = np.flatnonzero(np.repeat(np.frombuffer(panels, dtype=bool), width))
+    _, _, excess = _excess(averaging)
+    weights = excess[:, nodes] if excess.size else excess
+    return grid.frequency[nodes], grid.weight[nodes], grid.gain[:, nodes], weights
+
+
 def _node_by_node(
     psd: PSD, dt: float, averaging: tuple[float, ...], chosen: npt.NDArray[np.bool_]
 ) -> FloatArray:
     """A quarter of the integrals over some panels, from all of their nodes."""
-    grid, panels = quadrature(averaging), _pairs(averaging).panels
-    nodes = np.flatnonzero(np.repeat(chosen, np.diff(panels.starts, append=grid.frequency.size)))
-    density = evaluated(psd, grid.frequency[nodes] / dt, dt) / dt
-    scaled = grid.gain[:, nodes] * (np.sqrt(grid.weight[nodes]) * density)
+    frequency, weight, gain, excess = _chosen(averaging, chosen.tobytes())
+    density = evaluated(psd, frequency / dt, dt) / dt
+    scaled = gain * (np.sqrt(weight) * density)
     integral = scaled @ scaled.T
-    rows, columns, weights = _excess(averaging)
+    rows, columns, _ = _excess(averaging)
     if rows.size:
-        correction = weights[:, nodes] @ (grid.weight[nodes] * density**2)
+        correction = excess @ (weight * density**2)
         integral[rows, columns] += correction
         apart = rows != columns
         integral[columns[apart], rows[apart]] += correction[apart]

@@ -123,14 +123,12 @@ def levels_apart(
 
     Parameters
     ----------
-    gaps : Gaps
     values : (n,) ndarray
         NaN where samples are missing.
     slope : float
         Of the series, per sample.
     psd : callable
         Of its noise between the gaps.
-    dt : float
     longest : float
         Averaging time that the spectrum is known for, samples.
     """

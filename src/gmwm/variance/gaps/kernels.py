@@ -90,7 +90,6 @@ def neighbours(
         Ascending, in half samples.
     kind : (G,) ndarray
         From 0; negative ones are left out.
-    kinds : int
     reach : int
         Half samples.
     """

@@ -20,10 +20,8 @@ def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletV
 
     Parameters
     ----------
-    series : Series
     channel : Channel
         Of any samples: what it is called and measures.
-    confidence : float
 
     Raises
     ------
