@@ -16,7 +16,16 @@ _SPOILING = {
 """Codes of issues of a whole recording that make the fits of some sensors invalid."""
 
 _SPOILING_CHANNEL = frozenset(
-    {"rounding", "saturation", "abrupt-end", "stuck", "held", "value-repeated", "variance"}
+    {
+        "abrupt-end",
+        "dead",
+        "held",
+        "rounding",
+        "saturation",
+        "stuck",
+        "value-repeated",
+        "variance",
+    }
 )
 """Codes of issues of a channel that make its fit invalid where they are bad."""
 

@@ -28,6 +28,7 @@ from gmwm.diagnosis.repeated import (
     held_notice,
     held_share,
     interpolation_notice,
+    leaves_runs,
     repetition,
     repetition_notice,
     thinned,
@@ -240,9 +241,10 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     stuck = stuck_notice(name, unit, dt, values, step, errors)
     if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
         held = 0.0  # most of what is held is held in a few places
+    is_even = held > 0.0 and not leaves_runs(values)
     noise = quiet[~np.isnan(quiet)]
     found = [
-        held_notice(name, held, chance) if held > 0.0 else stuck,
+        held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
         saturation_notice(name, unit, present, noise, step)
         or abrupt_end_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
@@ -265,7 +267,8 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         events=events,
         lsb=step,
         outliers=outliers,
-        held=held if chance <= tuning.CHANCE_OF_HELD else 0.0,
+        held=held if chance <= tuning.CHANCE_OF_HELD and not is_even else 0.0,
+        noise=errors.level,
     )
     return _Examined(notices, facts, _standardized(errors, usable))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import SEVERITIES, Notice, worst_first
+from gmwm._core.notices import SEVERITIES, Notice, Severity, worst_first
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
@@ -38,7 +38,7 @@ class _Noticed:
 def health_stream(path: Any, **reading: Any) -> Health:
     """Find what is wrong with a recording that is longer than memory, read a stretch at a time.
 
-    Each stretch, of half a million samples, is examined as `gmwm.health` does; a notice stands for
+    Each stretch, of 260,000 samples, is examined as `gmwm.health` does; a notice stands for
     those of one kind in all of them. A line or resonance is one of the channel if half of the
     stretches have it. What changes from one stretch to the next only is not seen: slow drift,
     tilt and temperature, for which `gmwm.calibrate_stream` looks beside the noise.
@@ -88,7 +88,13 @@ def joined(found: Sequence[Health]) -> Health:
     starts = [0, *ends[:-1]]
     rate, names = found[0].rate, tuple(found[0].channels)
     groups = _groups(found, starts)
-    notices = [_one_of(group, len(found), rate) for group in groups if not _falls(group, found)]
+    unsteady = [
+        one for name in names if (one := _unsteady(name, [h.channels[name] for h in found]))
+    ]
+    spoilt = {one.where for one in unsteady}
+    notices = unsteady + [
+        _one_of(group, len(found), rate) for group in groups if not _falls(group, found, spoilt)
+    ]
     whole = [length_notice(ends[-1], rate), *(each for each in notices if not each.where)]
     own = [each for name in names for each in worst_first([n for n in notices if n.where == name])]
     return Health(
@@ -127,10 +133,11 @@ def _same(one: float, other: float) -> bool:
     return abs(one / other - 1.0) < tuning.SAME_PEAK
 
 
-def _falls(group: Sequence[_Noticed], found: Sequence[Health]) -> bool:
-    """Whether nothing is left of it: a length, or a channel that is clean elsewhere only."""
-    code = group[0].notice.code
-    return code == "length" or (code == "clean" and len(group) < len(found))
+def _falls(group: Sequence[_Noticed], found: Sequence[Health], spoilt: Collection[str]) -> bool:
+    """Whether nothing is left of it: a length, or a channel that is not clean in all stretches."""
+    one = group[0].notice
+    is_clean = len(group) == len(found) and one.where not in spoilt
+    return one.code == "length" or (one.code == "clean" and not is_clean)
 
 
 def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
@@ -157,7 +164,28 @@ def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
         values |= {
             name: sum(float(each.notice.values.get(name, 0.0)) for each in group) for name in known
         }
-    return replace(worst.notice, text=text, values=values)
+    # A channel that is dead in some stretches is not skipped.
+    action = "use the other stretches" if first.code == "dead" else worst.notice.action
+    return replace(worst.notice, text=text, values=values, action=action)
+
+
+def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:
+    """Whether the noise differs between stretches, each of which may be steady in itself."""
+    levels = np.array([part.noise for part in parts if part.noise > 0.5 * part.lsb])
+    if levels.size < 2:
+        return None
+    excess = float(np.sqrt(np.mean(levels**2)) / np.quantile(levels, 0.25, method="lower")) - 1.0
+    ratio = float(np.max(levels) / np.min(levels))
+    if ratio < 1.0 + tuning.UNSTEADY:
+        return None
+    text = (
+        f"the noise is {ratio:.3g} times as large in the loudest stretch as in the quietest, so "
+        f"that its mean is {100.0 * excess:.2g} % above that of the quiet quarter"
+    )
+    values = {"ratio": ratio, "excess": excess}
+    severity: Severity = "bad" if excess > tuning.UNSTEADY else "warning"
+    action = "use a part without what vibrates"
+    return Notice("variance", severity, name, text, values, action)
 
 
 def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHealth:
@@ -178,6 +206,7 @@ def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHeal
         lsb=min(steps, default=0.0),
         outliers=float(np.mean([part.outliers for part in parts])),
         held=float(np.mean([part.held for part in parts])),
+        noise=float(np.median([part.noise for part in parts])),
         repetition=times[0] if times else None,
     )
 

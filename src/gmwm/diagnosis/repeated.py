@@ -142,8 +142,18 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
     return same / sizes.size - chance, chance
 
 
-def held_notice(name: str, share: float, chance: float) -> Notice:
-    """Say how many samples repeat the one before."""
+def leaves_runs(values: FloatArray) -> bool:
+    """Whether some samples in a row are left where those that repeat the one before are missing.
+
+    Not where every fifth is: a slower sensor in the rows of a faster clock.
+    """
+    ends = np.flatnonzero(np.isnan(values[1:]) | (np.diff(values) == 0.0)) + 1
+    longest = np.max(np.diff(ends, prepend=0, append=values.size))
+    return bool(longest > tuning.FEWEST_BETWEEN_HELD)
+
+
+def held_notice(name: str, share: float, chance: float, *, is_even: bool) -> Notice:
+    """Say how many samples repeat the one before, and whether that is every so manyth."""
     text = f"{share:.2g} of the samples repeat the one before, where chance explains {chance:.2g}"
     return Notice(
         "held",
@@ -151,5 +161,5 @@ def held_notice(name: str, share: float, chance: float) -> Notice:
         name,
         f"{text}: lost packets, for which the last sample was written again",
         {"share": share, "chance": chance},
-        "make such samples missing (NaN)",
+        "record at the sensor's own rate" if is_even else "make such samples missing (NaN)",
     )

@@ -62,6 +62,8 @@ class ChannelHealth:
         noise and some shocks explain.
     held : float
         Share of samples that only repeat the one before, where nearly all that do are such; else 0.
+    noise : float
+        Usual standard deviation of what cannot be predicted of a sample, u; 0 if it is not known.
     repetition : Repetition or None
         If each sample is written several times; the other numbers are then those of the channel
         at its own rate, events those of the recording.
@@ -73,6 +75,7 @@ class ChannelHealth:
     lsb: float = 0.0
     outliers: float = 0.0
     held: float = 0.0
+    noise: float = 0.0
     repetition: Repetition | None = None
 
     @classmethod
@@ -86,6 +89,7 @@ class ChannelHealth:
             lsb=content["lsb"],
             outliers=content["outliers"],
             held=content["held"],
+            noise=content["noise"],
             repetition=repeated and Repetition(repeated["times"], repeated["first"]),
         )
 
@@ -293,6 +297,7 @@ class ChannelHealthForm(Form):
     lsb: NotNegative
     outliers: Annotated[float, Field(ge=0.0, le=1.0)]
     held: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    noise: NotNegative = 0.0
     repetition: RepetitionForm | None
 
 

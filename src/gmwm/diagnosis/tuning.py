@@ -105,6 +105,9 @@ that; part that may equal it by chance where such samples are made missing (whic
 1.6 % smaller). Largest power of a law (t with 2.5 degrees of freedom, rounded to two deviations;
 Laplace's walk 0.65). Of the scatter, a step to compare with where there is none."""
 
+FEWEST_BETWEEN_HELD = 16
+"""Samples in a row, of which something is known of how the noise goes on."""
+
 # -- prediction errors ----------------------------------------------------------------------------
 
 FEWEST_KNOWN = 64

@@ -149,8 +149,8 @@ def _read(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def part_of(table: Table, given: Given) -> Part:
-    """The recording of a table, and when it begins."""
+def part_of(table: Table, given: Given, fewest: int = tuning.FEWEST_SAMPLES) -> Part:
+    """The recording of a table, and when it begins; of so many samples of one channel at least."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     # Complain before a long file is read, not after.
@@ -160,7 +160,7 @@ def part_of(table: Table, given: Given) -> Part:
     unit_of, unit_notices = channel_units(table, roles, given.units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
-    _check_size(table, roles, arrays)
+    _check_size(table, roles, arrays, fewest)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
         if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
@@ -247,13 +247,13 @@ def _load(
     return arrays, kept, [Notice("columns-unreadable", "note", "", text)]
 
 
-def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
+def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray], fewest: int) -> None:
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
-    if most < tuning.FEWEST_SAMPLES:
+    if most < fewest:
         of_any = "" if most == n else " of any channel"
         raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least {tuning.FEWEST_SAMPLES} are "
+            f"{table.source} has {most} samples{of_any} where at least {fewest} are "
             "needed: record longer"
         )
 

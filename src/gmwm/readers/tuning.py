@@ -204,5 +204,8 @@ ROWS_OF_BLOCK = 1 << 18
 FEWEST_OF_BLOCK = 4096
 """Rows of which a clock is seen as well as of a long recording."""
 
+LONGEST_GAP_OF_BLOCK = 1 << 24
+"""Rows that may be missing at the seam of two blocks, 46 h at 100 Hz and 134 MB a channel."""
+
 ROWS_BACK_OF_BLOCK = 2
 """By which stamps may be early at the seam of two blocks: a late row before."""

@@ -113,6 +113,67 @@ def test_a_channel_that_is_written_twice_or_moved_is_not_silent(tmp_path):
         gmwm.calibrate_stream(tmp_path / "moved.npy", MODEL, screening=("x",), **reading)
 
 
+def stretched(tmp_path, change, **reading):
+    """White noise of four stretches of 10,000 samples that is changed from the second on."""
+    x = 1e-3 * np.random.default_rng(6).normal(size=40_000)
+    change(x[10_000:])
+    np.save(tmp_path / "changed.npy", x[:, None])
+    reading = {**READING, "channels": {"gyro_x": 0}, "rows": 10_000, **reading}
+    return gmwm.calibrate_stream(tmp_path / "changed.npy", gmwm.WhiteNoise(), **reading)
+
+
+def dies(x):
+    x[10_000:] = 0.0
+
+
+def swells(x):
+    x *= 1.4
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "reason"),
+    [(dies, "dead", "samples_change"), (swells, "variance", "noise_steady")],
+)
+def test_what_one_stretch_does_not_show_makes_the_whole_not_valid(tmp_path, change, code, reason):
+    found = stretched(tmp_path, change)
+    assert not found["gyro_x"].reasons[reason]
+    assert [n.severity for n in found.notices if n.code == code] == ["bad"]
+    assert not [n for n in found.notices if n.code == "clean"]
+
+
+def test_noise_that_stays_is_clean(tmp_path):
+    found = stretched(tmp_path, lambda x: None)
+    assert found["gyro_x"].valid
+    assert [n.where for n in found.notices if n.code == "clean"] == ["gyro_x"]
+
+
+def test_a_stretch_without_samples_is_a_gap(tmp_path):
+    def ends(x):
+        x[20_000:] = np.nan
+
+    found = stretched(tmp_path, ends)
+    assert found["gyro_x"].params["N"] == pytest.approx(1e-4, rel=0.03)
+    assert found["gyro_x"].wv.gaps.missing == 10_000
+
+
+def test_the_row_of_a_number_that_is_none_is_that_of_the_file(tmp_path):
+    def breaks(x):
+        x[5_000] = np.inf
+
+    with pytest.raises(InputError, match=r"row 15000 \(counted from 0\): inf"):
+        stretched(tmp_path, breaks)
+
+
+def test_a_clock_that_was_set_between_stretches_takes_no_memory(tmp_path):
+    table = np.zeros((40_000, 2))
+    table[:, 0] = 0.01 * np.arange(40_000)
+    table[10_000:, 0] += 1.7e9
+    table[:, 1] = np.random.default_rng(7).normal(size=40_000)
+    np.savetxt(tmp_path / "set.csv", table, "%.14g", ",", header="time [s],gyro_x [rad/s]")
+    with pytest.raises(InputError, match="go forward by 1.7e.09 about row 10,000"):
+        gmwm.calibrate_stream(tmp_path / "set.csv", gmwm.WhiteNoise(), rows=10_000)
+
+
 def test_health_of_one_stretch_is_that_of_the_whole(spoilt):
     reading = {key: value for key, value in READING.items() if key != "rows"}
     whole = gmwm.health(gmwm.read(spoilt, **reading))

@@ -136,3 +136,15 @@ def test_a_sensor_that_is_held_keeps_the_samples_that_were_measured(record):
     assert np.array_equal(np.flatnonzero(gone), np.arange(100, 5000, 40))
     assert masked["gyro_y"].is_complete
     assert found.channels["gyro_x"].held == pytest.approx(123 / 4999)
+
+
+def test_every_fifth_sample_written_again_is_not_left_out(record):
+    # Nothing would be left of how the noise goes on.
+    x = np.random.default_rng(8).normal(size=20_000)
+    x[4::5] = x[3::5]
+    rec = record(gyro_x=x)
+    found = gmwm.health(rec)
+    (notice,) = found.of("gyro_x", "held")
+    assert notice.severity == "bad"
+    assert found.masked(rec)["gyro_x"].is_complete
+    assert not gmwm.calibrate(rec, gmwm.WhiteNoise())["gyro_x"].reasons["samples_measured"]

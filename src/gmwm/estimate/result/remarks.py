@@ -38,6 +38,7 @@ REASONS = {
     "saturation": "within_range",
     "abrupt-end": "within_range",
     "stuck": "samples_change",
+    "dead": "samples_change",
     "held": "samples_measured",
     "value-repeated": "samples_measured",
     "variance": "noise_steady",

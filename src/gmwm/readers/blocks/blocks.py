@@ -105,7 +105,9 @@ def read_blocks(
     done = 0
     given = Given(rate, units or {}, channels, time)
     for arrays, stamps in _segments(table, given, rows):
-        found = part_of(_Segment(table, arrays, done), given).recording
+        # Later parts may hold no samples at all.
+        fewest = 0 if done else tuning.FEWEST_SAMPLES
+        found = part_of(_Segment(table, arrays, done), given, fewest).recording
         if first is None:
             first = found
         if stamps is not None:
@@ -162,6 +164,11 @@ def _on_the_grid(
         if missing < -tuning.ROWS_BACK_OF_BLOCK:
             raise InputError(
                 f"{first.source}: time stamps go back about row {rows:,}: cut the file there"
+            )
+        if missing > tuning.LONGEST_GAP_OF_BLOCK:
+            raise InputError(
+                f"{first.source}: time stamps go forward by {since[1] - since[0]:.6g} about row "
+                f"{rows:,}, as if the clock was set: cut the file there"
             )
     gone = np.full(max(missing, 0), np.nan)
     return replace(

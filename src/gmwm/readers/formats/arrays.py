@@ -80,6 +80,7 @@ class ArrayTable:
     rate: float | None = None
     tentative: bool = False
     notices: tuple[Notice, ...] = ()
+    before: int = 0  # rows of a file of which this is a part
 
     @classmethod
     def of_entries(
@@ -145,14 +146,14 @@ class ArrayTable:
         """The same, ``rows`` at a time; only what is mapped is not read as a whole."""
         longest = max(self.arrays[column].like.shape[0] for column in columns)
         for begin in range(0, longest, rows):
-            part = replace(self, arrays=tuple(array[begin : begin + rows] for array in self.arrays))
-            yield part.load(columns)
+            arrays = tuple(array[begin : begin + rows] for array in self.arrays)
+            yield replace(self, arrays=arrays, before=begin).load(columns)
             for column in columns:
                 _release(self.arrays[column].like)
 
     def where(self, row: int) -> str:
         """Say which row."""
-        return f"row {row} (counted from 0)"
+        return f"row {self.before + row} (counted from 0)"
 
     def _column(self, index: int) -> FloatArray:
         like, place = self.arrays[index].like, f"{self.source}, column {label(self.names, index)}"
