@@ -150,7 +150,7 @@ def of_navigation(seconds=10.0, dt=0.01, step=0.1):
 def of_main_job(recording, folder):
     floor = min(medians({"sum": lambda: [np.sum(c.values) for c in recording.channels]}).values())
     with Stopwatch().running() as watch:
-        found = gmwm.calibrate(recording)
+        found = gmwm.calibrate(recording, jobs=1)
         with stage("report"):
             found.report(folder / "report.html", recording)
         with stage("exports"):

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 NONE_VALID = 1
 """Exit status."""
 
-_LARGE, _CHANNELS = 1 << 20, 6
+_LARGE, _CHANNELS = 4 << 20, 6
 """Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")

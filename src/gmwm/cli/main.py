@@ -79,13 +79,22 @@ def _run() -> int:
     except click.ClickException as error:
         return _failed(printable(error.format_message()))
     except click.Abort:
-        _failed("interrupted, no file is half-written")
-        return _EXIT_INTERRUPTED
+        return _interrupted()
+    except SystemError as error:
+        # What is interrupted while compiled code is loaded; click knows it by no other name.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        return _interrupted()
     except SystemExit as stop:
         if stop.code == 0:  # of click, after it has answered a shell that completes a line
             return 0
         _discard_output()  # of click and rich, where nobody reads on, as head does
         return _EXIT_PIPE
+
+
+def _interrupted() -> int:
+    _failed("interrupted, no file is half-written")
+    return _EXIT_INTERRUPTED
 
 
 def _failed(sentence: str) -> int:

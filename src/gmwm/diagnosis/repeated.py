@@ -122,6 +122,9 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
     sizes = np.abs(np.diff(values))
     sizes = sizes[~np.isnan(sizes)]
     same = int(np.count_nonzero(sizes == 0.0))
+    fewest = max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN)
+    if same < fewest:
+        return 0.0, 0.0
     width = step or tuning.NEAR * scatter
     near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
     if not is_dithered(values[~np.isnan(values)], step) or not min(one, two):
@@ -134,8 +137,7 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
         power = tuning.LAST_RISE
         chance = 0.5 * one / sizes.size * max(one / two, 1.0) ** power
         error = float(np.hypot((1.0 + power) / np.sqrt(one), power / np.sqrt(two)))
-    beyond = same - chance * np.exp(3.0 * error) * sizes.size
-    if beyond < max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN):
+    if same - chance * np.exp(3.0 * error) * sizes.size < fewest:
         return 0.0, 0.0
     return same / sizes.size - chance, chance
 

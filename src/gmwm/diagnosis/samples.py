@@ -267,7 +267,6 @@ def abrupt_end_notice(
     count = max(int(tuning.LAST_OF_END * values.size), tuning.FEWEST_OF_END)
     if values.size < 4 * count or 2.0 * step > scatter:
         return None
-    part = np.arange(values.size) * tuning.PARTS_OF_END // values.size
     found, density = [], 0.0
     for sign in (1.0, -1.0):
         end = sign * float(np.max(sign * values))
@@ -276,16 +275,18 @@ def abrupt_end_notice(
         if step > 0.0:
             # Both halves have the same number of steps, two at least.
             width = step * 2.0 * max(np.ceil(0.5 * width / step), 2.0)
-        if width > np.median(inwards):
+        near = np.flatnonzero(inwards < width - 0.5 * step)
+        if 2 * near.size > values.size:
             continue
-        half = 0.5 * step if step > 0.0 else 0.0
-        last = np.bincount(part[inwards + half < width], minlength=tuning.PARTS_OF_END)
-        outer = np.bincount(part[inwards + half < 0.5 * width], minlength=tuning.PARTS_OF_END)
+        part = near * tuning.PARTS_OF_END // values.size
+        is_outer = inwards[near] < 0.5 * (width - step)
+        last = np.bincount(part, minlength=tuning.PARTS_OF_END)
+        outer = np.bincount(part[is_outer], minlength=tuning.PARTS_OF_END)
         asked = last >= tuning.FEWEST_OF_PART
         dense = int(np.count_nonzero(asked & (3 * (outer - 1) >= last)))
         if binom.sf(dense - 1, int(np.count_nonzero(asked)), 0.5) < 0.5 * tuning.FALSE_ALARM:
             found.append(end)
-            density += float(np.sum(last)) / values.size / width * float(np.std(values))
+            density += near.size / values.size / width * float(np.std(values))
     if not found:
         return None
     where = " and ".join(readable(end, unit, digits=5) for end in sorted(found))

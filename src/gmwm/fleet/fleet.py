@@ -22,7 +22,6 @@ from gmwm._core.notices import Notice
 from gmwm._core.runs import results
 from gmwm._core.text import wrapped
 from gmwm._core.typing import Progress
-from gmwm._core.units import field_units
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
 from gmwm.fleet import tuning
@@ -122,7 +121,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
             head = f"{'channel':<10} {'number':<9} {'units':>5} {'median':>9} {'spread':>7}"
             lines += ["", f"{head} {'limit':>9}  unit"]
         for each in shown:
-            unit, scale = _field(each)
+            unit, scale = each.field_unit
             spread = f"{100.0 * each.sd:.3g} %" if each.sd >= 0.0 else "-"
             limit = f"{each.normal_limit * scale:.4g}" if each.sd >= 0.0 else "-"
             lines.append(
@@ -210,12 +209,6 @@ class Fleet(Mapping[str, Calibration | Notice]):
             self.report(new / page)
             units = self.units.values()
             write_index(new / index, units, self.horizon, self.options, self.notices)
-
-
-def _field(spread: Spread) -> tuple[str, float]:
-    """The unit in which the field quotes a derived number, and how many of it one SI unit is."""
-    found = field_units(DERIVED[spread.parameter], spread.quantity)
-    return (found[0].unit, found[0].per_si) if found else (spread.unit, 1.0)
 
 
 def fleet(

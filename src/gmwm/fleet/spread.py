@@ -13,6 +13,8 @@ from scipy.stats import norm, shapiro
 
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.units import factor, field_units
+from gmwm.errors import InputError
 from gmwm.fleet import tuning
 from gmwm.fleet.table import Row
 from gmwm.fleet.tolerance import one_sided_factor, rank_of_limit, rank_of_limits, two_sided_factor
@@ -82,6 +84,17 @@ class Spread:
     @property
     def n(self) -> int:
         return len(self.devices)
+
+    @property
+    def field_unit(self) -> tuple[str, float]:
+        """The unit in which the field quotes it, and how many of it one SI unit is."""
+        for plain in ("u/sqrt(Hz)", "u", "u s", "u/s/sqrt(Hz)", "u/s"):
+            for usual in field_units(plain, self.quantity)[:1]:
+                try:
+                    return usual.unit, 1.0 / factor(usual.unit, self.unit.replace(" s", "*s"))
+                except InputError:
+                    continue
+        return self.unit, 1.0
 
     @property
     def is_logarithmic(self) -> bool:

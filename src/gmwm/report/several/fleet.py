@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.units import factor, field_units
-from gmwm.errors import InputError, printable
+from gmwm.errors import printable
 from gmwm.fleet import (
     CONFIDENCE,
     CONTENT,
@@ -132,7 +131,7 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
                 numbers.append(
                     {
                         "title": _TITLES[parameter],
-                        "unit": _scale(own[0])[0],
+                        "unit": own[0].field_unit[0],
                         "picture": _picture(own),
                         "rows": [_row(each) for each in own],
                     }
@@ -143,20 +142,8 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
     return groups
 
 
-def _scale(spread: Spread) -> tuple[str, float]:
-    """The unit in which the field quotes a parameter, and how many of it one SI unit is."""
-    for plain in ("u/sqrt(Hz)", "u", "u s", "u/s/sqrt(Hz)", "u/s"):
-        for unit in field_units(plain, spread.quantity)[:1]:
-            try:
-                per_si = 1.0 / factor(unit.unit, spread.unit.replace(" s", "*s"))
-            except InputError:
-                continue
-            return unit.unit, per_si
-    return spread.unit, 1.0
-
-
 def _row(spread: Spread) -> dict[str, Any]:
-    unit, scale = _scale(spread)
+    unit, scale = spread.field_unit
 
     def text(value: float) -> str:
         return short(value * scale) if np.isfinite(value) else "-"
@@ -200,7 +187,7 @@ def _spread_text(spread: Spread, text: Any) -> str:
 def _outliers(spreads: Sequence[Spread]) -> list[dict[str, str]]:
     rows = []
     for spread in spreads:
-        unit, scale = _scale(spread)
+        unit, scale = spread.field_unit
         for each in spread.outliers:
             rows.append(
                 {
@@ -248,7 +235,7 @@ def _options(fleet: Fleet) -> str:
 
 def _picture(spreads: Sequence[Spread]) -> dict[str, Any]:
     """Places of what is drawn: a row an axis, a point a unit, on a logarithmic scale."""
-    _, scale = _scale(spreads[0])
+    _, scale = spreads[0].field_unit
     values = np.concatenate([each.values for each in spreads]) * scale
     limits = [each.normal_limit * scale for each in spreads]
     drawn = [x for x in limits if np.isfinite(x) and x < _FARTHEST * values.max()]

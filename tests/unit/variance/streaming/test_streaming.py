@@ -105,6 +105,14 @@ def test_parts_merge_to_the_whole_in_any_order(n, seed, cuts, gaps, flood):
         assert_same(found.result(), whole.result(), rtol=1e-7)
 
 
+def test_a_gap_over_a_cut_is_one():
+    x = noise(300, 1)
+    x[190:215] = np.nan
+    first, second, third = merged(x, [100, 200])
+    found = first.merge(second).merge(third)
+    np.testing.assert_array_equal(found._series[0].gaps, streamed(x)._series[0].gaps)
+
+
 def test_a_merged_part_goes_on():
     x = noise(40_000, 1)
     both = streamed(x[:12_345]).merge(streamed(x[12_345:20_001], start=12_345))

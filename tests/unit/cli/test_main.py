@@ -1,0 +1,30 @@
+"""What the entry point makes of what ends a command."""
+
+import pytest
+
+from gmwm.cli.main import _run, cli
+
+
+def ends_with(error):
+    def command(**_):
+        raise error
+
+    return command
+
+
+def interrupted_while_loading():
+    error = SystemError("<method> returned a result with an exception set")
+    error.__cause__ = KeyboardInterrupt()
+    return error
+
+
+def test_an_interrupt_while_compiled_code_is_loaded_is_one(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "main", ends_with(interrupted_while_loading()))
+    assert _run() == 130
+    assert capsys.readouterr().err == "gmwm: interrupted, no file is half-written\n"
+
+
+def test_other_errors_of_the_system_are_not_hidden(monkeypatch):
+    monkeypatch.setattr(cli, "main", ends_with(SystemError("broken")))
+    with pytest.raises(SystemError, match="broken"):
+        _run()
