@@ -246,15 +246,26 @@ def window_centres(runs: IntArray, width: int) -> IntArray:
 def pair_factor(centres: IntArray, m: int, n: int) -> float:
     """Sampling variance of a Haar level by windows at these centres, over that of n samples.
 
-    By the pairs of coefficients at the lags at which those of white noise are correlated.
+    By the pairs of coefficients at the lags at which those of white noise are correlated: some
+    lags of an average, or of the most windows in a row where these are fewer.
     """
-    lags = np.arange(0, 2 * m, max(m // tuning.LAGS_PER_AVERAGE, 1))
-    correlation = np.where(lags <= m, 1.0 - 1.5 * lags / m, 0.5 * lags / m - 1.0)
-    weight = correlation**2 * np.where(lags == 0, 1.0, 2.0)
-    complete = n - 2.0 * m + 1.0
+    step = max(m // tuning.LAGS_PER_AVERAGE, 1)
+    widest = int(np.max(centres[:, 1] - centres[:, 0]))
+    finer = max(min(step, widest // tuning.LAGS_PER_AVERAGE), 1)
+    reach = min(2 * m, int(centres[-1, 1] - centres[0, 0]))
+    lags, weight = _weights(m, finer, reach)
     found = np.array([pairs_at_lag(centres, centres, int(lag)) for lag in lags], dtype=float)
-    seen = weight @ found / found[0] ** 2
-    return float(seen / (weight @ np.maximum(complete - lags, 0.0) * complete**-2))
+    seen = finer * (weight @ found) / found[0] ** 2
+    lags, weight = _weights(m, step, 2 * m)
+    complete = n - 2.0 * m + 1.0
+    return float(seen / (step * (weight @ np.maximum(complete - lags, 0.0)) / complete**2))
+
+
+def _weights(m: int, step: int, reach: int) -> tuple[IntArray, FloatArray]:
+    """Lags below a reach, and squared correlations there, for both signs of the lag."""
+    lags = np.arange(0, reach, step)
+    correlation = np.where(lags <= m, 1.0 - 1.5 * lags / m, 0.5 * lags / m - 1.0)
+    return lags, correlation**2 * np.where(lags == 0, 1.0, 2.0)
 
 
 def common_share(centres: Sequence[IntArray], width: FloatArray, n: int) -> FloatArray:

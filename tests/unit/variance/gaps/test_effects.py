@@ -463,3 +463,19 @@ def test_data_covariance_and_robust_variances_of_filled_series():
         assert np.all(np.abs(difference) < 0.8 * error)
     ratio = np.diag(part.data_covariance) / np.diag(whole.data_covariance)
     assert np.all(np.abs(np.log(ratio[known])) < 0.5)
+
+
+@pytest.mark.parametrize("more", [0, 1, 10, 100])
+def test_few_windows_before_a_long_gap_are_known_as_well_as_alone(more):
+    # The longest averaging time has 1 + more windows, nearly all of them the same samples.
+    present = 4096 + more
+    x = np.full(6000, np.nan)
+    x[:present] = np.random.default_rng(1).normal(size=present)
+
+    def psd(f, dt):
+        return np.full_like(f, dt)
+
+    one, alone = (gmwm.wavelet_variance(each, 1.0) for each in (x, x[:present]))
+    assert one.gaps.counts[-1] == 1 + more
+    ratio = np.diag(one.covariance_under(psd)) / np.diag(alone.covariance_under(psd))
+    np.testing.assert_allclose(ratio, 1.0, rtol=0.04)
