@@ -246,26 +246,21 @@ def window_centres(runs: IntArray, width: int) -> IntArray:
 def pair_factor(centres: IntArray, m: int, n: int) -> float:
     """Sampling variance of a Haar level by windows at these centres, over that of n samples.
 
-    By the pairs of coefficients at the lags at which those of white noise are correlated: some
-    lags of an average, or of the most windows in a row where these are fewer.
+    By the pairs of coefficients at the lags at which those of white noise are correlated.
     """
-    step = max(m // tuning.LAGS_PER_AVERAGE, 1)
-    widest = int(np.max(centres[:, 1] - centres[:, 0]))
-    finer = max(min(step, widest // tuning.LAGS_PER_AVERAGE), 1)
-    reach = min(2 * m, int(centres[-1, 1] - centres[0, 0]))
-    lags, weight = _weights(m, finer, reach)
-    found = np.array([pairs_at_lag(centres, centres, int(lag)) for lag in lags], dtype=float)
-    seen = finer * (weight @ found) / found[0] ** 2
-    lags, weight = _weights(m, step, 2 * m)
-    complete = n - 2.0 * m + 1.0
-    return float(seen / (step * (weight @ np.maximum(complete - lags, 0.0)) / complete**2))
+    return _mean_variance(centres, m) / _mean_variance(window_centres(np.array([[0, n]]), 2 * m), m)
 
 
-def _weights(m: int, step: int, reach: int) -> tuple[IntArray, FloatArray]:
-    """Lags below a reach, and squared correlations there, for both signs of the lag."""
-    lags = np.arange(0, reach, step)
+def _mean_variance(centres: IntArray, m: int) -> float:
+    """Of the mean of squares at these centres, over that of one of them."""
+    # Some lags of an average, or of the most windows in a row where these are fewer.
+    widest = min(m, int(np.max(centres[:, 1] - centres[:, 0])))
+    step = max(widest // tuning.LAGS_PER_AVERAGE, 1)
+    lags = np.arange(0, min(2 * m, int(centres[-1, 1] - centres[0, 0])), step)
     correlation = np.where(lags <= m, 1.0 - 1.5 * lags / m, 0.5 * lags / m - 1.0)
-    return lags, correlation**2 * np.where(lags == 0, 1.0, 2.0)
+    weight = correlation**2 * np.where(lags == 0, 1.0, 2.0)
+    found = np.array([pairs_at_lag(centres, centres, int(lag)) for lag in lags], dtype=float)
+    return float(step * (weight @ found) / found[0] ** 2)
 
 
 def common_share(centres: Sequence[IntArray], width: FloatArray, n: int) -> FloatArray:

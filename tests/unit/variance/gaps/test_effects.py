@@ -312,12 +312,20 @@ def test_any_pattern_is_finite(gaps, seed):
     assert np.all(np.isfinite(found.covariance))
 
 
+def white(f, dt):
+    """Density of white noise of unit variance."""
+    return np.full_like(f, dt)
+
+
 def test_gaps_at_the_ends_cost_what_they_hold():
     x = WhiteNoise(1.0).simulate(10_000, 1.0, 1)
     found = gmwm.wavelet_variance(with_gaps(x, [(0, 700), (9800, 10_000)]), dt=1.0)
     expected = gmwm.wavelet_variance(x[700:9800], dt=1.0)
     np.testing.assert_allclose(found.variance, expected.variance, rtol=1e-9)
-    np.testing.assert_allclose(found.dof, expected.dof, rtol=0.15)
+    ratio = [np.diag(each.covariance_under(white)) for each in (found, expected)]
+    np.testing.assert_allclose(ratio[0] / ratio[1], 1.0, rtol=0.02)
+    # The last level has 0.03 degrees of freedom by chance, by the spectrum that it shows itself.
+    np.testing.assert_allclose(found.dof[:-1], expected.dof[:-1], rtol=0.03)
 
 
 def test_a_gap_of_half_the_record_ends_the_curve_and_is_reported():
@@ -472,10 +480,7 @@ def test_few_windows_before_a_long_gap_are_known_as_well_as_alone(more):
     x = np.full(6000, np.nan)
     x[:present] = np.random.default_rng(1).normal(size=present)
 
-    def psd(f, dt):
-        return np.full_like(f, dt)
-
     one, alone = (gmwm.wavelet_variance(each, 1.0) for each in (x, x[:present]))
     assert one.gaps.counts[-1] == 1 + more
-    ratio = np.diag(one.covariance_under(psd)) / np.diag(alone.covariance_under(psd))
+    ratio = np.diag(one.covariance_under(white)) / np.diag(alone.covariance_under(white))
     np.testing.assert_allclose(ratio, 1.0, rtol=0.04)
