@@ -25,7 +25,7 @@ from gmwm.calibration.screening import (
     with_treatment,
 )
 from gmwm.calibration.stages import stage
-from gmwm.diagnosis import STRETCH, Health, health, joined
+from gmwm.diagnosis import Health, health, joined
 from gmwm.process import Process
 from gmwm.readers import Recording
 from gmwm.variance import StreamedRecording, WaveletVariance, stream
@@ -127,7 +127,7 @@ def _examined(
         parts.append(health(part))
         return parts[-1].masked(part) if "events" in screening else part
 
-    found = stream(path, prepare=without_events, **{"rows": STRETCH, **reading})
+    found = stream(path, prepare=without_events, **reading)
     return found, joined(parts)
 
 

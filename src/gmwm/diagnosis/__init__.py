@@ -2,7 +2,6 @@
 
 from gmwm.diagnosis.check import health as health
 from gmwm.diagnosis.joined import (
-    STRETCH as STRETCH,
     health_stream as health_stream,
     joined as joined,
 )

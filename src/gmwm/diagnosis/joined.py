@@ -16,8 +16,6 @@ from gmwm.diagnosis.samples import length_notice
 from gmwm.errors import InputError
 from gmwm.readers import read_blocks
 
-STRETCH = tuning.ROWS_OF_STRETCH
-
 _LARGEST = {"event": "height", "gap": "missing", "line": "amplitude", "resonance": "sigma"}
 """The number by which one notice stands for those of its code in all stretches."""
 
@@ -38,10 +36,11 @@ class _Noticed:
 def health_stream(path: Any, **reading: Any) -> Health:
     """Find what is wrong with a recording that is longer than memory, read a stretch at a time.
 
-    Each stretch, of 260,000 samples, is examined as `gmwm.health` does; a notice stands for
-    those of one kind in all of them. A line or resonance is one of the channel if half of the
-    stretches have it. What changes from one stretch to the next only is not seen: slow drift,
-    tilt and temperature, for which `gmwm.calibrate_stream` looks beside the noise.
+    Each stretch, of 260,000 samples, is examined as `gmwm.health` does, and the levels of their
+    noise are compared; a notice stands for those of one kind in all of them. A line or resonance is
+    one of the channel if half of the stretches have it. What else changes from one stretch to the
+    next only is not seen: slow drift, tilt and temperature, for which `gmwm.calibrate_stream` looks
+    beside the noise.
 
     Parameters
     ----------
@@ -59,7 +58,6 @@ def health_stream(path: Any, **reading: Any) -> Health:
     InputError
         If the file cannot be used, or not a block at a time.
     """
-    reading.setdefault("rows", STRETCH)
     return joined([health(part) for part in read_blocks(path, **reading)])
 
 

@@ -8,10 +8,6 @@ FALSE_ALARM = 1e-3
 LONG_RECORD = 3600.0
 """s: slow errors of inertial sensors have correlation times of minutes."""
 
-ROWS_OF_STRETCH = 1 << 18
-"""Of a recording longer than memory: an hour and a half at 100 Hz, which shows lines and
-resonances nearly as well as the whole; 4 MB a channel, and some ten times as much for the work."""
-
 SAME_PEAK = 0.02
 """Relative difference of the frequency of one line or resonance in several stretches: lines of
 engines and fans wander by about as much (docs/real-data.md)."""
