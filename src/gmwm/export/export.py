@@ -9,14 +9,13 @@ from typing import Any
 
 from gmwm._core import checks
 from gmwm.calibration import Calibration
-from gmwm.export.gazebo import GAZEBO
 from gmwm.export.gtsam import GTSAM
 from gmwm.export.json_targets import JSON_TARGETS
 from gmwm.export.keyed import KEYED
 from gmwm.export.kfgins import KFGINS
 from gmwm.export.matlab import MATLAB
-from gmwm.export.python_simulators import PYTHON_SIMULATORS
 from gmwm.export.ros import ROS
+from gmwm.export.simulators import SIMULATORS
 from gmwm.export.state_space import STATE_SPACE
 from gmwm.export.target import Target
 from gmwm.filter_numbers import SensorNumbers
@@ -25,7 +24,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
     {
         target.name: target
         for target in (
-            *KEYED, *GTSAM, ROS, MATLAB, STATE_SPACE, GAZEBO, *PYTHON_SIMULATORS, KFGINS,
+            *KEYED, *GTSAM, ROS, MATLAB, STATE_SPACE, *SIMULATORS, KFGINS,
             *JSON_TARGETS,
         )
     }

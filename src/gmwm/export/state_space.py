@@ -21,7 +21,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.comments import wrapped
-from gmwm.export.imu import numbers_of
+from gmwm.export.found import numbers_of
 from gmwm.export.json_targets import json_text
 from gmwm.export.target import Target
 from gmwm.filter_numbers import FORMS, SensorNumbers

@@ -13,7 +13,8 @@ from gmwm._core.files import written
 from gmwm.errors import InputError
 from gmwm.export import tuning
 from gmwm.export.comments import about, comment, wrapped
-from gmwm.export.imu import Imu, imu_of
+from gmwm.export.found import imu_of
+from gmwm.export.imu import Imu
 from gmwm.filter_numbers import FORMS
 
 
