@@ -24,12 +24,8 @@ _KINDS = {"Sinusoid": "line", "Resonance": "resonance"}
 class Feature:
     """A line or a resonance of a channel.
 
-    Attributes
-    ----------
-    channel : str
-    kind : {"line", "resonance"}
-    frequency : float
-        Hz.
+    kind: {"line", "resonance"}.
+    frequency: Hz.
     """
 
     channel: str
@@ -139,10 +135,7 @@ def clock_ratio(
 ) -> ClockRatio | None:
     """A ratio by which everything that has a frequency moved, if there is one.
 
-    Parameters
-    ----------
-    densities : mapping of str to float
-        Channel -> N of the second recording over N of the first.
+    densities: Channel -> N of the second recording over N of the first.
     """
     pairs = [
         (a.frequency, b.frequency)

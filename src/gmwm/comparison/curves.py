@@ -36,14 +36,10 @@ _UNDERFLOW = 1e-300
 class Curve:
     """Wavelet variances of one recording with their errors.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    variance : (J,) ndarray
-        Without a drift where one was removed, u^2.
-    relative : (J, J) ndarray
-        Covariance of ``variance`` over the product of the variances, as models imply it.
+    tau: (J,), averaging times, s.
+    variance: (J,), without a drift where one was removed, u^2.
+    relative: (J, J), covariance of ``variance`` over the product of the variances, as models imply
+        it.
     """
 
     tau: FloatArray
@@ -58,13 +54,8 @@ class Curve:
         nearer to the truth than each: a walk that one of them misses changes the covariances at
         long averaging times by half.
 
-        Parameters
-        ----------
-        fit : Fit
-        noises : sequence of Model
-            Those of all recordings, without drifts.
-        drifting : bool
-            Whether a drift is removed, also one that the fitted model does not have.
+        noises: Those of all recordings, without drifts.
+        drifting: Whether a drift is removed, also one that the fitted model does not have.
         """
         wv, scales, share = fit.wv, Scales.of(fit.wv), 1.0 / len(noises)
         spectra = [scales.spectrum(noise) for noise in noises]

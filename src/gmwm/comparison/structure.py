@@ -145,14 +145,9 @@ def axis_numbers(
 ) -> tuple[AxisNumbers, tuple[Notice, ...]]:
     """What a filter should believe of an axis.
 
-    Parameters
-    ----------
-    name : str
-        Of the channel.
-    fits : mapping of str to Fit
-        Recording -> its own fit.
-    horizon : float
-        s.
+    name: Of the channel.
+    fits: Recording -> its own fit.
+    horizon: s.
     """
     each: dict[str, FilterNumbers] = {}
     notices = []

@@ -155,10 +155,7 @@ def numbers_of(
     Where a calibration has a random walk and the form none, they are those of `gmwm.reduce`. Those
     with one correlation time for all axes, where it is given (s), bound the given ones.
 
-    Raises
-    ------
-    InputError
-        If they have not.
+    Raises InputError if they have not.
     """
     if isinstance(given, Calibration):
         return _found(given, form, usual if horizon is None else horizon, tau)

@@ -107,14 +107,8 @@ class Axis:
 class Axes:
     """Axes, and where they are from.
 
-    Attributes
-    ----------
-    axes : tuple of Axis
-    source : str
-    rate, duration : float
-        Hz and s; NaN if they are not known.
-    single : bool
-        Whether one axis was given, not a mapping.
+    rate, duration: Hz and s; NaN if they are not known.
+    single: Whether one axis was given, not a mapping.
     """
 
     axes: tuple[Axis, ...]
@@ -127,10 +121,7 @@ class Axes:
     def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> Axes:
         """Axes of a model, a fit, a calibration or a mapping.
 
-        Raises
-        ------
-        InputError
-            If the source is something else, or a parameter is open.
+        Raises InputError if the source is something else, or a parameter is open.
         """
         if isinstance(source, Process | Model | Fit):
             name = (source.wv.name or "") if isinstance(source, Fit) else ""
@@ -190,10 +181,7 @@ class Axes:
 def given_tau(form: str, tau: float | str | None) -> float | str | None:
     """A correlation time as users give it, of a form.
 
-    Raises
-    ------
-    InputError
-        If it is none, or the form has none or several.
+    Raises InputError if it is none, or the form has none or several.
     """
     if tau is None:
         return None

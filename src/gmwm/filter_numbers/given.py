@@ -195,22 +195,11 @@ def read_numbers(
 def in_use(given: Given, name: str, quantity: str, horizon: float, start: float) -> FilterNumbers:
     """The numbers of one axis.
 
-    Parameters
-    ----------
-    given : FilterNumbers, SensorNumbers or mapping
-    name : str
-        Of the channel.
-    quantity : str
-        Its kind.
-    horizon : float
-        s, of numbers that name none.
-    start : float
-        Standard deviation of the bias at the start, of numbers that name none, u.
-
-    Raises
-    ------
-    InputError
-        If there are none for this axis.
+    name: Of the channel.
+    quantity: Its kind.
+    horizon: s, of numbers that name none.
+    start: Standard deviation of the bias at the start, of numbers that name none, u.
+    Raises InputError if there are none for this axis.
     """
     item: Any = given
     if isinstance(given, Mapping):

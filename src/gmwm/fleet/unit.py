@@ -91,21 +91,12 @@ class Unit:
 class Task:
     """How every unit is calibrated; as a function it does so, on whatever machine.
 
-    Attributes
-    ----------
-    reading : dict
-        Arguments of `gmwm.read`.
-    start, stop : float
-        Part of the recordings, s.
-    models : dict
-        Channel, sensor ("gyro", "accel") or "" for all -> what is fitted; selected if empty.
-    screening : tuple of str
-    still : bool
-        See `gmwm.calibrate`.
-    horizon : float
-        Of the N and K of a filter, s.
-    version : str
-        Of the program that numbers are to be from.
+    reading: Arguments of `gmwm.read`.
+    start, stop: Part of the recordings, s.
+    models: Channel, sensor ("gyro", "accel") or "" for all -> what is fitted; selected if empty.
+    still: See `gmwm.calibrate`.
+    horizon: Of the N and K of a filter, s.
+    version: Of the program that numbers are to be from.
     """
 
     reading: Mapping[str, Any]
@@ -209,10 +200,7 @@ def _state(path: str) -> list[tuple[int, int]]:
 def digest_of(path: str) -> str:
     """SHA-256 of a file, or of the files of a folder, which a bag of ROS 2 is.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read.
+    Raises InputError if it cannot be read.
     """
     try:
         if not os.path.isdir(path):

@@ -51,10 +51,7 @@ _MINUTE, _LEAP_MINUTE = 60.0, 61.0  # s
 def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line, without blanks around them and without quotes.
 
-    Raises
-    ------
-    ValueError
-        If the quotes do not match.
+    Raises ValueError if the quotes do not match.
     """
     if delimiter == BLANKS:
         return [cell.strip('"') for cell in _RUN_OF_BLANKS.split(line.strip(" \t"))]
@@ -77,18 +74,10 @@ def split_header(line: str, delimiter: str) -> list[str]:
 def number(cell: str, decimal: str) -> float | None:
     """The number in a field.
 
-    Parameters
-    ----------
-    cell : str
-        Without blanks around it.
-    decimal : {".", ","}
-        Decimal mark.
-
-    Returns
-    -------
-    float or None
-        NaN where the field is empty or one of the usual words for a missing sample, infinity where
-        the number is infinite or too large for use, ``None`` where the field is text.
+    cell: Without blanks around it.
+    decimal: {".", ","}, decimal mark.
+    Returns: NaN where the field is empty or one of the usual words for a missing sample, infinity
+        where the number is infinite or too large for use, ``None`` where the field is text.
     """
     if _NUMBERS[decimal].fullmatch(cell):
         value = float(cell.replace(",", "."))
@@ -148,10 +137,7 @@ def has_zone(found: re.Match[str]) -> bool:
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
     """Columns whose every field is a date, or empty; whether they have a zone.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of str
-        Fields of the first lines.
+    rows: Fields of the first lines.
     """
     result = {}
     for column in range(min(map(len, rows), default=0)):

@@ -107,16 +107,10 @@ _POWER = re.compile(r"(?<=[A-Za-z])(?:\^|\*\*)?(-?[1-3])")
 class Meaning:
     """What a name says.
 
-    Attributes
-    ----------
-    role : str or None
-        One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
-    unit : str or None
-        Its unit, if the name has one that is understood.
-    seconds : float or None
-        For a time column, its unit in seconds.
-    stated : str
-        For a time column, what stands in brackets after its name, understood or not.
+    role: One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
+    unit: Its unit, if the name has one that is understood.
+    seconds: For a time column, its unit in seconds.
+    stated: For a time column, what stands in brackets after its name, understood or not.
     """
 
     role: str | None

@@ -25,17 +25,9 @@ from gmwm.variance import wavelet_variance
 def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str, npt.NDArray[Any]]:
     """Simulate one series and estimate it by every method.
 
-    Parameters
-    ----------
-    name : str
-        Of the study.
-    seed, run : int
-        Together the seed of the series.
-
-    Returns
-    -------
-    dict
-        Column -> its values by method.
+    name: Of the study.
+    seed, run: Together the seed of the series.
+    Returns: column -> its values by method.
     """
     study = STUDIES[name]
     series = study.truth.simulate(study.n, study.dt, np.random.default_rng([seed, run]))

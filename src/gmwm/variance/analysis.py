@@ -133,12 +133,8 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
     Cumulants of independent samples add up, so that first differences have twice that of the
     samples.
 
-    Parameters
-    ----------
-    square, fourth : float
-        Mean second and fourth power of the first differences, u^2 and u^4.
-    count : float
-        Number of the first differences.
+    square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
+    count: Number of the first differences.
     """
     excess = fourth / square**2 - 3.0 if square > 0.0 else 0.0
     chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)
@@ -153,11 +149,8 @@ def where_of(channel: Channel) -> str:
 def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
     """The samples of a channel, and which of them exist.
 
-    Raises
-    ------
-    InputError
-        If they are no series of numbers, too few, infinite, constant or of no sensor's size, or
-        the sampling interval is none.
+    Raises InputError if they are no series of numbers, too few, infinite, constant or of no
+        sensor's size, or the sampling interval is none.
     """
     where = where_of(channel)
     checks.sampling_interval(channel.dt)
@@ -186,9 +179,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
 def check_varies(channel: Channel) -> None:
     """Refuse a channel that is constant or varies by what no sensor does.
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     where = where_of(channel)
     if channel.is_constant:

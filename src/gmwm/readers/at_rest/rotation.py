@@ -19,14 +19,9 @@ _ROWS = 1 << 16  # at a time
 class TurningGravity:
     """Changes of the specific force against those that the angular rate explains.
 
-    Attributes
-    ----------
-    factor : float
-        Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
-    explained : float
-        Share of the squared changes that the prediction explains: zero for noise.
-    change : float
-        Root mean square of the predicted changes, m/s^2.
+    factor: Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
+    explained: Share of the squared changes that the prediction explains: zero for noise.
+    change: Root mean square of the predicted changes, m/s^2.
     """
 
     factor: float
