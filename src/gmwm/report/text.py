@@ -24,7 +24,7 @@ def duration_text(seconds: float) -> str:
 
 def number(value: float) -> str:
     """Four significant digits, without an exponent where a person would write none."""
-    text = f"{value:.4g}"
+    text = f"{value:,.4g}"
     return text if "e" not in text else f"{value:.3e}"
 
 
