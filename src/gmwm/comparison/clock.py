@@ -37,19 +37,12 @@ class Feature:
 class ClockRatio:
     """A suspected ratio of the clocks of two recordings.
 
-    Attributes
-    ----------
-    ratio : float
-        Frequencies of the second over those of the first.
-    frequencies : tuple of (float, float)
-        Of distinct lines and resonances in the first and the second recording, Hz.
-    others : int
-        Distinct lines and resonances that moved otherwise.
-    densities : float
-        Median over the channels of N in the second over N in the first; 1/sqrt(ratio) if the clock
-        is all.
-    channels : int
-        How many channels have one.
+    ratio: Frequencies of the second over those of the first.
+    frequencies: Of distinct lines and resonances in the first and the second recording, Hz.
+    others: Distinct lines and resonances that moved otherwise.
+    densities: Median over the channels of N in the second over N in the first; 1/sqrt(ratio) if the
+        clock is all.
+    channels: How many channels have one.
     """
 
     ratio: float

@@ -81,16 +81,10 @@ class Curve:
 class Difference:
     """How far recordings are apart in one part of the Allan plot.
 
-    Attributes
-    ----------
-    part : str
-        One of `PARTS`.
-    shortest, longest : float
-        Averaging times of the part, s.
-    ratios : (R,) ndarray
-        Allan deviation of each recording over the common one; NaN without data there.
-    errors : (R,) ndarray
-        Relative standard errors of these.
+    part: One of `PARTS`.
+    shortest, longest: Averaging times of the part, s.
+    ratios: (R,), allan deviation of each recording over the common one; NaN without data there.
+    errors: (R,), relative standard errors of these.
     """
 
     part: str
@@ -130,20 +124,12 @@ class Difference:
 class Equality:
     """Test that several recordings have the same wavelet variances.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times that two recordings have at least, s.
-    common : (J,) ndarray
-        Their mean wavelet variance, u^2.
-    ratios, errors : (R, J) ndarray
-        Allan deviation of each recording over the common one, and relative standard errors; NaN
-        where a recording has no such level.
-    chi_square : float
-        Weighted sum of squares about the common curve, on cube roots of the variances.
-    dof : int
-    differences : tuple of Difference
-        Part by part of the plot.
+    tau: (J,), averaging times that two recordings have at least, s.
+    common: (J,), their mean wavelet variance, u^2.
+    ratios, errors: (R, J), allan deviation of each recording over the common one, and relative
+        standard errors; NaN where a recording has no such level.
+    chi_square: Weighted sum of squares about the common curve, on cube roots of the variances.
+    differences: Part by part of the plot.
     """
 
     tau: FloatArray

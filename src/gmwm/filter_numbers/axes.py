@@ -51,19 +51,12 @@ DT = 0.01
 class Axis:
     """One axis of a sensor.
 
-    Attributes
-    ----------
-    name : str
-        Of the channel; empty if there is none.
-    model : Model
-        With given parameters.
-    dt : float
-        Sampling interval, s.
-    quantity : {"gyro", "accel", ""}
-    bias_sd : float
-        Of a constant bias, u.
-    fit : Fit or None
-        Where the model is from.
+    name: Of the channel; empty if there is none.
+    model: With given parameters.
+    dt: Sampling interval, s.
+    quantity: {"gyro", "accel", ""}.
+    bias_sd: Of a constant bias, u.
+    fit: Where the model is from.
     """
 
     name: str

@@ -31,13 +31,8 @@ the horizon (`gmwm.bound`), and the bias instability at the lowest point of its 
 class Number(NamedTuple):
     """A number that was derived from a fit.
 
-    Attributes
-    ----------
-    value : float
-        SI.
-    stderr : float or None
-    found : bool
-        Else it is an upper bound: of 95 %, or the end of a curve that still falls.
+    value: SI.
+    found: Else it is an upper bound: of 95 %, or the end of a curve that still falls.
     """
 
     value: float
@@ -56,18 +51,11 @@ class Item(NamedTuple):
 class Unit:
     """A unit of a fleet.
 
-    Attributes
-    ----------
-    path : str
-        Of its recording.
-    name : str
-        Short, and its own in the fleet.
-    result : Calibration or Notice
-        Or why there is none.
-    numbers : dict
-        Channel -> one of `DERIVED` -> `Number`.
-    digest : str
-        SHA-256 of the recording; empty where it cannot be read.
+    path: Of its recording.
+    name: Short, and its own in the fleet.
+    result: Or why there is none.
+    numbers: Channel -> one of `DERIVED` -> `Number`.
+    digest: SHA-256 of the recording; empty where it cannot be read.
     """
 
     path: str

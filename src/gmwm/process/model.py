@@ -233,10 +233,7 @@ def _no_term(other: Any) -> str:
 def as_model(model: Process | Model) -> Model:
     """A model of one term from a process; a model as it is.
 
-    Raises
-    ------
-    InputError
-        For anything else.
+    Raises InputError for anything else.
     """
     if isinstance(model, Model):
         return model

@@ -93,15 +93,8 @@ def seconds_of(found: re.Match[str]) -> float:
     Whole days and minutes are counted by the calendar; the last minute of a day of UTC may have
     61 s.
 
-    Parameters
-    ----------
-    found : re.Match
-        Of `DATE` or `FIELD_OF_DATE`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such day, minute, second or zone.
+    found: Of `DATE` or `FIELD_OF_DATE`.
+    Raises ValueError if there is no such day, minute, second or zone.
     """
     day, hour, minute, second = (part for part in found.groups()[:8] if part is not None)
     start = datetime.combine(_day(day), time(int(hour), int(minute)), tzinfo=UTC)

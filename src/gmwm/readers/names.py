@@ -122,10 +122,7 @@ class Meaning:
 def stated_seconds(source: str, name: str) -> float | None:
     """Unit of a time column in seconds, ``None`` if its name states none.
 
-    Raises
-    ------
-    InputError
-        If the name states a unit that is not one of time.
+    Raises InputError if the name states a unit that is not one of time.
     """
     found = meaning(name)
     if found.stated and found.seconds is None:
@@ -141,10 +138,7 @@ def stated_seconds(source: str, name: str) -> float | None:
 def meaning(name: str) -> Meaning:
     """Interpret the name of a column.
 
-    Parameters
-    ----------
-    name : str
-        As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
+    name: As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
     """
     plain = unicodedata.normalize("NFKC", name.replace("²", "^2")).replace("μ", "u")
     base, bracket = _split_brackets(plain)

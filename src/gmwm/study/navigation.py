@@ -216,23 +216,11 @@ def reproduce_figure(
 ) -> tuple[str, list[Path]]:
     """Draw one of the paper's Figures 5 to 9.
 
-    Parameters
-    ----------
-    figure : str
-        One of `FIGURES`.
-    folder : Path
-        Where figures and tables go.
-    runs : int or None
-    seed, jobs : int
-    recordings : sequence of Recording, optional
-        The first is calibrated, the others are navigated with.
-    progress : callable, optional
-        Called with the number of runs done.
-
-    Returns
-    -------
-    text, paths
-        What to print, and the files that were written.
+    figure: One of `FIGURES`.
+    folder: Where figures and tables go.
+    recordings: The first is calibrated, the others are navigated with.
+    progress: Called with the number of runs done.
+    Returns: what to print, and the files that were written.
     """
     if figure not in _OF_ONE_GYRO and len(recordings) == 1:
         raise InputError("give two recordings or more: one to calibrate, others to navigate with")

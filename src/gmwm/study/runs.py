@@ -98,32 +98,13 @@ def run_study(
     Finished runs are kept in ``folder/NAME-runs`` every few seconds, also when the work is
     interrupted.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-    runs : int
-    seed : int, optional
-    methods : sequence of str, optional
-        Some of ``study.methods``; all by default.
-    jobs : int, optional
-        Processes on this machine.
-    resume : bool, optional
-        Go on where an earlier call stopped.
-    cluster : str, optional
-        Address of a Dask scheduler that does the work instead.
-    progress : callable, optional
-
-    Returns
-    -------
-    pyarrow.Table
-        One row a run and method: estimates, intervals, validity, seconds.
-
-    Raises
-    ------
-    InputError
-        If a method is unknown, or the folder holds runs and ``resume`` is not set, or it is and
-        they are not of the same study.
+    methods: Some of ``study.methods``; all by default.
+    jobs: Processes on this machine.
+    resume: Go on where an earlier call stopped.
+    cluster: Address of a Dask scheduler that does the work instead.
+    Returns: one row a run and method: estimates, intervals, validity, seconds.
+    Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
+        it is and they are not of the same study.
     """
     chosen = tuple(methods or study.methods)
     for method in chosen:

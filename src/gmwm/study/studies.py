@@ -44,20 +44,10 @@ class Estimation:
 class Study:
     """A true model, the quantities to estimate, and the ways to do so.
 
-    Attributes
-    ----------
-    name, title : str
-    truth : Model
-    n : int
-        Samples of a run.
-    dt : float
-        Sampling interval, s.
-    runs : int
-        Customary number of runs.
-    quantities : tuple of Quantity
-    methods : mapping of str to Estimation
-    notes : tuple of str
-        What a reader of the table has to know.
+    n: Samples of a run.
+    dt: Sampling interval, s.
+    runs: Customary number of runs.
+    notes: What a reader of the table has to know.
     """
 
     name: str

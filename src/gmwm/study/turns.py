@@ -113,10 +113,7 @@ def reproduce_rotation(
 ) -> tuple[str, list[Path]]:
     """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
 
-    Returns
-    -------
-    text, paths
-        What to print, and the files that were written.
+    Returns: what to print, and the files that were written.
     """
     for recording in recordings:
         missing = [axis for axis in AXES if axis not in recording.names]

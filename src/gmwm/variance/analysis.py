@@ -217,10 +217,7 @@ def as_wavelet_variance(
 ) -> WaveletVariance:
     """A wavelet variance as it is, or that of a series.
 
-    Raises
-    ------
-    InputError
-        If a sampling interval is given for a wavelet variance, which has its own.
+    Raises InputError if a sampling interval is given for a wavelet variance, which has its own.
     """
     if not isinstance(data, WaveletVariance):
         return wavelet_variance(data, dt, data_covariance=data_covariance)
@@ -232,10 +229,7 @@ def as_wavelet_variance(
 def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
     """A channel without a name from an array and its sampling interval (s).
 
-    Raises
-    ------
-    InputError
-        If either is not usable.
+    Raises InputError if either is not usable.
     """
     if dt is None:
         raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")

@@ -28,12 +28,8 @@ IntArray = NDArray[np.int64]
 class Runs:
     """Runs of samples without a missing one.
 
-    Attributes
-    ----------
-    starts, stops : tuple of int
-        First sample of each run, and the one after its last, ascending.
-    n : int
-        Length of the series, missing samples included.
+    starts, stops: First sample of each run, and the one after its last, ascending.
+    n: Length of the series, missing samples included.
     """
 
     starts: tuple[int, ...]
