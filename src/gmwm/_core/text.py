@@ -33,14 +33,9 @@ def made_by(function: str, result: Any, *args: Any, **options: Any) -> Any:
 def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
     """A number in deg/s, mg or g; in its own unit where that is another.
 
-    Parameters
-    ----------
-    value : float
-        In ``unit``.
-    unit : str
-        Of the channel, SI.
-    sign : bool, optional
-        Whether a plus is written.
+    value: In ``unit``.
+    unit: Of the channel, SI.
+    sign: Whether a plus is written.
     """
     for name in _UNITS.get(unit, (unit,)):
         shown = value if name == unit else value / factor(name, unit)

@@ -55,26 +55,15 @@ def _reason(notice: Notice) -> str:
 class AxisComparison:
     """One channel in several recordings.
 
-    Attributes
-    ----------
-    name : str
-    fits : dict of str to Fit
-        Recording -> its own fit, of those that are compared.
-    left_out : dict of str to Notice
-        Recording -> why it is not.
-    equality : Equality or None
-        Test of the curves; ``None`` where fewer than two recordings are compared.
-    p_value : float
-        Of that test, made larger for the number of channels (Holm); NaN without a test.
-    joint : JointFit or None
-        The structure that is recommended for all of them.
-    parameters : tuple of ParameterSpread
-        Of the joint model.
-    numbers : AxisNumbers
-        N and K for a filter.
-    curve_inflation : float
-        By how much the amplitudes of the joint model must grow so that its curve is nowhere below
-        that of a recording's own model; NaN without a joint model.
+    fits: Recording -> its own fit, of those that are compared.
+    left_out: Recording -> why it is not.
+    equality: Test of the curves; ``None`` where fewer than two recordings are compared.
+    p_value: Of that test, made larger for the number of channels (Holm); NaN without a test.
+    joint: The structure that is recommended for all of them.
+    parameters: Of the joint model.
+    numbers: N and K for a filter.
+    curve_inflation: By how much the amplitudes of the joint model must grow so that its curve is
+        nowhere below that of a recording's own model; NaN without a joint model.
     """
 
     name: str

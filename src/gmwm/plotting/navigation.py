@@ -37,14 +37,9 @@ def track(
 ) -> Figure:
     """A track with its outages, and what filters made of it.
 
-    Parameters
-    ----------
-    truth : (n, 2) ndarray
-        East and north, m.
-    outages : sequence of (k, 2) ndarray
-        The parts of the track without GNSS.
-    solutions : mapping of str to sequence of (k, 2) ndarray
-        Name -> estimated positions during each outage.
+    truth: (n, 2), east and north, m.
+    outages: The parts of the track without GNSS.
+    solutions: Name -> estimated positions during each outage.
     """
     import matplotlib.pyplot as plt
 
@@ -85,14 +80,9 @@ def errors(
 ) -> Figure:
     """True errors of one run with the bands of 1 and 3 sigma that each filter predicted.
 
-    Parameters
-    ----------
-    panels : mapping of str to (time, error, sd)
-        Name -> times (K,), s; errors and predicted standard deviations (K, d).
-    spans : sequence of (start, end)
-        Outages, s.
-    labels : sequence of str, optional
-        Of the d components.
+    panels: Name -> times (K,), s; errors and predicted standard deviations (K, d).
+    spans: Outages, s.
+    labels: Of the d components.
     """
     import matplotlib.pyplot as plt
 
@@ -145,13 +135,9 @@ def growth(
 ) -> Figure:
     """Growth of errors in outages: root mean square over the runs, and what filters predicted.
 
-    Parameters
-    ----------
-    panels : mapping of str to mapping of str to (time, rms, predicted)
-        Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
+    panels: Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
         errors and of the predicted ones, (K, d).
-    labels : sequence of str, optional
-        Of the d components.
+    labels: Of the d components.
     """
     import matplotlib.pyplot as plt
 
@@ -231,13 +217,9 @@ def _plain(ax: Axes) -> None:
 def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) -> Figure:
     """An estimated track, the fixes that it rests on, and its part without fixes.
 
-    Parameters
-    ----------
-    track : (n, 2) ndarray
-        East and north, m.
-    fixes : (k, 2) ndarray
-    without : (j, 2) ndarray
-        Part of the track.
+    track: (n, 2), east and north, m.
+    fixes: (k, 2).
+    without: (j, 2), part of the track.
     """
     import matplotlib.pyplot as plt
 
@@ -262,18 +244,12 @@ def measured_outage(
 ) -> Figure:  # fmt: skip
     """A time without fixes: its track, and errors of three components with their bands.
 
-    Parameters
-    ----------
-    track, without, fixes : (n, 2), (j, 2), (k, 2) ndarray
-        East and north, m: of the solution, of its part without fixes, and of the fixes.
-    time : (n,) ndarray
-        Of the solution, s.
-    sd : (n, 3) ndarray
-        Predicted standard deviations to the north, east and down, m.
-    fix_time : (e,) ndarray
-        s.
-    error : (e, 3) ndarray
-        Fixes less where they were expected, m.
+    track, without, fixes: (n, 2), (j, 2), (k, 2), east and north, m: of the solution, of its part
+        without fixes, and of the fixes.
+    time: (n,), of the solution, s.
+    sd: (n, 3), predicted standard deviations to the north, east and down, m.
+    fix_time: (e,), s.
+    error: (e, 3), fixes less where they were expected, m.
     """
     import matplotlib.pyplot as plt
 
@@ -304,10 +280,8 @@ def measured_outage(
 def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> Figure:
     """Innovations of three components with the bands of 1 and 3 sigma that a filter expected.
 
-    Parameters
-    ----------
-    panels : mapping of str to (time, value, sd)
-        Kind with its unit -> times (K,), s; innovations and expected standard deviations (K, 3).
+    panels: Kind with its unit -> times (K,), s; innovations and expected standard deviations (K,
+        3).
     """
     import matplotlib.pyplot as plt
 
@@ -340,14 +314,9 @@ def outages_compared(
 ) -> Figure:
     """Errors at the end of each outage, model by model, and their ratios.
 
-    Parameters
-    ----------
-    time : (K,) ndarray
-        Ends of the outages, s.
-    panels : mapping of str to mapping of str to ((K,) ndarray, float)
-        Quantity with its unit -> name -> errors, and their root mean square as predicted.
-    ratios : mapping of str to three floats
-        What is compared with what -> ratio of the errors, lower and upper end of its interval.
+    time: (K,), ends of the outages, s.
+    panels: Quantity with its unit -> name -> errors, and their root mean square as predicted.
+    ratios: What is compared with what -> ratio of the errors, lower and upper end of its interval.
     """
     import matplotlib.pyplot as plt
 

@@ -32,18 +32,8 @@ def simulated_imu(
 ) -> tuple[Recording, dict[str, Model]]:
     """A six-axis static recording and the model of each of its channels.
 
-    Parameters
-    ----------
-    seconds : float
-        Length.
-    seed : int
-    sensors : SensorModels, optional
-
-    Returns
-    -------
-    Recording
-    dict
-        Channel name -> Model that made it.
+    seconds: Length.
+    Returns: dict, channel name -> Model that made it.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE)

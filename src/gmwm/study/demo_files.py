@@ -22,17 +22,8 @@ _AXES = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xy
 def write_demo_files(folder: Path, seconds: float, seed: int) -> tuple[float, float, float]:
     """Write ``static.csv``, ``imu.csv`` and ``fixes.csv``.
 
-    Parameters
-    ----------
-    folder : Path
-    seconds : float
-        Length of the recording at rest.
-    seed : int
-
-    Returns
-    -------
-    tuple of float
-        From the IMU to the antenna: forward, right, down; m.
+    seconds: Length of the recording at rest.
+    Returns: from the IMU to the antenna: forward, right, down; m.
     """
     still = sensors().simulate(round(seconds * RATE), 1.0 / RATE, np.random.default_rng(seed)).total
     _write(folder / "static.csv", _inertial(still + np.array([0, 0, 0, 0, 0, -_GRAVITY])))

@@ -33,25 +33,15 @@ from gmwm.variance.pilot import pilot_psd
 class Levels:
     """The levels of a series, gaps included.
 
-    Attributes
-    ----------
-    values : (n,) ndarray
-        About their mean; NaN where samples are missing.
-    runs : Runs
-        The samples that exist.
-    averaging : (J,) ndarray
-        Averaging times, in samples, of the levels with a coefficient.
-    wavelet : str
-    filling : Filling or None
-        How short gaps are filled; ``None`` where none are.
-    change : (J,) ndarray
-        Of the expected variances by filling, relative.
-    error : (J,) ndarray
-        Wavelet variances of the error of the filling, relative.
-    filled : (J,) ndarray of bool
-        Levels for which gaps are filled.
-    parts : (P,) ndarray
-        Where the series begins anew with another level; its line has one level in each part.
+    values: (n,), about their mean; NaN where samples are missing.
+    runs: The samples that exist.
+    averaging: (J,), averaging times, in samples, of the levels with a coefficient.
+    filling: How short gaps are filled; ``None`` where none are.
+    change: (J,), of the expected variances by filling, relative.
+    error: (J,), wavelet variances of the error of the filling, relative.
+    filled: (J,) of bool, levels for which gaps are filled.
+    parts: (P,), where the series begins anew with another level; its line has one level in each
+        part.
     """
 
     values: FloatArray

@@ -20,16 +20,11 @@ def haar_moments(
 ) -> FloatArray:
     """Mean and mean square of the Haar MODWT coefficients that lie within a run, (L, 2).
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        About their mean.
-    integral : (n + 1,) ndarray
-        Their cumulative sum, starting with 0.
-    runs : (P, 2) ndarray
-        First sample of each run, and the one after its last.
-    averaging : (L,) ndarray
-        Averaging times in samples: powers of two in a row, of each of which a window fits a run.
+    values: (n,), about their mean.
+    integral: (n + 1,), their cumulative sum, starting with 0.
+    runs: (P, 2), first sample of each run, and the one after its last.
+    averaging: (L,), averaging times in samples: powers of two in a row, of each of which a window
+        fits a run.
     """
     m = averaging.astype(np.int64)
     first = int(m[0]).bit_length() - 1

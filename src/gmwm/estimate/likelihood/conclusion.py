@@ -33,15 +33,8 @@ def conclude_likelihood(
     Where the wavelet variances are those of a series whose gaps are bridged by lines, nothing is
     concluded from how the model agrees with them.
 
-    Parameters
-    ----------
-    series : Series
-        What was fitted; its wavelet variances test the fit.
-    found : Estimates
-    method : str
-    log_likelihood : float
-    notices, trace : sequence
-        See `Fit`.
+    series: What was fitted; its wavelet variances test the fit.
+    notices, trace: See `Fit`.
     """
     comparison, agrees = _compared(series, found)
     misfits = not (agrees or series.is_bridged)

@@ -23,12 +23,7 @@ _SMALL = 0.1  # of the variance that is all of the data: of terms that are not n
 
 
 def candidates(series: Series) -> list[tuple[Process, ...]]:
-    """Values of the noise terms of a series' model, eight sets where a shape is open.
-
-    Parameters
-    ----------
-    series : Series
-    """
+    """Values of the noise terms of a series' model, eight sets where a shape is open."""
     try:
         design = Design(Model(series.coordinates.noise), Scales.of(series.wv))
     except InputError:

@@ -27,15 +27,9 @@ _FINE = 2000
 class Top:
     """The maximum of a likelihood over the open parameters of some terms.
 
-    Attributes
-    ----------
-    processes : tuple of Process
-        The terms at the maximum.
-    maximum : Maximum
-    information : (d, d) ndarray
-        Observed information of the coordinates.
-    likelihood : callable
-        The log-likelihood of any processes.
+    processes: The terms at the maximum.
+    information: (d, d), observed information of the coordinates.
+    likelihood: The log-likelihood of any processes.
     """
 
     processes: tuple[Process, ...]
@@ -63,16 +57,10 @@ def upper_bound(process: Process, coordinates: Coordinates, top: Top, columns: C
     be seen shows in few degrees of freedom, so that the likelihood falls off much slower than its
     curvature at zero shows.
 
-    Parameters
-    ----------
-    process : Process
-        The term; its amplitude does not matter.
-    coordinates : Coordinates
-        Of the other terms.
-    top : Top
-        Of the other terms.
-    columns : Columns
-        The series.
+    process: The term; its amplitude does not matter.
+    coordinates: Of the other terms.
+    top: Of the other terms.
+    columns: The series.
     """
     power = next(p.power for p in process.parameters if p.linear)
 

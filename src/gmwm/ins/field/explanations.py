@@ -35,20 +35,12 @@ Change = Callable[[Replay], Replay]
 class Explanation:
     """A change of what a filter assumes.
 
-    Attributes
-    ----------
-    code, where : str
-        What is wrong, and with what.
-    change : callable
-        What is assumed of any log.
-    replay : Replay
-        This log under the changed assumptions.
-    gain : float
-        Of the log-likelihood of the fixes.
-    cost : float
-        Gain that is reached by chance with the probability of a false alarm.
-    values, errors : dict
-        What was estimated, in SI units, and standard errors.
+    code, where: What is wrong, and with what.
+    change: What is assumed of any log.
+    replay: This log under the changed assumptions.
+    gain: Of the log-likelihood of the fixes.
+    cost: Gain that is reached by chance with the probability of a false alarm.
+    values, errors: What was estimated, in SI units, and standard errors.
     """
 
     code: str
@@ -70,16 +62,10 @@ class Explanation:
 class Candidate:
     """An explanation that is worth a closer look if its first gain is among the largest.
 
-    Attributes
-    ----------
-    codes : frozenset of str
-        What would be found.
-    gain : float
-        A first guess, after few runs of the filter.
-    refined : callable
-        What is found; several that go together have the same gain and cost.
-    errors : dict
-        Standard errors of constant errors that are estimated together, whether there are any or
+    codes: What would be found.
+    gain: A first guess, after few runs of the filter.
+    refined: What is found; several that go together have the same gain and cost.
+    errors: Standard errors of constant errors that are estimated together, whether there are any or
         not.
     """
 

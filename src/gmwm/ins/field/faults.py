@@ -29,18 +29,11 @@ _CONSTANT = frozenset({"time-offset", "lever-arm", "heading"})
 class Faults:
     """What explains the innovations of a log better than that all is right.
 
-    Attributes
-    ----------
-    found : tuple of Explanation
-        Each given those before it; empty if there is none.
-    alternatives : tuple of str
-        Codes that explain the log nearly as well as the first.
-    explained : bool
-        Whether the innovations agree with the filter, with these allowed for.
-    replay : Replay
-        The log with these allowed for.
-    resolution : dict
-        Constant error -> its standard error from this motion, s, m, rad.
+    found: Each given those before it; empty if there is none.
+    alternatives: Codes that explain the log nearly as well as the first.
+    explained: Whether the innovations agree with the filter, with these allowed for.
+    replay: The log with these allowed for.
+    resolution: Constant error -> its standard error from this motion, s, m, rad.
     """
 
     found: tuple[Explanation, ...]
@@ -55,10 +48,6 @@ class Faults:
 
         One after the other, the explanation is taken that makes the fixes most probable, as long as
         it is more than chance would give.
-
-        Parameters
-        ----------
-        whole : Replay
         """
         base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
         here, found = base, list[Explanation]()

@@ -16,18 +16,10 @@ def check_axes(source: str, time: FloatArray, position: FloatArray, velocity: Fl
     A filter would blame the sensors. How far the vehicle went by the positions is compared with the
     integral of the velocities.
 
-    Parameters
-    ----------
-    source : str
-    time : (E,) ndarray
-        s.
-    position, velocity : (E, 3) ndarray
-        Latitude, longitude (rad), height (m); north, east, down (m/s); NaN where there is none.
-
-    Raises
-    ------
-    InputError
-        If the way by the velocities fits far better with an exchange.
+    time: (E,), s.
+    position, velocity: (E, 3), latitude, longitude (rad), height (m); north, east, down (m/s); NaN
+        where there is none.
+    Raises InputError if the way by the velocities fits far better with an exchange.
     """
     there = np.all(np.isfinite(position) & np.isfinite(velocity), axis=1)
     time, position, velocity = time[there], position[there], velocity[there]

@@ -48,17 +48,11 @@ _PASSED_OVER = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"}
 class FixLog:
     """GNSS fixes as a file says them.
 
-    Attributes
-    ----------
-    time : (E,) ndarray
-        On the receiver's clock, s.
-    position, velocity : (E, 3) ndarray or None
-        Latitude, longitude (rad), height (m); to the north, east and down (m/s); NaN where there
-        is none.
-    position_sd, velocity_sd : (E, 3) ndarray or None
-        To the north, east and down; ``None`` where the file has none.
-    source : str
-    notices : tuple of Notice
+    time: (E,), on the receiver's clock, s.
+    position, velocity: (E, 3) or None, latitude, longitude (rad), height (m); to the north, east
+        and down (m/s); NaN where there is none.
+    position_sd, velocity_sd: (E, 3) or None, to the north, east and down; ``None`` where the file
+        has none.
     """
 
     time: FloatArray
@@ -78,14 +72,9 @@ class FixLog:
     ) -> Aiding:
         """The fixes on the clock of an IMU.
 
-        Parameters
-        ----------
-        start : float, optional
-            Time of the IMU's first epoch, s.
-        position_sd, velocity_sd : three floats, optional
-            Where the file says none, m and m/s.
-        lever_arm : three floats, optional
-            From the IMU to the antenna, body axes, m.
+        start: Time of the IMU's first epoch, s.
+        position_sd, velocity_sd: Where the file says none, m and m/s.
+        lever_arm: From the IMU to the antenna, body axes, m.
         """
         fixes = []
         for kind, value, own, usual in (
@@ -186,21 +175,9 @@ def _read(table: CsvTable, scale: str) -> FixLog:
 def read_heights(path: str | os.PathLike[str]) -> tuple[str, FloatArray, FloatArray]:
     """Read heights of a barometer.
 
-    Parameters
-    ----------
-    path : str or path
-        Delimited text with columns time and height.
-
-    Returns
-    -------
-    source : str
-    time, height : (E,) ndarray
-        s and m; NaN where there is none.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used.
+    path: Delimited text with columns time and height.
+    Returns: source; time, height (E,), s and m; NaN where there is none.
+    Raises InputError if the file cannot be used.
     """
     with in_seconds(Path(path)) as (numbers, _):
         table = open_log(numbers)

@@ -43,15 +43,11 @@ _COLUMNS = (
 class Hole:
     """The longest time without a position fix.
 
-    Attributes
-    ----------
-    start, end : float
-        s since the filter's start.
-    sd : tuple of three floats
-        Predicted standard deviations of the position to the north, east and down before the fix
-        at its end, m; NaN if the filter diverged before.
-    distance : float or None
-        Horizontal distance of that fix from where it was expected, m; ``None`` if none follows.
+    start, end: s since the filter's start.
+    sd: Predicted standard deviations of the position to the north, east and down before the fix at
+        its end, m; NaN if the filter diverged before.
+    distance: Horizontal distance of that fix from where it was expected, m; ``None`` if none
+        follows.
     """
 
     start: float

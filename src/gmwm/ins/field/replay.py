@@ -25,21 +25,12 @@ from gmwm.process import Model, Process
 class Replay:
     """What a filter of real data starts from.
 
-    Attributes
-    ----------
-    imu : Imu
-        From the first epoch of the filter on.
-    state : NavState
-        At that epoch.
-    sd : InitialSd
-    models : SensorModels
-    aiding : Aiding
-        On the time of ``imu``.
-    stood : float
-        Time at rest of which the gyros' mean is subtracted, s; their ``bias_sd`` is how well it is
-        known then. 0 if there is none.
-    turned : float
-        Time over which the gyros turned the heading back to the start, s.
+    imu: From the first epoch of the filter on.
+    state: At that epoch.
+    aiding: On the time of ``imu``.
+    stood: Time at rest of which the gyros' mean is subtracted, s; their ``bias_sd`` is how well it
+        is known then. 0 if there is none.
+    turned: Time over which the gyros turned the heading back to the start, s.
     """
 
     imu: Imu
@@ -52,13 +43,7 @@ class Replay:
 
     @classmethod
     def of(cls, measured: Measured, alignment: Alignment) -> Replay:
-        """Real data from where they are aligned.
-
-        Parameters
-        ----------
-        measured : Measured
-        alignment : Alignment
-        """
+        """Real data from where they are aligned."""
         imu, aiding = started(measured.imu, measured.aiding, alignment)
         models = measured.sensors
         if alignment.gyro_bias_sd is not None:

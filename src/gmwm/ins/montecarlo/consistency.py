@@ -25,13 +25,8 @@ LEVELS = (0.5, 0.68, 0.95, 0.997)
 class Ratio:
     """A statistic that is 1 for a consistent filter.
 
-    Attributes
-    ----------
-    value : float
-    lower, upper : float
-        Band of 95 % in which it lies if the filter is consistent.
-    p_value : float
-        Two-sided probability of a value as far from 1, if it is.
+    lower, upper: Band of 95 % in which it lies if the filter is consistent.
+    p_value: Two-sided probability of a value as far from 1, if it is.
     """
 
     value: float
@@ -49,12 +44,7 @@ class Ratio:
 class Coverage:
     """How many errors lay within the predicted interval of a level.
 
-    Attributes
-    ----------
-    level : float
-    fraction : float
-    lower, upper : float
-        Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
+    lower, upper: Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
         *Biometrika* 26, 404-413), and over a time with as many draws as the scatter between the
         runs is worth (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
     """
@@ -173,12 +163,8 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
 class InnovationTest:
     """What a filter can be asked where no truth is known.
 
-    Attributes
-    ----------
-    nis : Ratio
-        Normalised innovation squared per degree of freedom.
-    whiteness : float
-        p-value of no correlation from one fix to the next.
+    nis: Normalised innovation squared per degree of freedom.
+    whiteness: p-value of no correlation from one fix to the next.
     """
 
     nis: Ratio

@@ -100,10 +100,7 @@ def judged(
 ) -> dict[str, FloatArray]:
     """What is kept of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
 
-    Parameters
-    ----------
-    outputs : Outputs
-        The K epochs that were asked for.
+    outputs: The K epochs that were asked for.
     """
     done, total = solution.time.size, outputs.epoch.size
     error = solution.errors(truth)

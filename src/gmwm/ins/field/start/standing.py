@@ -18,10 +18,7 @@ _WINDOWS = 1024  # looked at together: a few MB
 def positions_of(aiding: Aiding) -> Fixes:
     """Position fixes.
 
-    Raises
-    ------
-    InputError
-        If there are none.
+    Raises InputError if there are none.
     """
     found = aiding.of("position")
     if found is None:
