@@ -150,7 +150,7 @@ def squared_sine(f: FloatArray, dt: float) -> FloatArray:
 
 @_kept
 def log_tangent(f: FloatArray, dt: float) -> FloatArray:
-    """log tan(pi |f| dt) at frequencies f in Hz, up to half the sampling rate."""
+    """Log tan(pi |f| dt) at frequencies f in Hz, up to half the sampling rate."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5))))
 

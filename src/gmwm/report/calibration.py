@@ -95,7 +95,7 @@ def page(
         ],
         health=health(calibration),
         channels=[
-            _channel(name, calibration, numbers[SHOWN], sheet) | of_samples.get(name, {})
+            _channel(name, calibration, numbers[SHOWN], sheet) | of_samples[name]
             for name in calibration
         ],
         navigation=navigation(calibration),
@@ -132,10 +132,10 @@ def _side_by_side(
 ) -> tuple[dict[float, Certified], dict[str, dict[str, Any]]]:
     """What a filter should believe, and the figures of the samples: what takes longest."""
     believed = partial(certified, calibration)
+    samples = {} if recording is None else recording
     drawn = {
-        name: partial(_of_samples, fit, recording[name], calibration.left_out.get(name, ()))
+        name: partial(_of_samples, fit, samples.get(name), calibration.left_out.get(name, ()))
         for name, fit in calibration.items()
-        if recording is not None and name in recording
     }
     # The first is sent to another process, and the next done in this one, whose exports ask for
     # some of the numbers again.
@@ -145,7 +145,9 @@ def _side_by_side(
     return found[believed], {name: found[each] for name, each in drawn.items()}
 
 
-def _of_samples(fit: Fit, channel: Channel, spans: Spans) -> dict[str, Any]:
+def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, Any]:
+    if channel is None:
+        return {"density": None, "series": None}
     return {
         "density": density_figure(fit, channel, spans),
         "series": series_figure(fit, channel, spans),
