@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ class Jumps:
     interval : float
         Sampling interval, in the unit of the stamps.
     repeated : (r,) ndarray of int
-        Rows that repeat the one before them.
+        Rows that repeat one before them.
     set_at : (s,) ndarray of int
         First row after each time that the clock was set.
     """
@@ -87,6 +87,11 @@ class Jumps:
             return False
         low, usual, high = np.quantile(np.diff(self.rows), [0.25, 0.5, 0.75])
         return bool(high - low <= 1.0 + 0.1 * usual)
+
+    def among(self, kept: _Rows, copies: _Rows) -> Jumps:
+        """The same by the numbers of all rows, of which some were kept and others repeat one."""
+        repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
+        return replace(self, rows=kept[self.rows], repeated=repeated, set_at=kept[self.set_at])
 
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
