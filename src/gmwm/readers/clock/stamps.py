@@ -123,8 +123,8 @@ class Clock:
                 same=lambda order: self.same(kept[order]),
             )
             timing = rest.timing(expected)
-            notices = (*timing.notices, _repeated_notice(copies.size))
-            return replace(timing, jumps=timing.jumps.among(kept, copies), notices=notices)
+            found = (*timing.notices, _repeated_notice(copies.size))
+            return replace(timing, jumps=timing.jumps.among(kept, copies), notices=found)
         unwrapped = _unwrapped(self.stamps)
         if unwrapped is not None:
             text = "the counter of the time stamps ran over: they were continued"
