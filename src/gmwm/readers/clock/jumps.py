@@ -218,12 +218,13 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     missing = np.maximum(np.rint(advance) - 1.0, 0.0)
     real = missing > 0.0
     rows, advance, missing = candidates[real], advance[real], missing[real]
+    del steps  # the line needs as much memory
     advances = np.ones(stamps.size, dtype=np.int64)
     advances[rows] += missing.astype(np.int64)
     # What a jump off the grid goes beyond it belongs to no interval.
     starts = np.zeros(stamps.size, dtype=bool)
     starts[rows[_off_grid(advance, missing)]] = True
-    line = interval_of(stamps, np.cumsum(advances), starts)
+    line = interval_of(stamps, np.cumsum(advances, out=advances), starts)
     return Jumps(rows, advance, missing, line)
 
 
