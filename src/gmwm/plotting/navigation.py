@@ -124,10 +124,12 @@ def _draw_error(
     _plain(ax)
 
 
-def _draw_bands(ax: Axes, time: FloatArray, sd: FloatArray, what: str, **options: bool) -> None:
+def _draw_bands(
+    ax: Axes, time: FloatArray, sd: FloatArray, what: str, rasterized: bool = False
+) -> None:
     for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
         ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
-                        label=f"{factor:g} sigma {what}", **options)  # fmt: skip
+                        label=f"{factor:g} sigma {what}", rasterized=rasterized)  # fmt: skip
 
 
 def growth(

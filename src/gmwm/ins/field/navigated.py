@@ -182,7 +182,7 @@ class Navigated:
         return (
             self.solution.diverged_at is None
             and not self._misfits
-            and self._is_white
+            and not self.test().whiteness <= LEVEL  # NaN of too few
             and not self.faults.found
         )
 
@@ -193,11 +193,6 @@ class Navigated:
         tests["all"] = self.test().nis
         found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
-
-    @property
-    def _is_white(self) -> bool:
-        whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > LEVEL)
 
     @property
     def verdict(self) -> Notice:
@@ -295,13 +290,7 @@ class Navigated:
             at = float(self.clock(np.array([solution.diverged_at]))[0])
             lines += wrapped(f"the filter diverged at {at:.10g} s and was stopped", "- ", 2)
         lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
-        for kind in self.kinds:
-            test = self.test(kind)
-            mark = " " if test.nis.within else "*"
-            lines.append(
-                f"{kind:10} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
-                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
-            )
+        lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest
         lines += [f"largest: {far:.3g} sigma at {at:.10g} s", "", *self._accuracy(), ""]
         lines += wrapped(self.verdict.text)
