@@ -251,7 +251,6 @@ def _validate(
     from gmwm._core.files import folder_to_fill, replaceable, written
     from gmwm.ins.montecarlo import Validation
     from gmwm.ins.spec import experiment_from
-    from gmwm.report import write_validation_report
 
     with _named_in_messages(place):
         experiment = experiment_from(content, base)
@@ -266,7 +265,7 @@ def _validate(
         text = str(validation)
         with written(table) as stream:
             stream.write(text + "\n")
-        report = write_validation_report(validation, page)
+        report = validation.report(page)
     click.echo(text)
     click.echo(f"\nwrote {table}\nwrote {report}")
 
@@ -277,7 +276,6 @@ def _filter(
     """Filter real data."""
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.ins.field import Measured, Navigated
-    from gmwm.report import write_navigated_report
 
     with _named_in_messages(place):
         measured = Measured.of(content, base)
@@ -285,7 +283,7 @@ def _filter(
         paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
         navigated = Navigated.of(measured)
         navigated.write_solution(paths[0])
-        write_navigated_report(navigated, paths[1])
+        navigated.report(paths[1])
     if as_json:
         click.echo(json.dumps(navigated.to_dict(), allow_nan=False))
         return
@@ -299,12 +297,11 @@ def _compare(
     """Compare sensor models on real data."""
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.ins.field import Comparison
-    from gmwm.report import write_comparison_report
 
     with _named_in_messages(place):
         comparison = Comparison.of(content, base)
     with folder_to_fill(output) as folder:
-        page = write_comparison_report(comparison, replaceable(folder / "comparison.html"))
+        page = comparison.report(replaceable(folder / "comparison.html"))
     if as_json:
         click.echo(json.dumps(comparison.to_dict(), allow_nan=False))
         return

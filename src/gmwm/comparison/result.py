@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,7 +14,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, made_by, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -313,8 +312,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_sensor_comparison_report(
-            self, path, datasheet=datasheet, provenance=provenance
-        )
+        written: Path = made_by(
+            "write_sensor_comparison_report", self, path,
+            datasheet=datasheet, provenance=provenance,
+        )  # fmt: skip
         return written

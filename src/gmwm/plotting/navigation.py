@@ -105,7 +105,7 @@ def errors(
         axes[first + d - 1, column].tick_params(labelbottom=True)
     for ax in axes[-d:, (len(panels) - 1) % columns + 1 :].flat:
         ax.set_axis_off()
-    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -168,7 +168,7 @@ def growth(
             if row == rows - 1:
                 ax.set_xlabel("time since the outage began [s]")
     axes[0, 0].plot([], [], color=DATA_COLOUR, linestyle=":", label="predicted")
-    axes[0, 0].legend(fontsize="small")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -212,6 +212,12 @@ def _map(ax: Axes) -> None:
     _plain(ax)
 
 
+def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
+    """Of one panel, where it hides none."""
+    figure.legend(*ax.get_legend_handles_labels(), fontsize="x-small", ncols=4, title=title,
+                  title_fontsize="x-small", loc="outside upper center")  # fmt: skip
+
+
 def _plain(ax: Axes) -> None:
     ax.grid(True, color="#dddddd", linewidth=0.6)
     ax.set_axisbelow(True)
@@ -229,7 +235,7 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
 
     figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
     _draw_solution(ax, track, fixes, without, "longest time without fixes", 3)
-    ax.legend(fontsize="small")
+    _legend_above(figure, ax)
     return figure
 
 
@@ -298,7 +304,7 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
                 ax.set_ylabel(label)
         axes[0, column].set_title(title, fontsize="medium")
         axes[2, column].set_xlabel("time [s]")
-    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -329,8 +335,7 @@ def outages_compared(
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)
         _plain(ax)
-    axes[0].legend(fontsize="x-small", title="points: errors; lines: RMS as predicted",
-                   title_fontsize="x-small")  # fmt: skip
+    _legend_above(figure, axes[0], "points: errors; lines: RMS as predicted")
     axes[count - 1].set_xlabel("end of the outage [min]")
     ax = axes[count]
     for row, (ratio, lower, upper) in enumerate(ratios.values()):

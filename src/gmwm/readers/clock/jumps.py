@@ -88,6 +88,12 @@ class Jumps:
         low, usual, high = np.quantile(np.diff(self.rows), [0.25, 0.5, 0.75])
         return bool(high - low <= 1.0 + 0.1 * usual)
 
+    def sample(self, rows: _Rows) -> _Rows:
+        """Index of rows on the regular grid; -1 of that before the first."""
+        ahead = np.append(0.0, np.cumsum(self.missing)).astype(np.int64)
+        again = np.searchsorted(self.repeated, rows, side="right")
+        return np.asarray(rows + ahead[np.searchsorted(self.rows, rows, side="right")] - again)
+
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
 

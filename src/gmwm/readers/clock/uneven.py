@@ -52,7 +52,7 @@ class Followed:
         return not often and float(np.median(np.abs(self.late))) <= tuning.MOST_UNEVEN
 
 
-def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
+def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | None:
     """Number the rows of an uneven clock.
 
     Parameters
@@ -60,6 +60,8 @@ def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
     stamps : (n,) ndarray
     same : (n,) ndarray of bool
         Whether stamp and samples of a row are those of the row before.
+    extent : int
+        Samples that may be lost in one gap, at most.
 
     Returns
     -------
@@ -89,7 +91,7 @@ def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
     for memory in tuning.ROWS_OF_CLOCK:
         is_set_now = np.zeros(n, dtype=bool)
         follow(
-            (x - trend) / slope, same, float(n), start, sigma, memory, age,
+            (x - trend) / slope, same, float(extent), start, sigma, memory, age,
             costs, advance, is_set_now, tuning.ROWS_AT_ONCE,
         )  # fmt: skip
         is_set |= is_set_now
