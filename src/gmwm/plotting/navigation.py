@@ -63,10 +63,7 @@ def track(
             ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
         ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
     for ax in axes[0]:
-        ax.set_aspect("equal", adjustable="datalim")
-        ax.set_xlabel("east [m]")
-        ax.set_ylabel("north [m]")
-        _plain(ax)
+        _map(ax)
         # Below: solutions run from corner to corner.
         ax.legend(fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
@@ -120,13 +117,19 @@ def _draw_error(
     spans: Sequence[tuple[float, float]],
 ) -> None:
     """One component: its error in the bands of 3 and 1 sigma."""
-    for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
-                        label=f"{factor:g} sigma predicted")  # fmt: skip
+    _draw_bands(ax, time, sd, "predicted")
     ax.plot(time, error, color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
     for end in (end for span in spans for end in span):
         ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
     _plain(ax)
+
+
+def _draw_bands(
+    ax: Axes, time: FloatArray, sd: FloatArray, what: str, rasterized: bool = False
+) -> None:
+    for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
+        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
+                        label=f"{factor:g} sigma {what}", rasterized=rasterized)  # fmt: skip
 
 
 def growth(
@@ -202,6 +205,13 @@ def _styles(
     return list(zip(colours, dashes, named.items(), strict=True))
 
 
+def _map(ax: Axes) -> None:
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel("east [m]")
+    ax.set_ylabel("north [m]")
+    _plain(ax)
+
+
 def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
     """Of one panel, where it hides none."""
     figure.legend(*ax.get_legend_handles_labels(), fontsize="x-small", ncols=4, title=title,
@@ -224,18 +234,20 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=3, label="fixes",
-            rasterized=len(fixes) > _DENSE)  # fmt: skip
-    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
-            label="longest time without fixes")  # fmt: skip
-    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution",
-            rasterized=len(track) > _DENSE)  # fmt: skip
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("east [m]")
-    ax.set_ylabel("north [m]")
-    _plain(ax)
+    _draw_solution(ax, track, fixes, without, "longest time without fixes", 3)
     _legend_above(figure, ax)
     return figure
+
+
+def _draw_solution(
+    ax: Axes, track: FloatArray, fixes: FloatArray, without: FloatArray, label: str, size: int
+) -> None:
+    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=size, label="fixes",
+            rasterized=len(fixes) > _DENSE)  # fmt: skip
+    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
+    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution",
+            rasterized=len(track) > _DENSE)  # fmt: skip
+    _map(ax)
 
 
 def measured_outage(
@@ -254,16 +266,8 @@ def measured_outage(
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.6), layout="constrained")
-    ax = axes[0, 0]
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=4, label="fixes")
-    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
-            label="without fixes")  # fmt: skip
-    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("east [m]")
-    ax.set_ylabel("north [m]")
-    ax.legend(fontsize="x-small")
-    _plain(ax)
+    _draw_solution(axes[0, 0], track, fixes, without, "without fixes", 4)
+    axes[0, 0].legend(fontsize="x-small")
     for i, (ax, name) in enumerate(zip((axes[0, 1], axes[1, 0], axes[1, 1]),
                                        ("north", "east", "down"), strict=True)):  # fmt: skip
         ax.fill_between(time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0,
@@ -292,10 +296,7 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
     for column, (title, (time, value, sd)) in enumerate(panels.items()):
         for row, label in enumerate(("north", "east", "down")):
             ax = axes[row, column]
-            for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-                ax.fill_between(time, -factor * sd[:, row], factor * sd[:, row], color=_BAND,
-                                alpha=alpha, linewidth=0, rasterized=time.size > _DENSE,
-                                label=f"{factor:g} sigma expected")  # fmt: skip
+            _draw_bands(ax, time, sd[:, row], "expected", rasterized=time.size > _DENSE)
             ax.plot(time, value[:, row], ".", color=COMPONENT_COLOURS[1], markersize=3,
                     rasterized=time.size > _DENSE, label="innovation")  # fmt: skip
             _plain(ax)

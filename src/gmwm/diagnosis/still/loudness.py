@@ -35,7 +35,7 @@ def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
 
     scatter: (blocks, axes), variance within each block, u^2; NaN where it is not known.
     step: (axes,), to which samples are rounded, u; 0 where they are not.
-    Returns: the rest, without loud blocks where their scatter does no harm.
+    Returns: no loud block where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
     # Without rounding a block that does not scatter at all is dead, not quiet.

@@ -21,7 +21,12 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.likelihood.conclusion import conclude_likelihood
+from gmwm.estimate.likelihood.conclusion import (
+    Top,
+    conclude_likelihood,
+    redundant_term,
+    upper_bound,
+)
 from gmwm.estimate.likelihood.expectation import Expectation, expect
 from gmwm.estimate.likelihood.likelihood import (
     Columns,
@@ -38,7 +43,6 @@ from gmwm.estimate.likelihood.maximization import (
 )
 from gmwm.estimate.likelihood.scoring import Maximum, observed_information, regular_inverse
 from gmwm.estimate.likelihood.series import Series
-from gmwm.estimate.likelihood.vanishing import Top, redundant_term, upper_bound
 from gmwm.estimate.problem import Coordinates, Slope, spectral_information
 from gmwm.estimate.result import Estimates, Fit
 from gmwm.process import Model, Process, StateSpace, as_model

@@ -183,7 +183,7 @@ class Navigated:
         return (
             self.solution.diverged_at is None
             and not self._misfits
-            and self._is_white
+            and not self.test().whiteness <= LEVEL  # NaN of too few
             and not self.faults.found
         )
 
@@ -194,11 +194,6 @@ class Navigated:
         tests["all"] = self.test().nis
         found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
-
-    @property
-    def _is_white(self) -> bool:
-        whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > LEVEL)
 
     @property
     def verdict(self) -> Notice:
@@ -293,13 +288,7 @@ class Navigated:
         for notice in self.notices:
             lines += wrapped(str(notice), "- ", 2)
         lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
-        for kind in self.kinds:
-            test = self.test(kind)
-            mark = " " if test.nis.within else "*"
-            lines.append(
-                f"{kind:10} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
-                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
-            )
+        lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest
         lines.append(f"largest: {far:.3g} sigma at {at:.10g} s")
         for sentence in (*self.accuracy, self.verdict.text):

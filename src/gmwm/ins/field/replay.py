@@ -16,7 +16,7 @@ from gmwm.ins.field.start import Alignment, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio
+from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory import NavState
 from gmwm.process import Model, Process
 
@@ -252,11 +252,7 @@ def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) ->
     found = [each for each in found if each != KINDS["standstill"]]
     parts = [innovations.standard[innovations.kind == each] for each in found]
     seen = np.concatenate([part[np.isfinite(part)] for part in parts])
-    products = np.concatenate([(part[1:] * part[:-1]).ravel() for part in parts])
-    products = products[np.isfinite(products)]
-    scale = float(np.sqrt(np.sum(products**2)))
-    whiteness = 2.0 * norm.sf(abs(np.sum(products)) / scale) if scale > 0.0 else float("nan")
-    return InnovationTest(chi_square_ratio(seen**2, 1), float(whiteness))
+    return InnovationTest(chi_square_ratio(seen**2, 1), float(2.0 * norm.sf(abs(lag_one(parts)))))
 
 
 def _scaled(term: Process, factor: float) -> Process:

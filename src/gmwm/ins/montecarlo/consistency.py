@@ -6,6 +6,7 @@ Navigation*, sec. 5.4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,21 +102,9 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
         Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
-    nees, coverage, rms, score = {}, {}, {}, {}
-    for i, (name, part) in enumerate(GROUPS.items()):
-        size = part.stop - part.start
-        squares = runs.nees[alive, index, i]
-        nees[name] = chi_square_ratio(squares, size)
-        standard = runs.error[alive, index, part] / runs.sd[alive, index, part]
-        coverage[name] = covered(standard)
-        rms[name] = _rms(standard)
-        score[name] = _score(squares, runs.log_det[alive, index, i], size)
-    if np.any(np.isfinite(runs.sensor_nees[alive, index])):
-        size = int(np.sum(np.all(runs.sensor_sd[alive, index] > 0.0, axis=0)))
-        nees["sensors"] = chi_square_ratio(runs.sensor_nees[alive, index], size)
-        standard = _standard_sensors(runs, alive, slice(index, index + 1))[:, 0]
-        coverage["sensors"], rms["sensors"] = covered(standard), _rms(standard)
-    return Consistency(nees, coverage, rms, score)
+    return _judged(
+        runs, alive, np.array([index]), chi_square_ratio, lambda standard: covered(standard[:, 0])
+    )
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
@@ -141,21 +130,34 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
             f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
         )
     alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
+    return _judged(
+        runs, alive, epochs, lambda squares, size: mean_ratio(np.mean(squares, axis=1) / size),
+        _covered_by_run,
+    )  # fmt: skip
+
+
+def _judged(
+    runs: FilterErrors, alive: np.typing.NDArray[np.bool_], epochs: np.typing.NDArray[np.intp],
+    sized: Callable[[FloatArray, int], Ratio],
+    counted: Callable[[FloatArray], tuple[Coverage, ...]],
+) -> Consistency:  # fmt: skip
+    """Of runs and epochs: ``sized`` makes the NEES of squares (R, K), ``counted`` the coverage."""
     nees, coverage, rms, score = {}, {}, {}, {}
     for i, (name, part) in enumerate(GROUPS.items()):
         size = part.stop - part.start
         squares = runs.nees[alive][:, epochs, i]
-        nees[name] = mean_ratio(np.mean(squares, axis=1) / size)
+        nees[name] = sized(squares, size)
         standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
-        coverage[name] = _covered_by_run(standard)
-        rms[name] = _rms(standard)
+        coverage[name], rms[name] = counted(standard), _rms(standard)
         score[name] = _score(squares, runs.log_det[alive][:, epochs, i], size)
     settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
     if np.any(alive) and settled.size:
-        size = int(np.sum(np.all(runs.sensor_sd[alive][:, settled] > 0.0, axis=(0, 1))))
-        nees["sensors"] = mean_ratio(np.mean(runs.sensor_nees[alive][:, settled], axis=1) / size)
-        standard = _standard_sensors(runs, alive, settled)
-        coverage["sensors"], rms["sensors"] = _covered_by_run(standard), _rms(standard)
+        # Of the sensors that have states.
+        error, sd = runs.sensor_error[alive][:, settled], runs.sensor_sd[alive][:, settled]
+        known = np.all(sd > 0.0, axis=(0, 1))
+        standard = np.asarray(error[..., known] / sd[..., known])
+        nees["sensors"] = sized(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
+        coverage["sensors"], rms["sensors"] = counted(standard), _rms(standard)
     return Consistency(nees, coverage, rms, score)
 
 
@@ -169,6 +171,11 @@ class InnovationTest:
 
     nis: Ratio
     whiteness: float
+
+    def __str__(self) -> str:
+        mark = " " if self.nis.within else "*"
+        band = f"(band {self.nis.lower:.4f} .. {self.nis.upper:.4f})"
+        return f"{self.nis.value:>8.5g}{mark} {band}, p = {self.whiteness:.2g}"
 
 
 def innovation_test(runs: FilterErrors) -> InnovationTest:
@@ -257,17 +264,6 @@ def _ratio(total: float, dof: float) -> Ratio:
     )
     p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
     return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
-
-
-def _standard_sensors(
-    runs: FilterErrors,
-    alive: np.typing.NDArray[np.bool_],
-    epochs: slice | np.typing.NDArray[np.intp],
-) -> FloatArray:
-    """Standardised errors of the sensors that have states, (R, K, d)."""
-    error, sd = runs.sensor_error[alive][:, epochs], runs.sensor_sd[alive][:, epochs]
-    known = np.all(sd > 0.0, axis=(0, 1))
-    return np.asarray(error[..., known] / sd[..., known])
 
 
 def _rms(standard: FloatArray) -> float:
