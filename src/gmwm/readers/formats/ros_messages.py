@@ -108,8 +108,8 @@ def decode(
         if foreign.size:
             row = int(foreign[0])
             raise InputError(
-                f"{where(row)}: encoding {int(head[row, 0]) << 8 | int(head[row, 1]):#06x} is not plain CDR: "
-                "record with a usual RMW, or convert the bag with ros2 bag convert"
+                f"{where(row)}: encoding {int(head[row, 0]) << 8 | int(head[row, 1]):#06x} is not "
+                "plain CDR: record with a usual RMW, or convert the bag with ros2 bag convert"
             )
     length = np.ascontiguousarray(head[:, -4:])
     frames = length.view("<u4")[:, 0].astype(np.int64)
