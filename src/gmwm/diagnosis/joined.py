@@ -71,19 +71,8 @@ def health_stream(path: Any, **reading: Any) -> Health:
 def joined(found: Sequence[Health]) -> Health:
     """The health of a recording from that of its consecutive stretches.
 
-    Parameters
-    ----------
-    found : sequence of Health
-
-    Returns
-    -------
-    Health
-        Itself, of one stretch.
-
-    Raises
-    ------
-    InputError
-        If there is none.
+    Returns: itself, of one stretch.
+    Raises InputError if there is none.
     """
     if not found:
         raise InputError("there is no stretch to join: give one at least")

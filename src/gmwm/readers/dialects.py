@@ -45,12 +45,8 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     name of the file, and time in nanoseconds. Gyroflow (gcsv): scales in the preamble. Xsens DOT:
     a clock of 1 MHz, where MTi has 10 kHz. Kalibr, ulog2csv of PX4 and rostopic: units of time.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file.
-    head : bytes
-        Its beginning.
+    source: Name of the file.
+    head: Its beginning.
     """
     names = layout.names
     if names[:1] == ("loopIteration",):

@@ -37,13 +37,7 @@ _CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 class ImuLog:
     """An IMU record with the clock that it was stamped by.
 
-    Attributes
-    ----------
-    imu : Imu
-    start : float
-        Time of the first epoch on that clock, s; 0 without time stamps.
-    source : str
-    notices : tuple of Notice
+    start: Time of the first epoch on that clock, s; 0 without time stamps.
     """
 
     imu: Imu
@@ -230,10 +224,7 @@ def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
 def _fill(record: _Record) -> tuple[Notice, ...]:
     """Fill short holes along straight lines, in place.
 
-    Raises
-    ------
-    InputError
-        If one is too long, or at an end.
+    Raises InputError if one is too long, or at an end.
     """
     most = max(round(tuning.LONGEST_FILLED / record.dt), 1)
     longest = 0

@@ -64,25 +64,13 @@ def read_blocks(
 ) -> Iterator[Recording]:
     """Read a static recording a block at a time, as `gmwm.read` does as a whole.
 
-    Parameters
-    ----------
-    path, rate, units, channels, time, layout, topic, clock, format
-        As in `gmwm.read`, of delimited text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of
-        ArduPilot, a binary layout or a table in memory; of one topic. Temperatures with stamps of
-        their own are left out.
-    rows : int, optional
-        Of a block, about.
-
-    Yields
-    ------
-    Recording
-        Consecutive parts on one grid of the sampling interval of the first; rows that are missing
-        between two of them are NaN at the beginning of the second.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used, or not a block at a time.
+    path, rate, units, channels, time, layout, topic, clock, format: As in `gmwm.read`, of delimited
+        text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of ArduPilot, a binary layout or a
+        table in memory; of one topic. Temperatures with stamps of their own are left out.
+    rows: Of a block, about.
+    Yields: consecutive parts on one grid of the sampling interval of the first; rows that are
+        missing between two of them are NaN at the beginning of the second.
+    Raises InputError if the file cannot be used, or not a block at a time.
     """
     opened = tables_of(path, layout, topic, clock, format)
     tables = [table for table in opened if has_sensors(table)] or opened

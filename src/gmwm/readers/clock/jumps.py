@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ class Jumps:
     interval : float
         Sampling interval, in the unit of the stamps.
     repeated : (r,) ndarray of int
-        Rows that repeat the one before them.
+        Rows that repeat one before them.
     set_at : (s,) ndarray of int
         First row after each time that the clock was set.
     """
@@ -93,6 +93,11 @@ class Jumps:
         ahead = np.append(0.0, np.cumsum(self.missing)).astype(np.int64)
         again = np.searchsorted(self.repeated, rows, side="right")
         return np.asarray(rows + ahead[np.searchsorted(self.rows, rows, side="right")] - again)
+
+    def among(self, kept: _Rows, copies: _Rows) -> Jumps:
+        """The same by the numbers of all rows, of which some were kept and others repeat one."""
+        repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
+        return replace(self, rows=kept[self.rows], repeated=repeated, set_at=kept[self.set_at])
 
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.

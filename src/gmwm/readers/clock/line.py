@@ -18,17 +18,10 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     usual jitter. From independent errors of the stamps of s intervals the slope has a relative
     error of ``s sqrt(12 / n^3)``, that from the first to the last stamp ``s sqrt(2) / n``.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
-    number : (n,) ndarray of int
-    starts : (n,) ndarray of bool
-        Where a part begins whose clock has an offset of its own.
-
-    Returns
-    -------
-    float
-        In the unit of the stamps.
+    stamps: (n,).
+    number: (n,) of int.
+    starts: (n,) of bool, where a part begins whose clock has an offset of its own.
+    Returns: a number in the unit of the stamps.
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]

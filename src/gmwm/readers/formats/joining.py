@@ -23,13 +23,8 @@ _SAMPLE = 0.5
 class Part:
     """The sensors of one topic.
 
-    Attributes
-    ----------
-    recording : Recording
-    start : float
-        Stamp of its first sample, s.
-    jumps : Jumps or None
-        Of its time stamps.
+    start: Stamp of its first sample, s.
+    jumps: Of its time stamps.
     """
 
     recording: Recording
@@ -59,10 +54,7 @@ def shares(
 ) -> list[tuple[Table, Collection[str] | None]]:
     """Which of the channels that the caller names are in which table; those without any go.
 
-    Raises
-    ------
-    InputError
-        If columns are assigned, which needs one table, or a channel is in none.
+    Raises InputError if columns are assigned, which needs one table, or a channel is in none.
     """
     source = tables[0].source
     if channels is None:
@@ -90,10 +82,7 @@ def shares(
 def joined(parts: Sequence[Part]) -> Recording:
     """Parts cut to the time that they have in common.
 
-    Raises
-    ------
-    InputError
-        If they have no such time, or hold the same channel.
+    Raises InputError if they have no such time, or hold the same channel.
     """
     first = parts[0].recording
     if len(parts) == 1:
