@@ -74,7 +74,7 @@ class FrameTable:
         place = f"{self.source}, column {label(self.names, column)}"
         is_time = pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
         if not (is_time or _is_number(kind)):
-            raise InputError(f"{place} holds {kind}: give numbers")
+            raise InputError(f"{place} holds {kind}: give numbers, a column for each axis")
         with damage_named(self.source):
             is_stamp = pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME
             if is_time or is_stamp:
