@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.resolution import step_size
@@ -20,14 +20,6 @@ def repetition(channel: Channel) -> Repetition | None:
 
     Of samples that are not repeated, every change is in the same place modulo k with a probability
     of 1/k, so that some dozen changes leave no room for chance, however coarse the rounding is.
-
-    Parameters
-    ----------
-    channel : Channel
-
-    Returns
-    -------
-    Repetition or None
     """
     steps = np.diff(channel.values)
     changes = np.flatnonzero((steps != 0.0) & ~np.isnan(steps)) + 1
@@ -58,14 +50,10 @@ def repetition_notice(channel: Channel, found: Repetition) -> Notice:
 
 
 def interpolation_notice(channel: Channel) -> Notice | None:
-    """Say that samples lie on straight lines between those of a lower rate.
+    """Say that samples lie on straight lines between others, all over or now and then.
 
     Second differences vanish but where two lines meet, which two of them see: of an interpolation
     from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
-
-    Parameters
-    ----------
-    channel : Channel
     """
     values = np.asarray(channel.values, dtype=float)
     steps = np.diff(values)
@@ -83,13 +71,18 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     if not limit < tuning.STRAIGHT_AT_MOST * size:
         return None  # steps as large as the noise
     share = float(np.mean(bends <= limit))
-    if share < max(tuning.LEAST_STRAIGHT, 10.0 * limit / size):
+    near = float(np.mean(bends <= tuning.NEARLY_STRAIGHT * size)) - share
+    if share < max(tuning.FEWEST_STRAIGHT, tuning.BESIDE_STRAIGHT * near, 10.0 * limit / size):
         return None
+    text = f"{share:.2g} of the samples lie on straight lines between others"
+    if share < tuning.LEAST_STRAIGHT:
+        values_of = {"share": share}
+        text += ": put there for samples that were lost or sorted out"
+        action = "make such samples missing (NaN)"
+        severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
+        return Notice("filled", severity, channel.name, text, values_of, action)
     rate = 0.5 * (1.0 - share) / channel.dt
-    text = (
-        f"{share:.0%} of the samples lie on straight lines between others: it was interpolated "
-        f"from about {rate:.3g} Hz, and its noise is not that of the sensor"
-    )
+    text += f": it was interpolated from about {rate:.3g} Hz, and its noise is not the sensor's"
     action = (
         "record what the sensor gives, in a topic of its own or without the driver's interpolation "
         "(RealSense: unite_imu_method 0); the channel is skipped in the calibration"
@@ -105,19 +98,10 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
     of no step are by a power of the ratio more frequent than those of one step by which these are
     than those of two: 1/3 of a Gaussian law.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples in their order, NaN where missing.
-    step : float
-        u; 0 if samples are not rounded: then none equals the one before by chance.
-    scatter : float
-        Standard deviation of what cannot be predicted of a sample, u.
-
-    Returns
-    -------
-    tuple of float
-        Zeros if chance, with three standard errors, explains those that repeat.
+    values: (n,), samples in their order, NaN where missing.
+    step: u; 0 if samples are not rounded: then none equals the one before by chance.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
+    Returns: zeros if chance, with three standard errors, explains those that repeat.
     """
     sizes = np.abs(np.diff(values))
     sizes = sizes[~np.isnan(sizes)]

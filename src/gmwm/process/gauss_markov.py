@@ -233,12 +233,8 @@ def _exponential(frequency: float, damping: float, dt: float) -> tuple[complex, 
 def real_haar(rate: float, m: FloatArray) -> FloatArray:
     """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
-    Parameters
-    ----------
-    rate : float
-        a > 0.
-    m : (J,) ndarray
-        Averaging times in samples.
+    rate: a > 0.
+    m: (J,), averaging times in samples.
     """
     result = np.empty(m.size)
     if rate > _WHITE_ABOVE:

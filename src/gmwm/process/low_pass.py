@@ -224,10 +224,7 @@ def low_pass_haar(
 ) -> FloatArray:
     """Haar wavelet variance at unit N, (J,); empty where panels are too wide for the spectrum.
 
-    Parameters
-    ----------
-    wide, narrow : (points, weights)
-        Of panels, see `on_panels`.
+    wide, narrow: (points, weights), of panels, see `on_panels`.
     """
     # Distance of the next pole of the spectrum from the real axis of log tan(pi f dt).
     pole = math.acos(max(1.0 - 2.0 * damping**2, -1.0)) / order

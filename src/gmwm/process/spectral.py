@@ -49,16 +49,10 @@ _MARGIN = 0.25  # a spectrum f^-a needs a < 2 r + 1 - _MARGIN: the lowest octave
 class Quadrature:
     """Nodes and gains for a set of averaging times.
 
-    Attributes
-    ----------
-    frequency : (K,) ndarray
-        Nodes in cycles per sample, within (0, 1/2).
-    weight : (K,) ndarray
-        Quadrature weights, in cycles per sample; their sum is 1/2.
-    gain : (J, K) ndarray
-        |H_m|^2 at the nodes, with unresolved lobes replaced by their mean.
-    resolved : (J, K) ndarray
-        Share of each gain that is resolved (1) rather than averaged over lobes (0).
+    frequency: (K,), nodes in cycles per sample, within (0, 1/2).
+    weight: (K,), quadrature weights, in cycles per sample; their sum is 1/2.
+    gain: (J, K), |H_m|^2 at the nodes, with unresolved lobes replaced by their mean.
+    resolved: (J, K), share of each gain that is resolved (1) rather than averaged over lobes (0).
     """
 
     frequency: FloatArray
@@ -320,19 +314,10 @@ _TAIL = (
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     """Haar wavelet variance of a process from its spectrum alone.
 
-    Parameters
-    ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, u^2/Hz.
-    tau : array_like
-        Averaging times in seconds.
-    dt : float
-        Sampling interval in seconds.
-
-    Returns
-    -------
-    ndarray
-        Same shape as ``tau``, in u^2.
+    psd: ``psd(f, dt)``, two-sided, u^2/Hz.
+    tau: Averaging times in seconds.
+    dt: Sampling interval in seconds.
+    Returns: same shape as ``tau``, in u^2.
     """
     tau = np.asarray(tau, dtype=float)
     result = quadrature(rounded(tuple((tau.ravel() / dt).tolist()))).haar_variance(psd, dt)

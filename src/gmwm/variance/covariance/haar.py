@@ -70,19 +70,12 @@ def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> Flo
 class _LagSums:
     """Everything about the coarse levels that does not depend on the spectrum.
 
-    Attributes
-    ----------
-    first : int
-        The finest of the coarse levels.
-    grid : LagGrid
-    averaging : (L,) ndarray of int
-        Averaging times, blocks.
-    amplitude : (L, F) ndarray
-        Gains over their phases.
-    weights : (H,) ndarray
-        How often each lag from zero on stands for itself and its negative.
-    counts : (L, L, H) ndarray
-        Pairs of coefficients at each lag, of those that there are, times ``weights``.
+    first: The finest of the coarse levels.
+    averaging: (L,) of int, averaging times, blocks.
+    amplitude: (L, F), gains over their phases.
+    weights: (H,), how often each lag from zero on stands for itself and its negative.
+    counts: (L, L, H), pairs of coefficients at each lag, of those that there are, times
+        ``weights``.
     """
 
     first: int
@@ -160,14 +153,10 @@ def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, Float
 class _Pairs:
     """Weights of the integrals of products of two gains against the square of a spectrum.
 
-    Attributes
-    ----------
-    panels : Panels
-    frequency : (P * 12,) ndarray
-        Points of the panels, cycles per sample.
-    weight : (pairs, P, 12) ndarray
-    first, second : (pairs,) ndarray
-        Levels.
+    panels: Of the frequencies.
+    frequency: (P * 12,), points of the panels, cycles per sample.
+    weight: (pairs, P, 12).
+    first, second: (pairs,), levels.
     """
 
     panels: Panels

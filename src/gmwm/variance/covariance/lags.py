@@ -20,12 +20,8 @@ _ZERO = 1e-4  # of a bin: the frequency that stands for zero
 class LagGrid:
     """Lags of covariances that are found by FFT, in blocks of samples.
 
-    Attributes
-    ----------
-    size : int
-        Number of lags, even.
-    block : int
-        Samples from lag to lag.
+    size: Number of lags, even.
+    block: Samples from lag to lag.
     """
 
     size: int
@@ -97,16 +93,10 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
 class _Folds:
     """What of `block_density` does not depend on the spectrum.
 
-    Attributes
-    ----------
-    frequency : (A,) ndarray
-        Of all folds, then of the rest of the band, cycles per sample.
-    smoothing : (folds, F) ndarray
-        Weights of the folds.
-    square : (F,) ndarray
-        Weight of the rest.
-    rest : (R,) ndarray
-        Weights of the integral over it.
+    frequency: (A,), of all folds, then of the rest of the band, cycles per sample.
+    smoothing: (folds, F), weights of the folds.
+    square: (F,), weight of the rest.
+    rest: (R,), weights of the integral over it.
     """
 
     frequency: FloatArray
