@@ -54,10 +54,7 @@ def is_number(value: Any) -> bool:
 def positive(name: str, value: Any, mend: str = "give a positive number") -> float:
     """A number above zero.
 
-    Raises
-    ------
-    InputError
-        For anything else; so do all functions of this module.
+    Raises InputError for anything else; so do all functions of this module.
     """
     if not is_number(value) or not value > 0.0:
         raise InputError(f"{name} = {shown(value)}: {mend}")

@@ -18,10 +18,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     What is compiled is kept in the folder of the package or that of the user's caches. Where
     neither can be written (containers, service users), each process compiles anew.
 
-    Parameters
-    ----------
-    **options
-        Of `numba.njit`, beside ``cache`` and ``nogil``.
+    **options: Of `numba.njit`, beside ``cache`` and ``nogil``.
     """
 
     def compile_it(function: Callable[..., Any]) -> Any:

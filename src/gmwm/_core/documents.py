@@ -69,10 +69,7 @@ class Document:
     def from_dict(cls, content: Any) -> Self:
         """Inverse of `to_dict`; gives an object of a subclass where the content is of one.
 
-        Raises
-        ------
-        InputError
-            If the content is of another schema or version, or damaged.
+        Raises InputError if the content is of another schema or version, or damaged.
         """
         kind = cls._kind_of(content)
         if kind is not None and kind is not cls and issubclass(kind, cls):
@@ -105,10 +102,8 @@ class Document:
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Inverse of `save`.
 
-        Raises
-        ------
-        InputError
-            If the file is missing, is not JSON, or holds something else or a damaged result.
+        Raises InputError if the file is missing, is not JSON, or holds something else or a damaged
+            result.
         """
         content = read_json(path)
         with _named(path):
@@ -117,10 +112,7 @@ class Document:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything as JSON; the file appears whole or not at all.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises InputError if it cannot be written.
         """
         with written(path) as stream:
             json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
@@ -131,10 +123,7 @@ class Document:
 def read_json(path: str | os.PathLike[str]) -> Any:
     """Content of a JSON file; its numbers are finite.
 
-    Raises
-    ------
-    InputError
-        If the file is missing or too large, is not JSON, or is nested too deeply.
+    Raises InputError if the file is missing or too large, is not JSON, or is nested too deeply.
     """
     try:
         with opened(path) as stream:
@@ -180,10 +169,7 @@ def _check_depth(content: Any) -> None:
 def load_document(path: str | os.PathLike[str]) -> Any:
     """A result from the file that its ``save`` wrote.
 
-    Raises
-    ------
-    InputError
-        If the file is missing, is not JSON, or holds no result of a kind known here.
+    Raises InputError if the file is missing, is not JSON, or holds no result of a kind known here.
     """
     content = read_json(path)
     kind = Document._kind_of(content)

@@ -20,10 +20,7 @@ from gmwm.errors import InputError
 def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary file to be filled; it takes its own name when all went well.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written.
+    Raises InputError if it cannot be written.
     """
     target = Path(path)
     try:
@@ -46,10 +43,7 @@ def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
 def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """Open a text file for writing under a temporary name; it takes its own when all went well.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written.
+    Raises InputError if it cannot be written.
     """
     with moved_into_place(path) as name, open(name, "w", encoding="utf-8") as stream:
         yield stream
@@ -61,10 +55,7 @@ def moved_together(folder: Path) -> Iterator[Path]:
 
     What stands in ``folder`` then is of one run: an interrupt comes before or after.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written.
+    Raises InputError if it cannot be written.
     """
     try:
         with tempfile.TemporaryDirectory(prefix=".gmwm-", dir=folder) as name:
@@ -95,10 +86,7 @@ def _interrupts_after() -> Iterator[None]:
 def existing_file(path: str | os.PathLike[str]) -> Path:
     """The path, if a file is there.
 
-    Raises
-    ------
-    InputError
-        If nothing is there, or no file: a directory, a pipe or a device.
+    Raises InputError if nothing is there, or no file: a directory, a pipe or a device.
     """
     found = Path(path)
     try:
@@ -114,12 +102,8 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
 def opened(path: str | os.PathLike[str]) -> BufferedReader:
     """A file, open for reading.
 
-    Raises
-    ------
-    OSError
-        If it cannot be opened.
-    InputError
-        If it is a pipe or a device.
+    Raises OSError if it cannot be opened.
+    Raises InputError if it is a pipe or a device.
     """
     found = Path(path)
     _check_regular(found, found.stat().st_mode)
@@ -135,10 +119,7 @@ def _check_regular(path: Path, mode: int) -> None:
 def replaceable(path: Path) -> Path:
     """The path, if a file can take its place.
 
-    Raises
-    ------
-    InputError
-        If a folder stands there.
+    Raises InputError if a folder stands there.
     """
     if path.is_dir():
         raise InputError(f"{path}: a folder of that name is in the way, move it")
@@ -148,10 +129,7 @@ def replaceable(path: Path) -> Path:
 def output_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder for outputs, and make sure that it can be written.
 
-    Raises
-    ------
-    InputError
-        If it cannot be made or written.
+    Raises InputError if it cannot be made or written.
     """
     folder = Path(path)
     try:
@@ -167,10 +145,7 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
 def folder_to_fill(path: str | os.PathLike[str]) -> Iterator[Path]:
     """An output folder, which is taken away again if it was made and an error left it empty.
 
-    Raises
-    ------
-    InputError
-        If it cannot be made or written.
+    Raises InputError if it cannot be made or written.
     """
     folder = Path(path)
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
@@ -187,10 +162,7 @@ def folder_to_fill(path: str | os.PathLike[str]) -> Iterator[Path]:
 def one_writer(folder: Path) -> Iterator[None]:
     """Keep others from filling the same folder at the same time.
 
-    Raises
-    ------
-    InputError
-        With the code "runs-in-use", if another process fills it.
+    Raises InputError with the code "runs-in-use", if another process fills it.
     """
     from filelock import FileLock, Timeout
 

@@ -29,10 +29,7 @@ class Form(BaseModel):
     def checked(cls, content: Mapping[str, Any]) -> dict[str, Any]:
         """The content, with texts on one line.
 
-        Raises
-        ------
-        InputError
-            With the place of the first thing that cannot be used.
+        Raises InputError with the place of the first thing that cannot be used.
         """
         if not isinstance(content, Mapping):
             raise InputError(f"{checks.shown(content)} has no keys")
@@ -67,10 +64,7 @@ Model = Annotated[Sequence[dict[str, Any]], Field(min_length=1, max_length=1000)
 def covariance(matrix: Sequence[Sequence[float]], size: int, name: str = "covariance") -> None:
     """Check a covariance: square, symmetric, without a negative variance.
 
-    Raises
-    ------
-    ValueError
-        If it is none.
+    Raises ValueError if it is none.
     """
     if len(matrix) != size or any(len(row) != size for row in matrix):
         raise ValueError(f"{name} is not {size} x {size}")

@@ -14,17 +14,9 @@ if TYPE_CHECKING:
 def frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> pandas.DataFrame:
     """A table.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Column -> value; others than ``columns`` are left out.
-    columns : sequence of str
-        In their order; an empty table has them too.
-
-    Raises
-    ------
-    InputError
-        If pandas is not installed.
+    rows: Column -> value; others than ``columns`` are left out.
+    columns: In their order; an empty table has them too.
+    Raises InputError if pandas is not installed.
     """
     try:
         import pandas

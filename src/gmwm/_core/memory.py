@@ -28,10 +28,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 def budget() -> int:
     """Bytes that may be used: as `VARIABLE` says, or half of what the machine has to give.
 
-    Raises
-    ------
-    InputError
-        If the variable holds something else than a positive number.
+    Raises InputError if the variable holds something else than a positive number.
     """
     limit = _LIMIT.get()
     if limit is not None:
@@ -49,10 +46,7 @@ def budget() -> int:
 def limited(gigabytes: float | None) -> Iterator[None]:
     """Allow so much, or a quarter of the machine, unless `VARIABLE` says how much.
 
-    Raises
-    ------
-    InputError
-        If it is not positive.
+    Raises InputError if it is not positive.
     """
     if gigabytes is not None and not 0.0 < gigabytes < 1e9:
         raise InputError(f"memory = {gigabytes!r}: give a positive number of gigabytes, e.g. 8")
@@ -69,17 +63,9 @@ def limited(gigabytes: float | None) -> Iterator[None]:
 def require(needed: float, what: str) -> None:
     """Refuse what needs more than the budget.
 
-    Parameters
-    ----------
-    needed : float
-        Bytes.
-    what : str
-        For the message: the file.
-
-    Raises
-    ------
-    InputError
-        With the code "memory".
+    needed: Bytes.
+    what: For the message: the file.
+    Raises InputError with the code "memory".
     """
     allowed = budget()
     if needed > allowed:

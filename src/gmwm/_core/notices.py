@@ -20,23 +20,14 @@ SEVERITIES: tuple[Severity, ...] = ("bad", "warning", "note", "good")
 class Notice:
     """One thing that people should know. Programs read ``code`` and ``values``, never ``text``.
 
-    Attributes
-    ----------
-    code : str
-        What kind of thing it is, in words joined by hyphens, e.g. ``"redundant-term"``.
-    severity : {"good", "note", "warning", "bad"}
-        "note": nothing is to be done; "warning": estimates may be off; "bad": what it is about
-        should not be used as it is.
-    where : str
-        The channel, parameter or file that it concerns; empty if it concerns the whole.
-    text : str
-        The report, with numbers and units, without the place.
-    values : dict
-        The numbers, in SI units, and the names that ``text`` mentions.
-    action : str
-        What is done about it, or should be.
-    source : str
-        The recording, where there are several.
+    code: What kind of thing it is, in words joined by hyphens, e.g. ``"redundant-term"``.
+    severity: {"good", "note", "warning", "bad"}, "note": nothing is to be done; "warning":
+        estimates may be off; "bad": what it is about should not be used as it is.
+    where: The channel, parameter or file that it concerns; empty if it concerns the whole.
+    text: The report, with numbers and units, without the place.
+    values: The numbers, in SI units, and the names that ``text`` mentions.
+    action: What is done about it, or should be.
+    source: The recording, where there are several.
     """
 
     code: str
@@ -77,10 +68,7 @@ class Notice:
     def from_dict(cls, content: Mapping[str, Any]) -> Notice:
         """Inverse of `to_dict`.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If the content is not a notice.
+        Raises KeyError, TypeError, ValueError if the content is not a notice.
         """
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {content['severity']!r}")

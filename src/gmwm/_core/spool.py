@@ -17,10 +17,7 @@ ROWS = 1 << 16
 class Spool:
     """Rows of numbers in a temporary file, which vanishes with the last array of it.
 
-    Parameters
-    ----------
-    width : int
-        Numbers in a row.
+    width: Numbers in a row.
     """
 
     def __init__(self, width: int) -> None:

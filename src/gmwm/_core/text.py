@@ -1,9 +1,11 @@
-"""Text for people: lines of 80 columns, sizes in usual units."""
+"""What people read of results: lines of 80 columns, sizes in usual units, pages."""
 
 from __future__ import annotations
 
 import textwrap
 from html import escape
+from importlib import import_module
+from typing import Any
 
 from gmwm._core.units import factor
 
@@ -20,17 +22,20 @@ class Printed:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+def made_by(function: str, result: Any, *args: Any, **options: Any) -> Any:
+    """What a function of `gmwm.report` makes of a result: a file, or a piece of HTML.
+
+    By name: the room of pages knows all results, and none of these knows it.
+    """
+    return getattr(import_module("gmwm.report"), function)(result, *args, **options)
+
+
 def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
     """A number in deg/s, mg or g; in its own unit where that is another.
 
-    Parameters
-    ----------
-    value : float
-        In ``unit``.
-    unit : str
-        Of the channel, SI.
-    sign : bool, optional
-        Whether a plus is written.
+    value: In ``unit``.
+    unit: Of the channel, SI.
+    sign: Whether a plus is written.
     """
     for name in _UNITS.get(unit, (unit,)):
         shown = value if name == unit else value / factor(name, unit)

@@ -79,20 +79,9 @@ def _quantity(text: str) -> pint.Quantity[Any]:
 def factor(unit: str, si_unit: str) -> float:
     """How many ``si_unit`` one ``unit`` is.
 
-    Parameters
-    ----------
-    unit, si_unit : str
-        Two units of the same dimension, such as ``"deg/s"`` and ``"rad/s"``.
-
-    Returns
-    -------
-    float
-        Multiply a number in ``unit`` by this to have it in ``si_unit``.
-
-    Raises
-    ------
-    InputError
-        If a unit is unknown or the two do not measure the same thing.
+    unit, si_unit: Two units of the same dimension, such as ``"deg/s"`` and ``"rad/s"``.
+    Returns: what a number in ``unit`` is multiplied by to have it in ``si_unit``.
+    Raises InputError if a unit is unknown or the two do not measure the same thing.
     """
     import pint
 
@@ -117,10 +106,7 @@ def seconds_in(unit: str) -> float | None:
 def quantity_of(unit: str) -> str:
     """``"gyro"`` for an angular rate, ``"accel"`` for a specific force.
 
-    Raises
-    ------
-    InputError
-        If the unit is unknown or neither of the two.
+    Raises InputError if the unit is unknown or neither of the two.
     """
     # Without exceptions of pint, which keep the arrays of their callers until they are collected.
     dimension = _quantity(unit).dimensionality
@@ -140,14 +126,9 @@ AUXILIARY = ("temperature", "voltage", "clock")
 class AuxiliaryUnit:
     """A unit of an auxiliary quantity.
 
-    Attributes
-    ----------
-    quantity : str
-        One of `AUXILIARY`.
-    unit : str
-        In which channels of the quantity are kept: degC, V, s.
-    scale, offset : float
-        Multiply by the one, then add the other, to have a number in ``unit``.
+    quantity: One of `AUXILIARY`.
+    unit: In which channels of the quantity are kept: degC, V, s.
+    scale, offset: Multiply by the one, then add the other, to have a number in ``unit``.
     """
 
     quantity: str
@@ -185,12 +166,8 @@ def auxiliary_unit(text: str) -> AuxiliaryUnit | None:
 class FieldUnit:
     """A unit in which the field quotes a parameter.
 
-    Attributes
-    ----------
-    unit : str
-        As printed, e.g. ``"deg/sqrt(h)"``.
-    per_si : float
-        Multiply the SI value by this to have it in ``unit``.
+    unit: As printed, e.g. ``"deg/sqrt(h)"``.
+    per_si: Multiply the SI value by this to have it in ``unit``.
     """
 
     unit: str
@@ -225,16 +202,9 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:
     """The units in which the field quotes a parameter; empty where SI is what people use.
 
-    Parameters
-    ----------
-    parameter_unit : str
-        With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
-    quantity : {"gyro", "accel", None}
-
-    Returns
-    -------
-    tuple of FieldUnit
-        The customary one first.
+    parameter_unit: With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
+    quantity: {"gyro", "accel", None}.
+    Returns: units, the customary one first.
     """
     names = _FIELD_UNITS.get((quantity or "", parameter_unit), ())
     si_unit = si_parameter_unit(parameter_unit, quantity).replace(" s", "*s")
@@ -244,17 +214,10 @@ def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, .
 def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]:
     """The unit in which a plot shows a channel, and how many of it one SI unit is.
 
-    Parameters
-    ----------
-    quantity : {"gyro", "accel", None}
-    unit : str
-        The channel's own.
-    units : {"field", "si"}
-
-    Raises
-    ------
-    InputError
-        If ``units`` is anything else.
+    quantity: {"gyro", "accel", None}.
+    unit: The channel's own.
+    units: {"field", "si"}.
+    Raises InputError if ``units`` is anything else.
     """
     if units not in ("field", "si"):
         raise InputError(f"units = {units!r}: give 'field' or 'si'")

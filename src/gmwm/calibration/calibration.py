@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -14,7 +13,7 @@ from gmwm._core.documents import Document, load_document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import made_by, wrapped
 from gmwm.calibration.summary import sentence
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit
@@ -111,7 +110,7 @@ class Calibration(Mapping[str, Fit], Document):
         return f"<Calibration of {self.source or 'a recording'}: {', '.join(channels)}>"
 
     def _repr_html_(self) -> str:
-        html: str = import_module("gmwm.report").fragment(self)
+        html: str = made_by("fragment", self)
         return html
 
     def __str__(self) -> str:
@@ -191,9 +190,8 @@ class Calibration(Mapping[str, Fit], Document):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write the self-contained HTML report; see `gmwm.report.write_report`."""
-        # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_report(
-            self, path, recording, datasheet=datasheet, provenance=provenance
+        written: Path = made_by(
+            "write_report", self, path, recording, datasheet=datasheet, provenance=provenance
         )
         return written
 

@@ -45,22 +45,14 @@ WIDE = float(norm.isf(0.025))
 class Departure:
     """Something that stationary noise does not have.
 
-    Attributes
-    ----------
-    kind : str
-        Code of its notice: "step", "transient", "drift-at-start" or "slow-period".
-    time : tuple of (float, float, float)
-        When the step is, the time constant, the end of the drift or the period, and the ends of its
-        95 % interval, s.
-    size : tuple of (float, float, float)
-        Height of the step; of the transient or the drift at the start of the record; amplitude of
+    kind: Code of its notice: "step", "transient", "drift-at-start" or "slow-period".
+    time: When the step is, the time constant, the end of the drift or the period, and the ends of
+        its 95 % interval, s.
+    size: Height of the step; of the transient or the drift at the start of the record; amplitude of
         the period; and the ends of its 95 % interval, u.
-    evidence : float
-        Ratio of the probability of the data with it to that without.
-    share : float
-        Largest fraction of the wavelet variance of the model that it accounts for.
-    phase : float
-        Of a period, ``size cos(2 pi t / time - phase)``, rad.
+    evidence: Ratio of the probability of the data with it to that without.
+    share: Largest fraction of the wavelet variance of the model that it accounts for.
+    phase: Of a period, ``size cos(2 pi t / time - phase)``, rad.
     """
 
     kind: str
@@ -79,16 +71,8 @@ class Departure:
 def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departure, ...]:
     """What a recording has that stationary noise does not have.
 
-    Parameters
-    ----------
-    fitted : Fit
-    wv : WaveletVariance, optional
-        The recording, where the fit is one of several.
-
-    Returns
-    -------
-    tuple of Departure
-        Most evident first, each beside the others; the last one may be one that noise explains
+    wv: The recording, where the fit is one of several.
+    Returns: most evident first, each beside the others; the last one may be one that noise explains
         about as well (`Departure.is_evident`).
     """
     noise = tuple(term for term in fitted.model.terms if not term.is_drift)
@@ -147,14 +131,9 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
 class _Means:
     """Means of blocks.
 
-    Attributes
-    ----------
-    blocks : (B,) ndarray
-        NaN where samples are missing, u.
-    samples : int
-        In a block.
-    dt : float
-        s.
+    blocks: (B,), NaN where samples are missing, u.
+    samples: In a block.
+    dt: s.
     """
 
     blocks: FloatArray
@@ -201,12 +180,9 @@ class _Means:
 class _Noise:
     """One of the noises.
 
-    Attributes
-    ----------
-    log_weight : float
-        Logarithm of its probability beforehand over the root of the determinant of its covariance.
-    inverse : (D, D) ndarray
-        Of the covariance of the differences; without what known curves explain.
+    log_weight: Logarithm of its probability beforehand over the root of the determinant of its
+        covariance.
+    inverse: (D, D), of the covariance of the differences; without what known curves explain.
     """
 
     log_weight: float
@@ -252,15 +228,9 @@ def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
 class _Test:
     """A family of departures beside those that are known.
 
-    Attributes
-    ----------
-    family : Family
-    evidence : (G,) ndarray
-        Logarithm of the evidence of each member.
-    weight : (C,) ndarray
-        Probability of each noise beside the most evident member.
-    sizes, variances : (C, r) ndarray
-        Of the curves of that member under each noise.
+    evidence: (G,), logarithm of the evidence of each member.
+    weight: (C,), probability of each noise beside the most evident member.
+    sizes, variances: (C, r), of the curves of that member under each noise.
     """
 
     family: Family

@@ -36,13 +36,8 @@ def judged(
 ) -> dict[str, ChannelModel | Notice]:
     """Models of channels, with fits that are not valid where the data were not fit for them.
 
-    Parameters
-    ----------
-    found : mapping
-    issues : sequence of Notice
-        Of the recordings and their channels.
-    still : bool
-        Whether a recording that was not static is an issue.
+    issues: Of the recordings and their channels.
+    still: Whether a recording that was not static is an issue.
     """
     spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
     if not still:

@@ -191,7 +191,7 @@ def _done(notice: Notice, robust: Collection[str], left_out: Collection[str]) ->
         if notice.where in robust:
             return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
         return "kept, as requested"
-    if notice.code in ("dead", "infinite"):
+    if notice.code in ("dead", "infinite") and "stretches" not in notice.values:
         return "the channel is skipped"
     if notice.code in _ADVICE:
         return f"left as it is; {notice.action}"

@@ -14,13 +14,8 @@ from gmwm.calibration import tuning
 class Family:
     """Departures of one kind.
 
-    Attributes
-    ----------
-    kind : str
-    times : (G,) ndarray
-        When, how long or how slow each member is, s.
-    curves : (G, r, B) ndarray
-        Block means of the members at unit size; r curves where a phase is free.
+    times: (G,), when, how long or how slow each member is, s.
+    curves: (G, r, B), block means of the members at unit size; r curves where a phase is free.
     """
 
     kind: str

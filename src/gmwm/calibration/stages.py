@@ -20,12 +20,8 @@ from dataclasses import dataclass, field
 class Stopwatch:
     """Time by stage, of all processes together.
 
-    Attributes
-    ----------
-    elapsed : dict
-        Stage -> s by the clock on the wall; stages of several processes run at one time.
-    worked : dict
-        Stage -> s of the processor.
+    elapsed: Stage -> s by the clock on the wall; stages of several processes run at one time.
+    worked: Stage -> s of the processor.
     """
 
     elapsed: dict[str, float] = field(default_factory=dict)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
+from gmwm._core.units import SI_UNIT
 from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.channel import (
     ChannelModel,
@@ -25,13 +29,15 @@ from gmwm.calibration.screening import (
     with_treatment,
 )
 from gmwm.calibration.stages import stage
-from gmwm.diagnosis import Health, health, joined
+from gmwm.diagnosis import Health, Repetition, health, joined
 from gmwm.process import Process
-from gmwm.readers import Recording
-from gmwm.variance import StreamedRecording, WaveletVariance, stream
+from gmwm.readers import Channel, Recording
+from gmwm.variance import StreamedRecording, StreamingVariance, WaveletVariance, stream
 
-_OF_SAMPLES = frozenset({"repeated-samples", "interpolated"})
-"""Codes of issues with which a channel of a stream is not used."""
+_NOT_DONE = (
+    "read a stretch at a time: stretches at rest of a recording that moves are not used, and "
+    "outliers are left out however many they are, where robust wavelet variances would keep them"
+)
 
 
 def calibrate_stream(
@@ -48,8 +54,9 @@ def calibrate_stream(
     Each stretch is examined and screened as `gmwm.calibrate` does (see `gmwm.health_stream`), and
     departures are looked for beside the noise. What needs all samples is not done, as the notice
     "streamed" says: a recording that is not static is not valid where `gmwm.calibrate` would use
-    its stretches at rest, outliers are left out however many they are, and a channel of which each
-    sample is written several times is skipped.
+    its stretches at rest, and outliers are left out however many they are. Where samples are
+    written several times in some stretches only, one of each is used, at the rate of the clock;
+    stretches that are interpolated are left out.
 
     Parameters
     ----------
@@ -91,10 +98,8 @@ def calibrate_stream(
 
     def one(name: str, data: WaveletVariance) -> ChannelModel | Notice:
         given = model_of(name, model)
-        why = next((n for n in issues if n.where == name and n.code in _OF_SAMPLES), None)
         missing = data.gaps.missing if data.gaps is not None else 0
-        why = why or mostly_missing(name, missing, data.n)
-        return why or channel_model(
+        return mostly_missing(name, missing, data.n) or channel_model(
             name, lambda _: [data], given, [found.source], extra=offered[name]
         )
 
@@ -120,15 +125,45 @@ def calibrate_stream(
 def _examined(
     path: Any, screening: Collection[str], reading: dict[str, Any]
 ) -> tuple[StreamedRecording, Health]:
-    """Wavelet variances without the samples of shocks, and the health of all stretches."""
+    """Wavelet variances of the samples that count, and the health of all stretches."""
     parts: list[Health] = []
+    # Channels of which samples are written several times, at their own rate.
+    own: dict[str, tuple[Repetition, StreamingVariance]] = {}
 
-    def without_events(part: Recording) -> Recording:
-        parts.append(health(part))
-        return parts[-1].masked(part) if "events" in screening else part
+    def prepared(part: Recording) -> Recording:
+        start = sum(each.n for each in parts)
+        parts.append(found := health(part))
+        used = found.masked(part) if "events" in screening else part
+        return replace(used, channels=tuple(counted(c, found, start) for c in used.channels))
 
-    found = stream(path, prepare=without_events, **reading)
-    return found, joined(parts)
+    def counted(channel: Channel, found: Health, start: int) -> Channel:
+        name, values = channel.name, np.full(channel.n, np.nan)
+        if found.of(name, "interpolated"):
+            channel = replace(channel, values=values)
+        each = None if channel.is_auxiliary else found.repetition(name)
+        if each is not None and name not in own:
+            since = Repetition(each.times, (start + each.first) % each.times)
+            unit = {name: SI_UNIT.get(channel.quantity or "", "")}
+            own[name] = since, StreamingVariance(channel.dt * each.times, unit)
+        if name in own:
+            since, series = own[name]
+            series.update(channel.values[(since.first - start) % since.times :: since.times])
+        if each is None:
+            return channel
+        values[each.first :: each.times] = channel.values[each.first :: each.times]
+        return replace(channel, values=values)
+
+    found = stream(path, prepare=prepared, **reading)
+    whole = joined(parts)
+    results = {**found.variances, **found.skipped}
+    for name, each in whole.channels.items():
+        if each.repetition is not None:
+            results |= own[name][1].result()
+        elif name in found.skipped and (straight := whole.of(name, "interpolated")):
+            results[name] = straight[0]
+    variances = {k: v for k in whole.channels if isinstance(v := results[k], WaveletVariance)}
+    skipped = {k: v for k in whole.channels if isinstance(v := results[k], Notice)}
+    return replace(found, variances=variances, skipped=skipped), whole
 
 
 def _issues(
@@ -139,13 +174,11 @@ def _issues(
         text = "read a block at a time, unexamined"
         return (*found.notices, Notice("streamed", "warning", "", text, {"samples": found.n}))
     left_out = tuple(whole.channels) if "events" in screening else ()
-    fresh = [n for n in whole.notices if all(n.code != r.code for r in found.notices)]
-    text = (
-        "read a stretch at a time: a slow tilt, and motion and temperature from one stretch to "
-        "the next, were not looked for"
-    )
-    streamed = Notice("streamed", "note", "", text, {"samples": found.n})
-    return (*found.notices, *with_treatment(fresh, whole, left_out), streamed)
+    severe = {notice.code for notice in whole.notices if notice.severity in ("warning", "bad")}
+    read = [notice for notice in found.notices if notice.code not in severe]
+    fresh = [n for n in whole.notices if all(n.code != r.code for r in read)]
+    streamed = Notice("streamed", "note", "", _NOT_DONE, {"samples": found.n})
+    return (*read, *with_treatment(fresh, whole, left_out), streamed)
 
 
 def _left_out(

@@ -25,12 +25,8 @@ _PLATEAU = np.sqrt(2.0 * np.log(2.0) / np.pi)
 class Floor:
     """Lowest point of the Allan deviation.
 
-    Attributes
-    ----------
-    deviation : float
-        SI.
-    tau : float
-        Averaging time, s.
+    deviation: SI.
+    tau: Averaging time, s.
     """
 
     deviation: float
@@ -49,10 +45,7 @@ def white_density(fitted: Fit) -> float:
     noise, Gauss-Markov processes of short correlation time, the foot of a resonance. Quantization
     noise and periodic lines leave none: their integrals stay bounded.
 
-    Returns
-    -------
-    float
-        In u/sqrt(Hz); zero if no term of the model is fast.
+    Returns: in u/sqrt(Hz); zero if no term of the model is fast.
     """
     tau = np.array([1.0, 2.0]) * max(tuning.REFERENCE_TIME, 4.0 * fitted.wv.dt)
     total = 0.0
@@ -89,12 +82,8 @@ def floor(fitted: Fit) -> Floor:
 class Level:
     """A noise level, or how large it may be.
 
-    Attributes
-    ----------
-    value : float
-        In the unit of the parameter.
-    found : bool
-        Whether the model has it; otherwise ``value`` is an upper bound of 95 %.
+    value: In the unit of the parameter.
+    found: Whether the model has it; otherwise ``value`` is an upper bound of 95 %.
     """
 
     value: float
@@ -120,10 +109,7 @@ def random_walk(fitted: Fit) -> Level:
 def _bound(fitted: Fit, process: Process, key: str) -> float:
     """Upper bound of a term added to the model and fitted together with it.
 
-    Raises
-    ------
-    InputError
-        If the data do not bound it.
+    Raises InputError if the data do not bound it.
     """
     # Given shapes, such as that of a line or of a low-pass, stay as they are.
     known = _BOUNDS.setdefault(fitted, {})

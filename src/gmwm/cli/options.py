@@ -111,10 +111,7 @@ def read_recording(
 ) -> Recording:
     """Read a recording as the options say.
 
-    Raises
-    ------
-    InputError
-        If an option or the file cannot be used.
+    Raises InputError if an option or the file cannot be used.
     """
     from gmwm.readers import read
 
@@ -146,10 +143,7 @@ def arguments_of_read(
 ) -> dict[str, Any]:
     """What `gmwm.read` is given for the options.
 
-    Raises
-    ------
-    InputError
-        If an option cannot be used.
+    Raises InputError if an option cannot be used.
     """
     units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
     return {
@@ -219,10 +213,7 @@ def seconds(option: str, text: str) -> list[float]:
 def written_models(texts: Sequence[str]) -> dict[str, Model]:
     """Models of ``--model MODEL`` and ``--model NAME=MODEL``, by name; empty for all channels.
 
-    Raises
-    ------
-    InputError
-        If a text is no model, or a name has two.
+    Raises InputError if a text is no model, or a name has two.
     """
     given: dict[str, Model] = {}
     for text in texts:
@@ -238,20 +229,9 @@ def models_of_channels(
 ) -> dict[str, Model] | None:
     """The model of each channel: its own, else that of its sensor, else that of all.
 
-    Parameters
-    ----------
-    given : mapping of str to Model
-        See `written_models`.
-
-    Returns
-    -------
-    dict or None
-        None if nothing is given.
-
-    Raises
-    ------
-    InputError
-        If a channel has no model, or a model no channel.
+    given: See `written_models`.
+    Returns: None if nothing is given.
+    Raises InputError if a channel has no model, or a model no channel.
     """
     if not given:
         return None
@@ -271,10 +251,7 @@ def models_of_channels(
 def _model(text: str) -> Model:
     """A model, all parameters of which are free.
 
-    Raises
-    ------
-    InputError
-        If it is none.
+    Raises InputError if it is none.
     """
     from gmwm.process import CATALOGUE, GaussMarkov, Model
 

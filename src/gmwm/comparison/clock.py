@@ -24,12 +24,8 @@ _KINDS = {"Sinusoid": "line", "Resonance": "resonance"}
 class Feature:
     """A line or a resonance of a channel.
 
-    Attributes
-    ----------
-    channel : str
-    kind : {"line", "resonance"}
-    frequency : float
-        Hz.
+    kind: {"line", "resonance"}.
+    frequency: Hz.
     """
 
     channel: str
@@ -41,19 +37,12 @@ class Feature:
 class ClockRatio:
     """A suspected ratio of the clocks of two recordings.
 
-    Attributes
-    ----------
-    ratio : float
-        Frequencies of the second over those of the first.
-    frequencies : tuple of (float, float)
-        Of distinct lines and resonances in the first and the second recording, Hz.
-    others : int
-        Distinct lines and resonances that moved otherwise.
-    densities : float
-        Median over the channels of N in the second over N in the first; 1/sqrt(ratio) if the clock
-        is all.
-    channels : int
-        How many channels have one.
+    ratio: Frequencies of the second over those of the first.
+    frequencies: Of distinct lines and resonances in the first and the second recording, Hz.
+    others: Distinct lines and resonances that moved otherwise.
+    densities: Median over the channels of N in the second over N in the first; 1/sqrt(ratio) if the
+        clock is all.
+    channels: How many channels have one.
     """
 
     ratio: float
@@ -139,10 +128,7 @@ def clock_ratio(
 ) -> ClockRatio | None:
     """A ratio by which everything that has a frequency moved, if there is one.
 
-    Parameters
-    ----------
-    densities : mapping of str to float
-        Channel -> N of the second recording over N of the first.
+    densities: Channel -> N of the second recording over N of the first.
     """
     pairs = [
         (a.frequency, b.frequency)

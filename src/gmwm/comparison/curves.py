@@ -36,14 +36,10 @@ _UNDERFLOW = 1e-300
 class Curve:
     """Wavelet variances of one recording with their errors.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    variance : (J,) ndarray
-        Without a drift where one was removed, u^2.
-    relative : (J, J) ndarray
-        Covariance of ``variance`` over the product of the variances, as models imply it.
+    tau: (J,), averaging times, s.
+    variance: (J,), without a drift where one was removed, u^2.
+    relative: (J, J), covariance of ``variance`` over the product of the variances, as models imply
+        it.
     """
 
     tau: FloatArray
@@ -58,13 +54,8 @@ class Curve:
         nearer to the truth than each: a walk that one of them misses changes the covariances at
         long averaging times by half.
 
-        Parameters
-        ----------
-        fit : Fit
-        noises : sequence of Model
-            Those of all recordings, without drifts.
-        drifting : bool
-            Whether a drift is removed, also one that the fitted model does not have.
+        noises: Those of all recordings, without drifts.
+        drifting: Whether a drift is removed, also one that the fitted model does not have.
         """
         wv, scales, share = fit.wv, Scales.of(fit.wv), 1.0 / len(noises)
         spectra = [scales.spectrum(noise) for noise in noises]
@@ -90,16 +81,10 @@ class Curve:
 class Difference:
     """How far recordings are apart in one part of the Allan plot.
 
-    Attributes
-    ----------
-    part : str
-        One of `PARTS`.
-    shortest, longest : float
-        Averaging times of the part, s.
-    ratios : (R,) ndarray
-        Allan deviation of each recording over the common one; NaN without data there.
-    errors : (R,) ndarray
-        Relative standard errors of these.
+    part: One of `PARTS`.
+    shortest, longest: Averaging times of the part, s.
+    ratios: (R,), allan deviation of each recording over the common one; NaN without data there.
+    errors: (R,), relative standard errors of these.
     """
 
     part: str
@@ -139,20 +124,12 @@ class Difference:
 class Equality:
     """Test that several recordings have the same wavelet variances.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times that two recordings have at least, s.
-    common : (J,) ndarray
-        Their mean wavelet variance, u^2.
-    ratios, errors : (R, J) ndarray
-        Allan deviation of each recording over the common one, and relative standard errors; NaN
-        where a recording has no such level.
-    chi_square : float
-        Weighted sum of squares about the common curve, on cube roots of the variances.
-    dof : int
-    differences : tuple of Difference
-        Part by part of the plot.
+    tau: (J,), averaging times that two recordings have at least, s.
+    common: (J,), their mean wavelet variance, u^2.
+    ratios, errors: (R, J), allan deviation of each recording over the common one, and relative
+        standard errors; NaN where a recording has no such level.
+    chi_square: Weighted sum of squares about the common curve, on cube roots of the variances.
+    differences: Part by part of the plot.
     """
 
     tau: FloatArray

@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,7 +14,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, made_by, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -56,26 +55,15 @@ def _reason(notice: Notice) -> str:
 class AxisComparison:
     """One channel in several recordings.
 
-    Attributes
-    ----------
-    name : str
-    fits : dict of str to Fit
-        Recording -> its own fit, of those that are compared.
-    left_out : dict of str to Notice
-        Recording -> why it is not.
-    equality : Equality or None
-        Test of the curves; ``None`` where fewer than two recordings are compared.
-    p_value : float
-        Of that test, made larger for the number of channels (Holm); NaN without a test.
-    joint : JointFit or None
-        The structure that is recommended for all of them.
-    parameters : tuple of ParameterSpread
-        Of the joint model.
-    numbers : AxisNumbers
-        N and K for a filter.
-    curve_inflation : float
-        By how much the amplitudes of the joint model must grow so that its curve is nowhere below
-        that of a recording's own model; NaN without a joint model.
+    fits: Recording -> its own fit, of those that are compared.
+    left_out: Recording -> why it is not.
+    equality: Test of the curves; ``None`` where fewer than two recordings are compared.
+    p_value: Of that test, made larger for the number of channels (Holm); NaN without a test.
+    joint: The structure that is recommended for all of them.
+    parameters: Of the joint model.
+    numbers: N and K for a filter.
+    curve_inflation: By how much the amplitudes of the joint model must grow so that its curve is
+        nowhere below that of a recording's own model; NaN without a joint model.
     """
 
     name: str
@@ -324,8 +312,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_sensor_comparison_report(
-            self, path, datasheet=datasheet, provenance=provenance
-        )
+        written: Path = made_by(
+            "write_sensor_comparison_report", self, path,
+            datasheet=datasheet, provenance=provenance,
+        )  # fmt: skip
         return written

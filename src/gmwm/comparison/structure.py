@@ -25,17 +25,11 @@ from gmwm.variance import WaveletVariance
 class ParameterSpread:
     """One parameter of the joint model in all recordings.
 
-    Attributes
-    ----------
-    joint : Estimate
-        Of all recordings together.
-    each : tuple of Estimate or None
-        Of each recording that is compared, with the same structure; ``None`` where it has none.
-    spread : float
-        Standard deviation between recordings beyond their standard errors, relative; NaN where
+    joint: Of all recordings together.
+    each: Of each recording that is compared, with the same structure; ``None`` where it has none.
+    spread: Standard deviation between recordings beyond their standard errors, relative; NaN where
         fewer than two determine it.
-    p_value : float
-        That it is the same in all of them; NaN likewise.
+    p_value: That it is the same in all of them; NaN likewise.
     """
 
     joint: Estimate
@@ -53,19 +47,12 @@ class ParameterSpread:
 class AxisNumbers:
     """N and K that a filter should believe of an axis, for a time without aiding.
 
-    Attributes
-    ----------
-    each : dict of str to FilterNumbers
-        Recording -> the bound of its own model.
-    joint : FilterNumbers or None
-        The bound of the joint model.
-    covering : FilterNumbers or None
-        One pair of numbers that bounds the models of all recordings.
-    nees : dict of str to float
-        Recording -> predicted normalised error squared of a filter with the covering numbers after
-        that time; 1 is right, below 1 cautious.
-    upper : dict of str to float
-        Letters that no recording determines -> the largest of their 95 % upper bounds.
+    each: Recording -> the bound of its own model.
+    joint: The bound of the joint model.
+    covering: One pair of numbers that bounds the models of all recordings.
+    nees: Recording -> predicted normalised error squared of a filter with the covering numbers
+        after that time; 1 is right, below 1 cautious.
+    upper: Letters that no recording determines -> the largest of their 95 % upper bounds.
     """
 
     each: Mapping[str, FilterNumbers]
@@ -145,14 +132,9 @@ def axis_numbers(
 ) -> tuple[AxisNumbers, tuple[Notice, ...]]:
     """What a filter should believe of an axis.
 
-    Parameters
-    ----------
-    name : str
-        Of the channel.
-    fits : mapping of str to Fit
-        Recording -> its own fit.
-    horizon : float
-        s.
+    name: Of the channel.
+    fits: Recording -> its own fit.
+    horizon: s.
     """
     each: dict[str, FilterNumbers] = {}
     notices = []

@@ -33,17 +33,9 @@ _NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond
 def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> float:
     """Share of prediction errors beyond four robust standard deviations, each event counted once.
 
-    Parameters
-    ----------
-    errors : Innovations
-    events : tuple of (int, int)
-        As `gmwm.diagnosis.events.find_events` finds them.
-
-    Returns
-    -------
-    float
-        0 unless it is above one in a thousand, which is 16 times that of Gaussian noise, and more
-        than Gaussian noise has in one of a thousand channels.
+    events: As `gmwm.diagnosis.events.find_events` finds them.
+    Returns: 0 unless it is above one in a thousand, which is 16 times that of Gaussian noise, and
+        more than Gaussian noise has in one of a thousand channels.
     """
     outside = errors.known.copy()
     for start, stop in events:
@@ -59,12 +51,8 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
 def contamination_notice(name: str, share: float) -> Notice | None:
     """Say how many outliers there are.
 
-    Parameters
-    ----------
-    name : str
-        Of the channel.
-    share : float
-        From `contamination`.
+    name: Of the channel.
+    share: From `contamination`.
     """
     if share == 0.0:
         return None
@@ -87,14 +75,9 @@ _Survival = Callable[[FloatArray], FloatArray]
 class Tails:
     """A law of heavy tails.
 
-    Attributes
-    ----------
-    law : {"student", "power"}
-        Student's t, or the exponential power law.
-    shape : float
-        Degrees of freedom, or the exponent: 2 is Gaussian, 1 Laplace.
-    scale : float
-        In robust standard deviations.
+    law: {"student", "power"}, student's t, or the exponential power law.
+    shape: Degrees of freedom, or the exponent: 2 is Gaussian, 1 Laplace.
+    scale: In robust standard deviations.
     """
 
     law: str
@@ -129,14 +112,7 @@ _LAWS = {"student": _student, "power": _power}
 def heavy_tails(errors: Innovations) -> Tails | None:
     """The law of the prediction errors, if it has heavy tails rather than outliers.
 
-    Parameters
-    ----------
-    errors : Innovations
-
-    Returns
-    -------
-    Tails or None
-        None if Gaussian noise with outliers is as likely, large errors cluster, the law has no
+    Returns: None if Gaussian noise with outliers is as likely, large errors cluster, the law has no
         variance or hardly one, or the noise hides in the rounding.
     """
     counted = errors.known
@@ -214,12 +190,7 @@ def _most_likely(
 def tails_notice(name: str, errors: Innovations, tails: Tails | None) -> Notice | None:
     """Say what the law is, and that nothing has to be done about it.
 
-    Parameters
-    ----------
-    name : str
-        Of the channel.
-    errors : Innovations
-    tails : Tails or None
+    name: Of the channel.
     """
     if tails is None:
         return None

@@ -32,14 +32,9 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
     drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
     20 times the root mean square of what the line leaves (200,000 simulated).
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    dt : float
-        s.
-    values : (n,) ndarray
-        Samples, NaN where missing.
+    name, unit: Of the channel.
+    dt: s.
+    values: (n,), samples, NaN where missing.
     """
     size = values.size // tuning.PARTS
     if size < 2 * tuning.SHORT_MEAN:
@@ -102,19 +97,12 @@ def variance_notice(
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
     variance gives the error of their means, so tails heavier than Gaussian do no harm.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    dt : float
-        s.
-    errors : Innovations
-    usable : (n,) ndarray of bool
-        Prediction errors outside events.
-    step : float
-        To which samples are rounded, u.
-    is_heavy : bool, optional
-        Whether the noise has heavy tails: the predictions after a large sample are worse then.
+    name, unit: Of the channel.
+    dt: s.
+    usable: (n,) of bool, prediction errors outside events.
+    step: To which samples are rounded, u.
+    is_heavy: Whether the noise has heavy tails: the predictions after a large sample are worse
+        then.
     """
     if step > 2.0 * errors.level:
         return None  # noise below the step is seen only when the level is between two steps

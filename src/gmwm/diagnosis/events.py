@@ -24,16 +24,8 @@ def find_events(errors: Innovations, tails: Tails | None = None) -> tuple[tuple[
     errors are usual, more of them next to each other than independent samples have with the same
     chance are an event too.
 
-    Parameters
-    ----------
-    errors : Innovations
-    tails : Tails, optional
-        Law of the noise; Gaussian by default.
-
-    Returns
-    -------
-    tuple of (int, int)
-        First sample and the one after the last, widened by a guard.
+    tails: Law of the noise; Gaussian by default.
+    Returns: first sample and the one after the last, widened by a guard.
     """
     n = errors.values.size
     beyond = np.abs(errors.values) - errors.rounding
@@ -77,19 +69,9 @@ def with_single_outliers(
     from the level than four standard deviations of such distances; where samples are predicted
     better than by their level, errors of prediction without these show the rest.
 
-    Parameters
-    ----------
-    events : tuple of (int, int)
-    errors : Innovations
-    values : (n,) ndarray
-        Samples, NaN where missing.
-    step : float
-        To which they are rounded, u.
-
-    Returns
-    -------
-    tuple of (int, int)
-        First sample and the one after the last.
+    values: (n,), samples, NaN where missing.
+    step: To which they are rounded, u.
+    Returns: first sample and the one after the last.
     """
     place = np.arange(values.size)
     there = ~np.isnan(values)
@@ -138,17 +120,10 @@ def event_notice(
 ) -> Notice | None:
     """Say when the events are, how large and how long.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    dt : float
-        s.
-    values : (n,) ndarray
-        Samples, NaN where missing.
-    events : tuple of (int, int)
-    scatter : float
-        Usual standard deviation of a prediction error, u.
+    name, unit: Of the channel.
+    dt: s.
+    values: (n,), samples, NaN where missing.
+    scatter: Usual standard deviation of a prediction error, u.
     """
     if not events:
         return None

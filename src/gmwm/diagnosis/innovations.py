@@ -26,16 +26,10 @@ _ROUNDS = 20
 class Innovations:
     """Prediction errors of a series.
 
-    Attributes
-    ----------
-    values : (n,) ndarray
-        u; 0 where there is none.
-    known : (n,) ndarray of bool
-        Whether there is one: not where samples are missing on both sides.
-    scale : (n,) ndarray
-        Robust standard deviation around each sample, u.
-    rounding : float
-        The most that rounding can add to a prediction error, u.
+    values: (n,), u; 0 where there is none.
+    known: (n,) of bool, whether there is one: not where samples are missing on both sides.
+    scale: (n,), robust standard deviation around each sample, u.
+    rounding: The most that rounding can add to a prediction error, u.
     """
 
     values: FloatArray
@@ -52,17 +46,9 @@ class Innovations:
 def innovations(values: FloatArray, step: float) -> Innovations | None:
     """Prediction errors of a series, forwards, or backwards where nothing stands before.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples, NaN where missing.
-    step : float
-        To which they are rounded, u; 0 if they are not.
-
-    Returns
-    -------
-    Innovations or None
-        None if the series is too short or too broken.
+    values: (n,), samples, NaN where missing.
+    step: To which they are rounded, u; 0 if they are not.
+    Returns: None if the series is too short or too broken.
     """
     n = values.size
     differences = np.diff(values)

@@ -22,6 +22,13 @@ _LARGEST = {"event": "height", "gap": "missing", "line": "amplitude", "resonance
 _ADDED = ("count", "samples", "missing")
 """Numbers of these notices that are sums over stretches."""
 
+_IN_SOME = {
+    "dead": "use the other stretches",  # such a channel is not skipped
+    "interpolated": "use the other stretches",
+    "repeated-samples": "one of each is used",
+}
+"""What is advised where some stretches only are so."""
+
 _SUMS = ("event", "gap", "saturation")
 
 
@@ -38,9 +45,9 @@ def health_stream(path: Any, **reading: Any) -> Health:
 
     Each stretch, of 260,000 samples, is examined as `gmwm.health` does, and the levels of their
     noise are compared; a notice stands for those of one kind in all of them. A line or resonance is
-    one of the channel if half of the stretches have it. What else changes from one stretch to the
-    next only is not seen: slow drift, tilt and temperature, for which `gmwm.calibrate_stream` looks
-    beside the noise.
+    one of the channel if half of the stretches have it. What changes from one stretch to the next
+    only is not seen, as the notice "streamed" says: slow drift, tilt and temperature, for which
+    `gmwm.calibrate_stream` looks beside the noise.
 
     Parameters
     ----------
@@ -64,19 +71,8 @@ def health_stream(path: Any, **reading: Any) -> Health:
 def joined(found: Sequence[Health]) -> Health:
     """The health of a recording from that of its consecutive stretches.
 
-    Parameters
-    ----------
-    found : sequence of Health
-
-    Returns
-    -------
-    Health
-        Itself, of one stretch.
-
-    Raises
-    ------
-    InputError
-        If there is none.
+    Returns: itself, of one stretch.
+    Raises InputError if there is none.
     """
     if not found:
         raise InputError("there is no stretch to join: give one at least")
@@ -93,7 +89,11 @@ def joined(found: Sequence[Health]) -> Health:
     notices = unsteady + [
         _one_of(group, len(found), rate) for group in groups if not _falls(group, found, spoilt)
     ]
-    whole = [length_notice(ends[-1], rate), *(each for each in notices if not each.where)]
+    whole = [
+        length_notice(ends[-1], rate),
+        _streamed(len(found), found[0].n / rate),
+        *(each for each in notices if not each.where),
+    ]
     own = [each for name in names for each in worst_first([n for n in notices if n.where == name])]
     return Health(
         notices=(*worst_first(whole), *own),
@@ -102,6 +102,16 @@ def joined(found: Sequence[Health]) -> Health:
         rate=rate,
         n=ends[-1],
     )
+
+
+def _streamed(stretches: int, length: float) -> Notice:
+    """What is less than of a whole recording; a line stands out of a periodogram by its length."""
+    text = (
+        f"read in {stretches} stretches of {length:.4g} s: drift, tilt, motion and temperature "
+        "from one to the next were not looked for, and lines are found from about "
+        f"{np.sqrt(stretches):.2g} times the amplitude on"
+    )
+    return Notice("streamed", "note", "", text, {"stretches": stretches})
 
 
 def _groups(found: Sequence[Health], starts: Sequence[int]) -> list[list[_Noticed]]:
@@ -162,8 +172,7 @@ def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
         values |= {
             name: sum(float(each.notice.values.get(name, 0.0)) for each in group) for name in known
         }
-    # A channel that is dead in some stretches is not skipped.
-    action = "use the other stretches" if first.code == "dead" else worst.notice.action
+    action = _IN_SOME.get(first.code, worst.notice.action)
     return replace(worst.notice, text=text, values=values, action=action)
 
 
@@ -193,6 +202,7 @@ def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHeal
         for part, start in zip(parts, starts, strict=True)
         if part.repetition is not None
     ]
+    known = sum(part.noise > 0.0 for part in parts)
     return ChannelHealth(
         lines=tuple(_lasting([part.lines for part in parts])),
         resonances=tuple(_lasting([part.resonances for part in parts])),
@@ -205,7 +215,7 @@ def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHeal
         outliers=float(np.mean([part.outliers for part in parts])),
         held=float(np.mean([part.held for part in parts])),
         noise=float(np.median([part.noise for part in parts])),
-        repetition=times[0] if times else None,
+        repetition=times[0] if len(times) >= known > 0 and len({*times}) == 1 else None,
     )
 
 

@@ -21,11 +21,8 @@ def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
     The correlation of two white series has the variance 1/n, whatever the spectra of the channels
     were; one that matters is above 0.05.
 
-    Parameters
-    ----------
-    errors : dict
-        Channel name -> prediction errors in units of their standard deviation, clipped, zero where
-        there is none, which counts for nothing in a sum of products.
+    errors: Channel name -> prediction errors in units of their standard deviation, clipped, zero
+        where there is none, which counts for nothing in a sum of products.
     """
     pairs = list(combinations(errors, 2))
     notices = []

@@ -20,14 +20,6 @@ def repetition(channel: Channel) -> Repetition | None:
 
     Of samples that are not repeated, every change is in the same place modulo k with a probability
     of 1/k, so that some dozen changes leave no room for chance, however coarse the rounding is.
-
-    Parameters
-    ----------
-    channel : Channel
-
-    Returns
-    -------
-    Repetition or None
     """
     steps = np.diff(channel.values)
     changes = np.flatnonzero((steps != 0.0) & ~np.isnan(steps)) + 1
@@ -62,10 +54,6 @@ def interpolation_notice(channel: Channel) -> Notice | None:
 
     Second differences vanish but where two lines meet, which two of them see: of an interpolation
     from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
-
-    Parameters
-    ----------
-    channel : Channel
     """
     values = np.asarray(channel.values, dtype=float)
     steps = np.diff(values)
@@ -110,19 +98,10 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
     of no step are by a power of the ratio more frequent than those of one step by which these are
     than those of two: 1/3 of a Gaussian law.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples in their order, NaN where missing.
-    step : float
-        u; 0 if samples are not rounded: then none equals the one before by chance.
-    scatter : float
-        Standard deviation of what cannot be predicted of a sample, u.
-
-    Returns
-    -------
-    tuple of float
-        Zeros if chance, with three standard errors, explains those that repeat.
+    values: (n,), samples in their order, NaN where missing.
+    step: u; 0 if samples are not rounded: then none equals the one before by chance.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
+    Returns: zeros if chance, with three standard errors, explains those that repeat.
     """
     sizes = np.abs(np.diff(values))
     sizes = sizes[~np.isnan(sizes)]

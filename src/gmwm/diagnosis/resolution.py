@@ -18,15 +18,8 @@ def step_size(values: FloatArray) -> float:
     Text holds steps rounded to some decimals (0.00333, 0.00667, 0.01): places may be off the
     lattice by a tenth of a step (root mean square).
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples, none missing.
-
-    Returns
-    -------
-    float
-        In the unit of ``values``; 0 if there is none.
+    values: (n,), samples, none missing.
+    Returns: a number in the unit of ``values``; 0 if there is none.
     """
     stride = -(-values.size // tuning.LEVELS_SAMPLED)
     part = values[::stride]
@@ -65,15 +58,10 @@ def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice
     before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
     sec. 5): of variance step^2/12, plain additive noise.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    step : float
-        u; 0 if there is none.
-    scatter : float
-        Standard deviation of what cannot be predicted from the samples before, rounding included,
-        u.
+    name, unit: Of the channel.
+    step: u; 0 if there is none.
+    scatter: Standard deviation of what cannot be predicted from the samples before, rounding
+        included, u.
     """
     if step == 0.0:
         return None

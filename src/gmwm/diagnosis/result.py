@@ -32,11 +32,7 @@ Index = Annotated[int, Field(ge=0)]
 class Repetition:
     """How often each sample of a channel is written.
 
-    Attributes
-    ----------
-    times : int
-    first : int
-        Index of a first one, below ``times``.
+    first: Index of a first one, below ``times``.
     """
 
     times: int
@@ -47,26 +43,19 @@ class Repetition:
 class ChannelHealth:
     """What a program wants to know of one channel.
 
-    Attributes
-    ----------
-    lines : tuple of (float, float)
-        Frequency (Hz) and amplitude (u) of each periodic line, strongest first.
-    resonances : tuple of (float, float)
-        Undamped natural frequency (Hz) and damping ratio of each resonance, strongest first.
-    events : tuple of (int, int)
-        First sample and the one after the last of each spike or shock.
-    lsb : float
-        Step of the samples, u; 0 if none was found.
-    outliers : float
-        Fraction of the samples that are outliers all over the record; 0 if they are no more than
-        noise and some shocks explain.
-    held : float
-        Share of samples that only repeat the one before, where nearly all that do are such; else 0.
-    noise : float
-        Usual standard deviation of what cannot be predicted of a sample, u; 0 if it is not known.
-    repetition : Repetition or None
-        If each sample is written several times; the other numbers are then those of the channel
-        at its own rate, events those of the recording.
+    lines: Frequency (Hz) and amplitude (u) of each periodic line, strongest first.
+    resonances: Undamped natural frequency (Hz) and damping ratio of each resonance, strongest
+        first.
+    events: First sample and the one after the last of each spike or shock.
+    lsb: Step of the samples, u; 0 if none was found.
+    outliers: Fraction of the samples that are outliers all over the record; 0 if they are no more
+        than noise and some shocks explain.
+    held: Share of samples that only repeat the one before, where nearly all that do are such; else
+        0.
+    noise: Usual standard deviation of what cannot be predicted of a sample, u; 0 if it is not
+        known.
+    repetition: If each sample is written several times; the other numbers are then those of the
+        channel at its own rate, events those of the recording.
     """
 
     lines: tuple[tuple[float, float], ...] = ()

@@ -88,12 +88,8 @@ def dead_notice(channel: Channel) -> Notice | None:
 def is_dithered(values: FloatArray, step: float) -> bool:
     """Whether noise is wide enough for neighbouring samples to differ by more than rounding.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples in their order, none missing.
-    step : float
-        To which they are rounded, u; 0 if they are not.
+    values: (n,), samples in their order, none missing.
+    step: To which they are rounded, u; 0 if they are not.
     """
     lengths = run_lengths(values)
     free = np.repeat(lengths < tuning.LONG_RUN, lengths)
@@ -119,17 +115,10 @@ def stuck_notice(
     interval around the prediction (Anderson 1955, *Proc. AMS* 6, 170-176). A run of L repetitions
     somewhere in n samples therefore has a probability below n times the L-th power.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    dt : float
-        s.
-    values : (n,) ndarray
-        Samples, NaN where missing.
-    step : float
-        u; 0 if samples are not rounded.
-    errors : Innovations
+    name, unit: Of the channel.
+    dt: s.
+    values: (n,), samples, NaN where missing.
+    step: u; 0 if samples are not rounded.
     """
     present = np.flatnonzero(~np.isnan(values))
     series = values[present]
@@ -194,16 +183,10 @@ def saturation_notice(
     by no less than from the one before to it, up to chance (binomial test, with three standard
     errors for that fall).
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    values : (n,) ndarray
-        Samples, none missing.
-    quiet : (m,) ndarray
-        Those outside shocks, whose peaks may be cut off without harm: they are left out.
-    step : float
-        u; 0 if samples are not rounded.
+    name, unit: Of the channel.
+    values: (n,), samples, none missing.
+    quiet: (m,), those outside shocks, whose peaks may be cut off without harm: they are left out.
+    step: u; 0 if samples are not rounded.
     """
     if not is_dithered(values, step):
         return None
@@ -253,16 +236,10 @@ def abrupt_end_notice(
     them a slow process takes to its extreme (sign test). Steps above half of the scatter are not
     looked at: they hide how noise ends.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    values : (n,) ndarray
-        Samples outside shocks in their order, none missing.
-    step : float
-        u; 0 if samples are not rounded.
-    scatter : float
-        Standard deviation of what cannot be predicted of a sample, u.
+    name, unit: Of the channel.
+    values: (n,), samples outside shocks in their order, none missing.
+    step: u; 0 if samples are not rounded.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
     count = max(int(tuning.LAST_OF_END * values.size), tuning.FEWEST_OF_END)
     if values.size < 4 * count or 2.0 * step > scatter:
@@ -312,16 +289,10 @@ def repeated_value_notice(
     integers, have twice as many zeros: the fall from zero to one step is larger then than from one
     to two, where that of noise is smaller, and of a Laplace law the same.
 
-    Parameters
-    ----------
-    name, unit : str
-        Of the channel.
-    values : (n,) ndarray
-        Samples in their order, none missing.
-    step : float
-        u; 0 if samples are not rounded.
-    scatter : float
-        Standard deviation of what cannot be predicted of a sample, u.
+    name, unit: Of the channel.
+    values: (n,), samples in their order, none missing.
+    step: u; 0 if samples are not rounded.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
     if step > scatter:
         return None

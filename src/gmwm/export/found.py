@@ -33,25 +33,13 @@ def imu_of(
 ) -> Imu:
     """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
 
-    Parameters
-    ----------
-    given : sequence of Calibration or SensorNumbers
-        Together they have gyros and accelerometers.
-    form : str
-    horizon : float or None
-        s; by default that of the numbers or, of calibrations, the usual one.
-    usual : float
-    shared : bool
-        Whether the axes of a sensor have one value in the file.
-    outlook : dict, optional
-        That of `Imu`, where it is known.
-    one_tau : bool, optional
-        Whether there is one correlation time in the file.
-
-    Raises
-    ------
-    InputError
-        If a sensor is missing or given twice, or numbers are of another form or horizon.
+    given: Together they have gyros and accelerometers.
+    horizon: s; by default that of the numbers or, of calibrations, the usual one.
+    shared: Whether the axes of a sensor have one value in the file.
+    outlook: That of `Imu`, where it is known.
+    one_tau: Whether there is one correlation time in the file.
+    Raises InputError if a sensor is missing or given twice, or numbers are of another form or
+        horizon.
     """
     if horizon is not None:
         horizon = checks.positive("horizon", horizon, "give a positive time in seconds")
@@ -155,10 +143,7 @@ def numbers_of(
     Where a calibration has a random walk and the form none, they are those of `gmwm.reduce`. Those
     with one correlation time for all axes, where it is given (s), bound the given ones.
 
-    Raises
-    ------
-    InputError
-        If they have not.
+    Raises InputError if they have not.
     """
     if isinstance(given, Calibration):
         return _found(given, form, usual if horizon is None else horizon, tau)

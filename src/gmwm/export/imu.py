@@ -24,22 +24,13 @@ LETTERS = "xyz"
 class Axis:
     """The numbers of one axis.
 
-    Attributes
-    ----------
-    name : str
-        Of its channel.
-    N, K : float
-        u/sqrt(Hz) and u/s/sqrt(Hz).
-    sigma, tau : float
-        Of the Gauss-Markov process, u and s; not a number in forms without one.
-    initial_sd : float
-        Of the bias at the start, u.
-    nees : dict
-        Predicted normalised error squared by time without aiding.
-    rate : float
-        Of its samples, Hz; NaN if it is not known.
-    upper : frozenset of str
-        Which of the numbers are upper bounds of a term that was not found.
+    name: Of its channel.
+    N, K: u/sqrt(Hz) and u/s/sqrt(Hz).
+    sigma, tau: Of the Gauss-Markov process, u and s; not a number in forms without one.
+    initial_sd: Of the bias at the start, u.
+    nees: Predicted normalised error squared by time without aiding.
+    rate: Of its samples, Hz; NaN if it is not known.
+    upper: Which of the numbers are upper bounds of a term that was not found.
     """
 
     name: str
@@ -72,16 +63,11 @@ class Axis:
 class Triad:
     """The axes of the gyros or of the accelerometers.
 
-    Attributes
-    ----------
-    quantity : {"gyro", "accel"}
-    axes : tuple of Axis
-        Each with its own numbers.
-    common : FilterNumbers or None
-        The bound of all, where a file has one value for them and one calibration has them all.
-    shared_nees : dict or None
-        Where a file has one value for all: predicted normalised error squared of each axis with
-        that value, by time without aiding; empty for an axis whose model is not known.
+    quantity: {"gyro", "accel"}.
+    axes: Each with its own numbers.
+    common: The bound of all, where a file has one value for them and one calibration has them all.
+    shared_nees: Where a file has one value for all: predicted normalised error squared of each axis
+        with that value, by time without aiding; empty for an axis whose model is not known.
     """
 
     quantity: str

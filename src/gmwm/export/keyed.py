@@ -45,22 +45,14 @@ def _same(value: float, letter: str, rate: float) -> float:
 class Keys:
     """How N and K are called and converted.
 
-    Attributes
-    ----------
-    names : tuple of (str, str, str)
-        Key, quantity, and "N" or "K".
-    convert : callable
-        Of a value, its letter and the rate in Hz.
-    units : dict
-        (quantity, letter) -> unit of the value.
-    before, after : tuple of str
-        Lines around the values; ``{rate}`` and ``{topic}`` stand for the rate and the topic.
-    indent, prefix : str
-        Before the key.
-    separator : str
-        Between key and value.
-    ending : str
-        After the value, before the unit.
+    names: Key, quantity, and "N" or "K".
+    convert: Of a value, its letter and the rate in Hz.
+    units: (quantity, letter) -> unit of the value.
+    before, after: Lines around the values; ``{rate}`` and ``{topic}`` stand for the rate and the
+        topic.
+    indent, prefix: Before the key.
+    separator: Between key and value.
+    ending: After the value, before the unit.
     """
 
     names: Sequence[tuple[str, str, str]]

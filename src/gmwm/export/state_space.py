@@ -114,25 +114,11 @@ class StateSpaceTarget(Target):
 def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> dict[str, Any]:
     """Matrices of one channel.
 
-    Parameters
-    ----------
-    model : Model
-        With given parameters.
-    dt : float
-        Sampling interval, s.
-    quantity : str
-    initial_sd : float, optional
-        Standard deviation at the start of a random walk, u.
-
-    Returns
-    -------
-    dict
-        ``continuous`` is ``None`` where a term is defined for samples only.
-
-    Raises
-    ------
-    InputError
-        If a term has no state space.
+    model: With given parameters.
+    dt: Sampling interval, s.
+    initial_sd: Standard deviation at the start of a random walk, u.
+    Returns: ``continuous`` is ``None`` where a term is defined for samples only.
+    Raises InputError if a term has no state space.
     """
     parts = [term.state_space(dt) for term in model.terms]
     starts = [

@@ -22,24 +22,14 @@ from gmwm.filter_numbers import FORMS
 class Target(ABC):
     """A file that some program reads.
 
-    Attributes
-    ----------
-    name : str
-        As users write it.
-    title : str
-        The program.
-    file : str
-        The file, or the place in it, where the numbers go.
-    convention : str
-        What the values are, in N, K, sigma, tau and the rate f of the samples.
-    source : str
-        Where the program's own source, or its manual, defines that.
-    form : str
-        The form of the numbers that it holds.
-    horizon : float
-        Time without aiding unless another is given, s.
-    warnings : tuple of str
-        What to know before use.
+    name: As users write it.
+    title: The program.
+    file: The file, or the place in it, where the numbers go.
+    convention: What the values are, in N, K, sigma, tau and the rate f of the samples.
+    source: Where the program's own source, or its manual, defines that.
+    form: The form of the numbers that it holds.
+    horizon: Time without aiding unless another is given, s.
+    warnings: What to know before use.
     """
 
     name: str
@@ -56,10 +46,7 @@ class Target(ABC):
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         """The file of calibrations or of numbers.
 
-        Raises
-        ------
-        InputError
-            If they do not hold what it needs.
+        Raises InputError if they do not hold what it needs.
         """
 
     def save(
@@ -80,18 +67,11 @@ class Target(ABC):
 class ImuFile(Target):
     """Numbers of gyros and accelerometers, under comments that say what they are.
 
-    Attributes
-    ----------
-    body : callable
-        Lines below the comments, of an `Imu`; of files in JSON, the object.
-    shared : bool
-        Whether the axes of a sensor have one value.
-    one_tau : bool
-        Whether all axes have one correlation time.
-    mark : str
-        What a comment begins with.
-    head : tuple of str
-        Lines that must stand first.
+    body: Lines below the comments, of an `Imu`; of files in JSON, the object.
+    shared: Whether the axes of a sensor have one value.
+    one_tau: Whether all axes have one correlation time.
+    mark: What a comment begins with.
+    head: Lines that must stand first.
     """
 
     body: Callable[[Imu], Any]

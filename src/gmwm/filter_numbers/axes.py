@@ -51,19 +51,12 @@ DT = 0.01
 class Axis:
     """One axis of a sensor.
 
-    Attributes
-    ----------
-    name : str
-        Of the channel; empty if there is none.
-    model : Model
-        With given parameters.
-    dt : float
-        Sampling interval, s.
-    quantity : {"gyro", "accel", ""}
-    bias_sd : float
-        Of a constant bias, u.
-    fit : Fit or None
-        Where the model is from.
+    name: Of the channel; empty if there is none.
+    model: With given parameters.
+    dt: Sampling interval, s.
+    quantity: {"gyro", "accel", ""}.
+    bias_sd: Of a constant bias, u.
+    fit: Where the model is from.
     """
 
     name: str
@@ -107,14 +100,8 @@ class Axis:
 class Axes:
     """Axes, and where they are from.
 
-    Attributes
-    ----------
-    axes : tuple of Axis
-    source : str
-    rate, duration : float
-        Hz and s; NaN if they are not known.
-    single : bool
-        Whether one axis was given, not a mapping.
+    rate, duration: Hz and s; NaN if they are not known.
+    single: Whether one axis was given, not a mapping.
     """
 
     axes: tuple[Axis, ...]
@@ -127,10 +114,7 @@ class Axes:
     def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> Axes:
         """Axes of a model, a fit, a calibration or a mapping.
 
-        Raises
-        ------
-        InputError
-            If the source is something else, or a parameter is open.
+        Raises InputError if the source is something else, or a parameter is open.
         """
         if isinstance(source, Process | Model | Fit):
             name = (source.wv.name or "") if isinstance(source, Fit) else ""
@@ -190,10 +174,7 @@ class Axes:
 def given_tau(form: str, tau: float | str | None) -> float | str | None:
     """A correlation time as users give it, of a form.
 
-    Raises
-    ------
-    InputError
-        If it is none, or the form has none or several.
+    Raises InputError if it is none, or the form has none or several.
     """
     if tau is None:
         return None

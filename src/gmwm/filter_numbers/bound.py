@@ -218,12 +218,8 @@ def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
 def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
     """The same numbers with what is predicted where an error model is the truth.
 
-    Parameters
-    ----------
-    source : Process, Model, Fit or mapping
-        The error model of the axis; as a mapping, with its name.
-    numbers : FilterNumbers
-        Of any origin; the times of its predictions are kept.
+    source: The error model of the axis; as a mapping, with its name.
+    numbers: Of any origin; the times of its predictions are kept.
     """
     axis = Axes.of(source, None, 0.0).axes[0]
     times = [each.time for each in numbers.predicted]

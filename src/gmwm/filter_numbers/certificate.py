@@ -67,20 +67,12 @@ class CertificateForm(Form):
 class Check:
     """Error that a filter believes beside the true one.
 
-    Attributes
-    ----------
-    consumer : {"free", "outage", "keyframes"}
-    where : str
-        The channel, or "horizontal".
-    quantity : str
-        What is in error.
-    unit : str
-    time : float
-        Without aiding, s.
-    true, believed : float
-        Standard deviations.
-    nees : float
-        Normalised error squared per degree of freedom: of all integrals of a channel, or of the
+    consumer: {"free", "outage", "keyframes"}.
+    where: The channel, or "horizontal".
+    quantity: What is in error.
+    time: Without aiding, s.
+    true, believed: Standard deviations.
+    nees: Normalised error squared per degree of freedom: of all integrals of a channel, or of the
         position.
     """
 
@@ -98,15 +90,10 @@ class Check:
 class Cause:
     """What makes the numbers of a kind of sensor larger.
 
-    Attributes
-    ----------
-    quantity : {"gyro", "accel", ""}
-    name : str
-    N, K : float
-        That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
-    N_factor, K_factor : float
-        Of "error model" and "all together", over the numbers in use; of the others, over those of
-        the error model.
+    quantity: {"gyro", "accel", ""}.
+    N, K: That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
+    N_factor, K_factor: Of "error model" and "all together", over the numbers in use; of the others,
+        over those of the error model.
     """
 
     quantity: str

@@ -26,12 +26,9 @@ from gmwm.process import Model, StateSpace, block_diagonal
 class ChainErrors:
     """Errors of the integrals at T times.
 
-    Attributes
-    ----------
-    time : (T,) ndarray
-        Since the last fix, s.
-    predicted, actual : (T, n, n) ndarray
-        Covariance of the errors of the n integrals, the filter's own and the true one.
+    time: (T,), since the last fix, s.
+    predicted, actual: (T, n, n), covariance of the errors of the n integrals, the filter's own and
+        the true one.
     """
 
     time: FloatArray
@@ -63,20 +60,13 @@ class ChainErrors:
 class Chain:
     """What is integrated, and how it is aided.
 
-    Attributes
-    ----------
-    order : int
-        Number n of integrals.
-    fix_sd : float
-        Of a fix of the last integral, in its unit.
-    settled : float
-        Time with fixes before they end, s; zero for none.
-    interval : float
-        Between fixes, s.
-    initial_sd : tuple of float
-        Of the integrals at the start.
-    is_relative : bool
-        Whether the last integral starts anew at each fix, as a relative pose at a keyframe.
+    order: Number n of integrals.
+    fix_sd: Of a fix of the last integral, in its unit.
+    settled: Time with fixes before they end, s; zero for none.
+    interval: Between fixes, s.
+    initial_sd: Of the integrals at the start.
+    is_relative: Whether the last integral starts anew at each fix, as a relative pose at a
+        keyframe.
     """
 
     order: int
@@ -104,23 +94,12 @@ class Chain:
     ) -> ChainErrors:
         """Predicted and true errors of the integrals after some times without aiding.
 
-        Parameters
-        ----------
-        truth, believed : Model
-            Of the sensor, and in the filter.
-        dt : float
-            Sampling interval, s.
-        times : sequence of float
-            Rising, s.
-        true_sd, believed_sd : float
-            Standard deviation of a constant bias, or of the start of a walk.
-        every_fix : bool
-            Whether the errors after every fix come first, with negative times.
-
-        Raises
-        ------
-        InputError
-            If a term has no state-space form.
+        truth, believed: Of the sensor, and in the filter.
+        dt: Sampling interval, s.
+        times: Rising, s.
+        true_sd, believed_sd: Standard deviation of a constant bias, or of the start of a walk.
+        every_fix: Whether the errors after every fix come first, with negative times.
+        Raises InputError if a term has no state-space form.
         """
         real, own = _with_constant(truth, true_sd, dt), _with_constant(believed, believed_sd, dt)
         n, q = self.order, own.n_states

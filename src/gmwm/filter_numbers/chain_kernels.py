@@ -16,26 +16,14 @@ def settle(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Propagate and update by fixes of the last integral.
 
-    Parameters
-    ----------
-    P, A, Q : (n + q, n + q) ndarray
-        The filter's covariance, its transition between fixes, its noise.
-    J, B, R : (m, m) ndarray
-        The same of the joint vector: errors of the integrals, estimates of the states, true states.
-    n, q : int
-        Integrals, and states of the filter.
-    variance : float
-        Of a fix.
-    is_relative : bool
-        Whether the last integral starts anew at each fix.
-    fixes : int
-    out_P, out_J : (K, n, n) ndarray
-        Covariances of the integrals after the first K fixes.
-
-    Returns
-    -------
-    P, J : ndarray
-        After the last fix.
+    P, A, Q: (n + q, n + q), the filter's covariance, its transition between fixes, its noise.
+    J, B, R: (m, m), the same of the joint vector: errors of the integrals, estimates of the states,
+        true states.
+    n, q: Integrals, and states of the filter.
+    variance: Of a fix.
+    is_relative: Whether the last integral starts anew at each fix.
+    out_P, out_J: (K, n, n), covariances of the integrals after the first K fixes.
+    Returns: ``P`` and ``J`` after the last fix.
     """
     size, total = P.shape[0], J.shape[0]
     added = np.zeros(total)

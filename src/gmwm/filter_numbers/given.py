@@ -141,25 +141,13 @@ def read_numbers(
 ) -> dict[str, Pair | Model]:
     """The numbers of gyro and accelerometer in a program's file.
 
-    Parameters
-    ----------
-    path : path-like
-        Of Kalibr, OpenVINS, Kimera and others with their keys, VINS-Mono and VINS-Fusion,
+    path: Of Kalibr, OpenVINS, Kimera and others with their keys, VINS-Mono and VINS-Fusion,
         ORB-SLAM3, FAST-LIO, LIO-SAM, OKVIS2, maplab, Basalt, PX4 (EKF2 at its usual interval),
         GTSAM (Python, C++), KF-GINS and gnss-ins-sim.
-    rate : float, optional
-        Of the IMU, Hz, for programs whose numbers depend on it; by default the file's own.
-
-    Returns
-    -------
-    dict
-        "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
+    rate: Of the IMU, Hz, for programs whose numbers depend on it; by default the file's own.
+    Returns: "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
         (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, has no known keys, or its numbers need a rate.
+    Raises InputError if the file cannot be read, has no known keys, or its numbers need a rate.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -195,22 +183,11 @@ def read_numbers(
 def in_use(given: Given, name: str, quantity: str, horizon: float, start: float) -> FilterNumbers:
     """The numbers of one axis.
 
-    Parameters
-    ----------
-    given : FilterNumbers, SensorNumbers or mapping
-    name : str
-        Of the channel.
-    quantity : str
-        Its kind.
-    horizon : float
-        s, of numbers that name none.
-    start : float
-        Standard deviation of the bias at the start, of numbers that name none, u.
-
-    Raises
-    ------
-    InputError
-        If there are none for this axis.
+    name: Of the channel.
+    quantity: Its kind.
+    horizon: s, of numbers that name none.
+    start: Standard deviation of the bias at the start, of numbers that name none, u.
+    Raises InputError if there are none for this axis.
     """
     item: Any = given
     if isinstance(given, Mapping):

@@ -70,15 +70,10 @@ class Predicted:
     It is the expected one of the filter of `gmwm.filter_numbers.chain.Chain`, by covariance
     analysis.
 
-    Attributes
-    ----------
-    time : float
-        Without aiding, s.
-    nees : float
-        Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it
+    time: Without aiding, s.
+    nees: Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it
         is too optimistic. NaN where a term of the truth has no state-space form.
-    tightness : float
-        Predicted over true standard deviation, of the last integral of the sensor's error.
+    tightness: Predicted over true standard deviation, of the last integral of the sensor's error.
     """
 
     time: float

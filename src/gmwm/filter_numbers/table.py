@@ -17,10 +17,7 @@ _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "ini
 def shown_unit(key: str, quantity: str, units: str) -> tuple[str, float]:
     """The unit in which a number is shown, and how many of it one SI unit is.
 
-    Raises
-    ------
-    InputError
-        If ``units`` is not one of `UNITS`.
+    Raises InputError if ``units`` is not one of `UNITS`.
     """
     unit = _UNITS[key if key in _UNITS else key.partition("_")[0]]
     known = field_units(unit, quantity) if checks.choice("units", units, UNITS) == "field" else ()

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.runs import results
-from gmwm._core.text import wrapped
+from gmwm._core.text import made_by, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
@@ -108,7 +107,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
         return f"<Fleet of {len(self)} units: {len(self.done)} calibrated{failed}>"
 
     def _repr_html_(self) -> str:
-        html: str = import_module("gmwm.report").fleet_fragment(self)
+        html: str = made_by("fleet_fragment", self)
         return html
 
     def __str__(self) -> str:
@@ -171,8 +170,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the self-contained HTML report; see `gmwm.report.write_fleet_report`."""
-        # By name: this room knows none above it, but a result shows itself.
-        written: Path = import_module("gmwm.report").write_fleet_report(self, path)
+        written: Path = made_by("write_fleet_report", self, path)
         return written
 
     def save(self, folder: str | os.PathLike[str]) -> Path:

@@ -22,18 +22,10 @@ Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 def recordings(paths: Paths, folder: Path | None) -> list[Item]:
     """Every recording that paths and patterns name, once, in their order.
 
-    Parameters
-    ----------
-    paths : path, pattern or iterable of them
-        What exists is taken as it is, brackets and all; ``**`` in a pattern stands for any
+    paths: What exists is taken as it is, brackets and all; ``**`` in a pattern stands for any
         folders.
-    folder : Path or None
-        Of the outputs, which are no recordings.
-
-    Raises
-    ------
-    InputError
-        If there are none, or a pattern matches nothing.
+    folder: Of the outputs, which are no recordings.
+    Raises InputError if there are none, or a pattern matches nothing.
     """
     given = [paths] if isinstance(paths, str | os.PathLike) else _listed(paths)
     found: dict[str, str] = {}

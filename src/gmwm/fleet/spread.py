@@ -30,13 +30,9 @@ _MAD = 1.0 / norm.ppf(0.75)
 class Outlier:
     """A unit that stands apart.
 
-    Attributes
-    ----------
-    device : str
-    value : float
-        SI.
-    distance : float
-        From the median, in robust standard deviations, of logarithms where values are positive.
+    value: SI.
+    distance: From the median, in robust standard deviations, of logarithms where values are
+        positive.
     """
 
     device: str
@@ -48,23 +44,13 @@ class Outlier:
 class Spread:
     """One parameter of one axis, over the units whose fit is valid and has it.
 
-    Attributes
-    ----------
-    channel, quantity, parameter : str
-    of : int
-        How many parameters of this letter the models have: those of models with equally many are
+    of: How many parameters of this letter the models have: those of models with equally many are
         compared.
-    unit : str
-        SI.
-    devices : tuple of str
-    values : (n,) ndarray
-        SI.
-    stderr : (n,) ndarray
-        NaN where it is not known.
-    found : (n,) ndarray of bool
-        Where not, the value is an upper bound.
-    without : int
-        Units with a valid model of the axis that does not have it.
+    unit: SI.
+    values: (n,), SI.
+    stderr: (n,), NaN where it is not known.
+    found: (n,) of bool, where not, the value is an upper bound.
+    without: Units with a valid model of the axis that does not have it.
     """
 
     channel: str
@@ -258,15 +244,9 @@ def _spread(key: tuple[str, str, int], rows: Iterable[Row], having: int) -> Spre
 class Structures:
     """Which models were selected for an axis.
 
-    Attributes
-    ----------
-    channel : str
-    counts : dict
-        Title -> units with a valid model of that structure, the commonest first.
-    invalid : tuple of str
-        Units whose model of this axis is not valid.
-    missing : tuple of str
-        Units without a model of this axis.
+    counts: Title -> units with a valid model of that structure, the commonest first.
+    invalid: Units whose model of this axis is not valid.
+    missing: Units without a model of this axis.
     """
 
     channel: str

@@ -62,11 +62,7 @@ class _IndexForm(Form):
 class Store:
     """Calibrations of a fleet on disk.
 
-    Attributes
-    ----------
-    folder : Path
-    options : dict
-        What numbers depend on beside the recordings; see `gmwm.fleet.unit.Task`.
+    options: What numbers depend on beside the recordings; see `gmwm.fleet.unit.Task`.
     """
 
     folder: Path
@@ -83,10 +79,7 @@ class Store:
     def kept(self, item: Item) -> Unit | None:
         """What an earlier run made of a recording, unless it has changed.
 
-        Raises
-        ------
-        InputError
-            If the file is damaged, or of another fleet (code "other-runs").
+        Raises InputError if the file is damaged, or of another fleet (code "other-runs").
         """
         path = self.path(item.name)
         if not path.exists():
@@ -116,10 +109,7 @@ class Store:
     def unit(self, item: Item) -> tuple[dict[str, Any], Unit]:
         """What is stored of a unit: where it is from, and the unit.
 
-        Raises
-        ------
-        InputError
-            If the file is damaged or not there.
+        Raises InputError if the file is damaged or not there.
         """
         path = self.path(item.name)
         content = read_json(path)
@@ -172,10 +162,7 @@ def write_index(
 def read_index(folder: Path) -> tuple[list[Unit], float, dict[str, Any], list[Notice]]:
     """Units, horizon, options and notices of a fleet's folder.
 
-    Raises
-    ------
-    InputError
-        If it holds no fleet that was finished, or one of its files is damaged.
+    Raises InputError if it holds no fleet that was finished, or one of its files is damaged.
     """
     path = folder / INDEX
     if not path.exists():
@@ -203,11 +190,8 @@ def _calibrations(folder: Path) -> list[Path]:
 def opened_store(folder: Path, options: Mapping[str, Any], resume: bool) -> Iterator[Store]:
     """The folder, for one fleet at a time.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written, is in use (code "runs-in-use"), or holds calibrations and
-        ``resume`` is not set (code "earlier-runs").
+    Raises InputError if it cannot be written, is in use (code "runs-in-use"), or holds calibrations
+        and ``resume`` is not set (code "earlier-runs").
     """
     with folder_to_fill(folder), one_writer(folder), folder_to_fill(folder / FOLDER):
         if not resume and _calibrations(folder):

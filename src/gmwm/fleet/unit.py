@@ -31,13 +31,8 @@ the horizon (`gmwm.bound`), and the bias instability at the lowest point of its 
 class Number(NamedTuple):
     """A number that was derived from a fit.
 
-    Attributes
-    ----------
-    value : float
-        SI.
-    stderr : float or None
-    found : bool
-        Else it is an upper bound: of 95 %, or the end of a curve that still falls.
+    value: SI.
+    found: Else it is an upper bound: of 95 %, or the end of a curve that still falls.
     """
 
     value: float
@@ -56,18 +51,11 @@ class Item(NamedTuple):
 class Unit:
     """A unit of a fleet.
 
-    Attributes
-    ----------
-    path : str
-        Of its recording.
-    name : str
-        Short, and its own in the fleet.
-    result : Calibration or Notice
-        Or why there is none.
-    numbers : dict
-        Channel -> one of `DERIVED` -> `Number`.
-    digest : str
-        SHA-256 of the recording; empty where it cannot be read.
+    path: Of its recording.
+    name: Short, and its own in the fleet.
+    result: Or why there is none.
+    numbers: Channel -> one of `DERIVED` -> `Number`.
+    digest: SHA-256 of the recording; empty where it cannot be read.
     """
 
     path: str
@@ -91,21 +79,12 @@ class Unit:
 class Task:
     """How every unit is calibrated; as a function it does so, on whatever machine.
 
-    Attributes
-    ----------
-    reading : dict
-        Arguments of `gmwm.read`.
-    start, stop : float
-        Part of the recordings, s.
-    models : dict
-        Channel, sensor ("gyro", "accel") or "" for all -> what is fitted; selected if empty.
-    screening : tuple of str
-    still : bool
-        See `gmwm.calibrate`.
-    horizon : float
-        Of the N and K of a filter, s.
-    version : str
-        Of the program that numbers are to be from.
+    reading: Arguments of `gmwm.read`.
+    start, stop: Part of the recordings, s.
+    models: Channel, sensor ("gyro", "accel") or "" for all -> what is fitted; selected if empty.
+    still: See `gmwm.calibrate`.
+    horizon: Of the N and K of a filter, s.
+    version: Of the program that numbers are to be from.
     """
 
     reading: Mapping[str, Any]
@@ -209,10 +188,7 @@ def _state(path: str) -> list[tuple[int, int]]:
 def digest_of(path: str) -> str:
     """SHA-256 of a file, or of the files of a folder, which a bag of ROS 2 is.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read.
+    Raises InputError if it cannot be read.
     """
     try:
         if not os.path.isdir(path):

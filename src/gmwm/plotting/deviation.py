@@ -46,14 +46,9 @@ def deviation(
 ) -> Axes:
     """Allan deviation with error bars against averaging time, log-log.
 
-    Parameters
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    value, lower, upper : (J,) ndarray
-        Deviations and the ends of their intervals, in ``unit``.
-    interval : str, optional
-        Level of the intervals, for the legend.
+    tau: (J,), averaging times, s.
+    value, lower, upper: (J,), deviations and the ends of their intervals, in ``unit``.
+    interval: Level of the intervals, for the legend.
     """
     import matplotlib.pyplot as plt
 
@@ -143,16 +138,10 @@ def curves(
 ) -> None:
     """Fitted curve and its components over the data of `deviation`.
 
-    Parameters
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    total : (J,) ndarray
-        Deviation of the sum.
-    components : mapping of str to (J,) ndarray
-        Deviations of the terms by label.
-    data : (J,) ndarray, optional
-        Deviations of the data, to keep in view.
+    tau: (J,), averaging times, s.
+    total: (J,), deviation of the sum.
+    components: Deviations of the terms by label.
+    data: (J,), deviations of the data, to keep in view.
     """
     for colour, (label, value) in zip(_cycle(len(components)), components.items(), strict=True):
         ax.plot(tau, value, color=colour, linewidth=1.3, linestyle="--", label=label, zorder=2)
@@ -165,12 +154,8 @@ def curves(
 def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, float]]) -> None:
     """Straight lines across the log-log axes of `deviation`, thick over a region of each.
 
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes
-        With its limits set; they stay as they are.
-    lines : mapping of str to (slope, coefficient, first, last)
-        Label -> the line ``coefficient * tau^slope`` and the averaging times (s) of its region.
+    ax: With its limits set; they stay as they are.
+    lines: Label -> the line ``coefficient * tau^slope`` and the averaging times (s) of its region.
     """
     ends = np.array(ax.get_xlim())
     limits = ax.get_ylim()
@@ -196,14 +181,9 @@ def residuals(
 ) -> Axes:
     """Standardised residuals as stems with the band of two standard errors; returns the axes.
 
-    Parameters
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    residual : (J,) ndarray
-        In standard errors; NaN where there is none.
-    misfit : (J,) ndarray
-        Relative difference of the deviations, written in per cent at each stem.
+    tau: (J,), averaging times, s.
+    residual: (J,), in standard errors; NaN where there is none.
+    misfit: (J,), relative difference of the deviations, written in per cent at each stem.
     """
     import matplotlib.pyplot as plt
 
@@ -258,12 +238,8 @@ def boxes(
     The axis of a panel shows the boxes and whiskers of all methods but those whose spread would
     flatten the others; what lies outside is counted at the edge.
 
-    Parameters
-    ----------
-    panels : mapping of str to mapping of str to (runs,) ndarray
-        Quantity -> method -> estimates.
-    truths : mapping of str to float
-        Quantity -> true value.
+    panels: Quantity -> method -> estimates.
+    truths: Quantity -> true value.
     """
     import matplotlib.pyplot as plt
 

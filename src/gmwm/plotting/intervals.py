@@ -21,10 +21,7 @@ def intervals(
 ) -> Figure:
     """Values that are 1 where nothing is wrong, on a logarithmic axis.
 
-    Parameters
-    ----------
-    panels : mapping of str to mapping of str to (values, (value, lower, upper))
-        Title -> row -> single values, and the one over all of them with its interval.
+    panels: Title -> row -> single values, and the one over all of them with its interval.
     """
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter

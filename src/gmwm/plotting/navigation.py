@@ -37,14 +37,9 @@ def track(
 ) -> Figure:
     """A track with its outages, and what filters made of it.
 
-    Parameters
-    ----------
-    truth : (n, 2) ndarray
-        East and north, m.
-    outages : sequence of (k, 2) ndarray
-        The parts of the track without GNSS.
-    solutions : mapping of str to sequence of (k, 2) ndarray
-        Name -> estimated positions during each outage.
+    truth: (n, 2), east and north, m.
+    outages: The parts of the track without GNSS.
+    solutions: Name -> estimated positions during each outage.
     """
     import matplotlib.pyplot as plt
 
@@ -68,10 +63,7 @@ def track(
             ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
         ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
     for ax in axes[0]:
-        ax.set_aspect("equal", adjustable="datalim")
-        ax.set_xlabel("east [m]")
-        ax.set_ylabel("north [m]")
-        _plain(ax)
+        _map(ax)
         # Below: solutions run from corner to corner.
         ax.legend(fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
@@ -85,14 +77,9 @@ def errors(
 ) -> Figure:
     """True errors of one run with the bands of 1 and 3 sigma that each filter predicted.
 
-    Parameters
-    ----------
-    panels : mapping of str to (time, error, sd)
-        Name -> times (K,), s; errors and predicted standard deviations (K, d).
-    spans : sequence of (start, end)
-        Outages, s.
-    labels : sequence of str, optional
-        Of the d components.
+    panels: Name -> times (K,), s; errors and predicted standard deviations (K, d).
+    spans: Outages, s.
+    labels: Of the d components.
     """
     import matplotlib.pyplot as plt
 
@@ -118,7 +105,7 @@ def errors(
         axes[first + d - 1, column].tick_params(labelbottom=True)
     for ax in axes[-d:, (len(panels) - 1) % columns + 1 :].flat:
         ax.set_axis_off()
-    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -130,13 +117,19 @@ def _draw_error(
     spans: Sequence[tuple[float, float]],
 ) -> None:
     """One component: its error in the bands of 3 and 1 sigma."""
-    for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
-                        label=f"{factor:g} sigma predicted")  # fmt: skip
+    _draw_bands(ax, time, sd, "predicted")
     ax.plot(time, error, color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
     for end in (end for span in spans for end in span):
         ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
     _plain(ax)
+
+
+def _draw_bands(
+    ax: Axes, time: FloatArray, sd: FloatArray, what: str, rasterized: bool = False
+) -> None:
+    for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
+        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
+                        label=f"{factor:g} sigma {what}", rasterized=rasterized)  # fmt: skip
 
 
 def growth(
@@ -145,13 +138,9 @@ def growth(
 ) -> Figure:
     """Growth of errors in outages: root mean square over the runs, and what filters predicted.
 
-    Parameters
-    ----------
-    panels : mapping of str to mapping of str to (time, rms, predicted)
-        Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
+    panels: Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
         errors and of the predicted ones, (K, d).
-    labels : sequence of str, optional
-        Of the d components.
+    labels: Of the d components.
     """
     import matplotlib.pyplot as plt
 
@@ -179,7 +168,7 @@ def growth(
             if row == rows - 1:
                 ax.set_xlabel("time since the outage began [s]")
     axes[0, 0].plot([], [], color=DATA_COLOUR, linestyle=":", label="predicted")
-    axes[0, 0].legend(fontsize="small")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -216,6 +205,19 @@ def _styles(
     return list(zip(colours, dashes, named.items(), strict=True))
 
 
+def _map(ax: Axes) -> None:
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel("east [m]")
+    ax.set_ylabel("north [m]")
+    _plain(ax)
+
+
+def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
+    """Of one panel, where it hides none."""
+    figure.legend(*ax.get_legend_handles_labels(), fontsize="x-small", ncols=4, title=title,
+                  title_fontsize="x-small", loc="outside upper center")  # fmt: skip
+
+
 def _plain(ax: Axes) -> None:
     ax.grid(True, color="#dddddd", linewidth=0.6)
     ax.set_axisbelow(True)
@@ -225,29 +227,27 @@ def _plain(ax: Axes) -> None:
 def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) -> Figure:
     """An estimated track, the fixes that it rests on, and its part without fixes.
 
-    Parameters
-    ----------
-    track : (n, 2) ndarray
-        East and north, m.
-    fixes : (k, 2) ndarray
-    without : (j, 2) ndarray
-        Part of the track.
+    track: (n, 2), east and north, m.
+    fixes: (k, 2).
+    without: (j, 2), part of the track.
     """
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=3, label="fixes",
+    _draw_solution(ax, track, fixes, without, "longest time without fixes", 3)
+    _legend_above(figure, ax)
+    return figure
+
+
+def _draw_solution(
+    ax: Axes, track: FloatArray, fixes: FloatArray, without: FloatArray, label: str, size: int
+) -> None:
+    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=size, label="fixes",
             rasterized=len(fixes) > _DENSE)  # fmt: skip
-    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
-            label="longest time without fixes")  # fmt: skip
+    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
     ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution",
             rasterized=len(track) > _DENSE)  # fmt: skip
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("east [m]")
-    ax.set_ylabel("north [m]")
-    _plain(ax)
-    ax.legend(fontsize="small")
-    return figure
+    _map(ax)
 
 
 def measured_outage(
@@ -256,32 +256,18 @@ def measured_outage(
 ) -> Figure:  # fmt: skip
     """A time without fixes: its track, and errors of three components with their bands.
 
-    Parameters
-    ----------
-    track, without, fixes : (n, 2), (j, 2), (k, 2) ndarray
-        East and north, m: of the solution, of its part without fixes, and of the fixes.
-    time : (n,) ndarray
-        Of the solution, s.
-    sd : (n, 3) ndarray
-        Predicted standard deviations to the north, east and down, m.
-    fix_time : (e,) ndarray
-        s.
-    error : (e, 3) ndarray
-        Fixes less where they were expected, m.
+    track, without, fixes: (n, 2), (j, 2), (k, 2), east and north, m: of the solution, of its part
+        without fixes, and of the fixes.
+    time: (n,), of the solution, s.
+    sd: (n, 3), predicted standard deviations to the north, east and down, m.
+    fix_time: (e,), s.
+    error: (e, 3), fixes less where they were expected, m.
     """
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.6), layout="constrained")
-    ax = axes[0, 0]
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=4, label="fixes")
-    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5,
-            label="without fixes")  # fmt: skip
-    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("east [m]")
-    ax.set_ylabel("north [m]")
-    ax.legend(fontsize="x-small")
-    _plain(ax)
+    _draw_solution(axes[0, 0], track, fixes, without, "without fixes", 4)
+    axes[0, 0].legend(fontsize="x-small")
     for i, (ax, name) in enumerate(zip((axes[0, 1], axes[1, 0], axes[1, 1]),
                                        ("north", "east", "down"), strict=True)):  # fmt: skip
         ax.fill_between(time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0,
@@ -298,10 +284,8 @@ def measured_outage(
 def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> Figure:
     """Innovations of three components with the bands of 1 and 3 sigma that a filter expected.
 
-    Parameters
-    ----------
-    panels : mapping of str to (time, value, sd)
-        Kind with its unit -> times (K,), s; innovations and expected standard deviations (K, 3).
+    panels: Kind with its unit -> times (K,), s; innovations and expected standard deviations (K,
+        3).
     """
     import matplotlib.pyplot as plt
 
@@ -312,10 +296,7 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
     for column, (title, (time, value, sd)) in enumerate(panels.items()):
         for row, label in enumerate(("north", "east", "down")):
             ax = axes[row, column]
-            for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-                ax.fill_between(time, -factor * sd[:, row], factor * sd[:, row], color=_BAND,
-                                alpha=alpha, linewidth=0, rasterized=time.size > _DENSE,
-                                label=f"{factor:g} sigma expected")  # fmt: skip
+            _draw_bands(ax, time, sd[:, row], "expected", rasterized=time.size > _DENSE)
             ax.plot(time, value[:, row], ".", color=COMPONENT_COLOURS[1], markersize=3,
                     rasterized=time.size > _DENSE, label="innovation")  # fmt: skip
             _plain(ax)
@@ -323,7 +304,7 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
                 ax.set_ylabel(label)
         axes[0, column].set_title(title, fontsize="medium")
         axes[2, column].set_xlabel("time [s]")
-    axes[0, 0].legend(fontsize="x-small", loc="upper left")
+    _legend_above(figure, axes[0, 0])
     return figure
 
 
@@ -334,14 +315,9 @@ def outages_compared(
 ) -> Figure:
     """Errors at the end of each outage, model by model, and their ratios.
 
-    Parameters
-    ----------
-    time : (K,) ndarray
-        Ends of the outages, s.
-    panels : mapping of str to mapping of str to ((K,) ndarray, float)
-        Quantity with its unit -> name -> errors, and their root mean square as predicted.
-    ratios : mapping of str to three floats
-        What is compared with what -> ratio of the errors, lower and upper end of its interval.
+    time: (K,), ends of the outages, s.
+    panels: Quantity with its unit -> name -> errors, and their root mean square as predicted.
+    ratios: What is compared with what -> ratio of the errors, lower and upper end of its interval.
     """
     import matplotlib.pyplot as plt
 
@@ -359,8 +335,7 @@ def outages_compared(
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)
         _plain(ax)
-    axes[0].legend(fontsize="x-small", title="points: errors; lines: RMS as predicted",
-                   title_fontsize="x-small")  # fmt: skip
+    _legend_above(figure, axes[0], "points: errors; lines: RMS as predicted")
     axes[count - 1].set_xlabel("end of the outage [min]")
     ax = axes[count]
     for row, (ratio, lower, upper) in enumerate(ratios.values()):

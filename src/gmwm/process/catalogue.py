@@ -54,14 +54,9 @@ def compiled_levels(tau: FloatArray, dt: float, kinds: Collection[int]) -> tuple
 def shaped_curve(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
     """`Process.unit_haar_variance` of a compiled kind, (J,), for inner loops; empty where unknown.
 
-    Parameters
-    ----------
-    kind : int
-        `Process.compiled_kind`.
-    shape : ndarray
-        Values of the shape parameters.
-    levels : tuple
-        From `compiled_levels`.
+    kind: `Process.compiled_kind`.
+    shape: Values of the shape parameters.
+    levels: From `compiled_levels`.
     """
     m, dt, wide, narrow = levels
     if kind == _GAUSS_MARKOV:
@@ -82,11 +77,8 @@ def shaped_slope(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
 def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
     """The model whose terms were written with ``to_dict``.
 
-    Raises
-    ------
-    InputError
-        For a process that is neither built in nor defined in a module imported so far, or
-        parameters it does not have.
+    Raises InputError for a process that is neither built in nor defined in a module imported so
+        far, or parameters it does not have.
     """
     kinds = {kind.__name__: kind for kind in _subclasses(Process)}
     terms = []

@@ -26,6 +26,7 @@ from gmwm.process.spectral import (
     PANEL_POLE,
     TOGETHER,
     WIDER,
+    log_tangent,
     node_weights,
     panel_weights,
     rounded,
@@ -98,10 +99,9 @@ class LowPassNoise(_Filtered):
         super().__init__(N, bandwidth, order, damping)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        with np.errstate(divide="ignore"):
-            log_tangent = np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5)))
-        found = _gain(self.bandwidth, self.order, self.damping, log_tangent.ravel(), dt)
-        return self.N**2 * found.reshape(log_tangent.shape)
+        x = log_tangent(f, dt)
+        found = _gain(self.bandwidth, self.order, self.damping, x.ravel(), dt)
+        return self.N**2 * found.reshape(x.shape)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)
@@ -224,10 +224,7 @@ def low_pass_haar(
 ) -> FloatArray:
     """Haar wavelet variance at unit N, (J,); empty where panels are too wide for the spectrum.
 
-    Parameters
-    ----------
-    wide, narrow : (points, weights)
-        Of panels, see `on_panels`.
+    wide, narrow: (points, weights), of panels, see `on_panels`.
     """
     # Distance of the next pole of the spectrum from the real axis of log tan(pi f dt).
     pole = math.acos(max(1.0 - 2.0 * damping**2, -1.0)) / order

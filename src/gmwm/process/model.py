@@ -21,15 +21,9 @@ from gmwm.process.state_space import StateSpace
 class ModelParameter:
     """A parameter of one term of a model.
 
-    Attributes
-    ----------
-    key : str
-        Its name in ``model.params``, e.g. ``"sigma_2"``.
-    term : int
-        Index of the term in ``model.terms``.
-    parameter : Parameter
-    value : float or None
-        ``None`` where open.
+    key: Its name in ``model.params``, e.g. ``"sigma_2"``.
+    term: Index of the term in ``model.terms``.
+    value: ``None`` where open.
     """
 
     key: str
@@ -239,10 +233,7 @@ def _no_term(other: Any) -> str:
 def as_model(model: Process | Model) -> Model:
     """A model of one term from a process; a model as it is.
 
-    Raises
-    ------
-    InputError
-        For anything else.
+    Raises InputError for anything else.
     """
     if isinstance(model, Model):
         return model

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 
 import numpy as np
 import numpy.typing as npt
@@ -49,16 +49,10 @@ _MARGIN = 0.25  # a spectrum f^-a needs a < 2 r + 1 - _MARGIN: the lowest octave
 class Quadrature:
     """Nodes and gains for a set of averaging times.
 
-    Attributes
-    ----------
-    frequency : (K,) ndarray
-        Nodes in cycles per sample, within (0, 1/2).
-    weight : (K,) ndarray
-        Quadrature weights, in cycles per sample; their sum is 1/2.
-    gain : (J, K) ndarray
-        |H_m|^2 at the nodes, with unresolved lobes replaced by their mean.
-    resolved : (J, K) ndarray
-        Share of each gain that is resolved (1) rather than averaged over lobes (0).
+    frequency: (K,), nodes in cycles per sample, within (0, 1/2).
+    weight: (K,), quadrature weights, in cycles per sample; their sum is 1/2.
+    gain: (J, K), |H_m|^2 at the nodes, with unresolved lobes replaced by their mean.
+    resolved: (J, K), share of each gain that is resolved (1) rather than averaged over lobes (0).
     """
 
     frequency: FloatArray
@@ -100,6 +94,59 @@ def haar_gain(m: float, frequency: FloatArray) -> FloatArray:
     """Squared gain of the Haar filter of averaging time ``m`` samples (cycles per sample)."""
     sine = np.sin(np.pi * m * frequency) ** 2  # a fourth power takes ten times as long
     return sine**2 / (m * np.sin(np.pi * frequency)) ** 2
+
+
+_OfFrequencies = Callable[[FloatArray, float], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fixed:
+    """An array, the same as another one only if it is that, and a sampling interval."""
+
+    f: FloatArray
+    dt: float
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Fixed) and self.f is other.f and self.dt == other.dt
+
+    def __hash__(self) -> int:
+        return hash((id(self.f), self.dt))
+
+
+def _kept(function: _OfFrequencies) -> _OfFrequencies:
+    """Keep what it gives for arrays that nobody can write to: spectra of a search share them."""
+
+    @lru_cache(maxsize=16)
+    def of_fixed(given: _Fixed) -> FloatArray:
+        found = function(given.f, given.dt)
+        found.flags.writeable = False
+        return found
+
+    @wraps(function)
+    def found(f: FloatArray, dt: float) -> FloatArray:
+        is_fixed = isinstance(f, np.ndarray) and f.base is None and not f.flags.writeable
+        return of_fixed(_Fixed(f, dt)) if is_fixed else function(f, dt)
+
+    return found
+
+
+@_kept
+def in_hertz(f: FloatArray, dt: float) -> FloatArray:
+    """Frequencies in Hz from those in cycles per sample."""
+    return f / dt
+
+
+@_kept
+def squared_sine(f: FloatArray, dt: float) -> FloatArray:
+    """sin^2(pi f dt) at frequencies f in Hz."""
+    return np.asarray(np.sin(np.pi * f * dt) ** 2)
+
+
+@_kept
+def log_tangent(f: FloatArray, dt: float) -> FloatArray:
+    """Log tan(pi |f| dt) at frequencies f in Hz, up to half the sampling rate."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5))))
 
 
 @lru_cache(maxsize=8)
@@ -267,19 +314,10 @@ _TAIL = (
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     """Haar wavelet variance of a process from its spectrum alone.
 
-    Parameters
-    ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, u^2/Hz.
-    tau : array_like
-        Averaging times in seconds.
-    dt : float
-        Sampling interval in seconds.
-
-    Returns
-    -------
-    ndarray
-        Same shape as ``tau``, in u^2.
+    psd: ``psd(f, dt)``, two-sided, u^2/Hz.
+    tau: Averaging times in seconds.
+    dt: Sampling interval in seconds.
+    Returns: same shape as ``tau``, in u^2.
     """
     tau = np.asarray(tau, dtype=float)
     result = quadrature(rounded(tuple((tau.ravel() / dt).tolist()))).haar_variance(psd, dt)

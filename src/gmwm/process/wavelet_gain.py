@@ -50,14 +50,9 @@ _ORDER = 64
 class GainWeights:
     """Nodes and weights for the levels 1 to J of a wavelet.
 
-    Attributes
-    ----------
-    frequency : (K,) ndarray
-        Nodes in cycles per sample, rising, within (0, 1/2).
-    weight : (J, K) ndarray
-        int_0^{1/2} |H_j|^2 S df = weight[j - 1] @ S(frequency), in cycles per sample.
-    lowest, second : slice
-        Nodes of the two lowest octaves.
+    frequency: (K,), nodes in cycles per sample, rising, within (0, 1/2).
+    weight: (J, K), int_0^{1/2} |H_j|^2 S df = weight[j - 1] @ S(frequency), in cycles per sample.
+    lowest, second: Nodes of the two lowest octaves.
     """
 
     frequency: FloatArray
@@ -198,14 +193,10 @@ def gain_weights(name: str, levels: int) -> GainWeights:
 class PairWeights:
     """Weights for products of the gains of two levels.
 
-    Attributes
-    ----------
-    frequency : (K,) ndarray
-        As in `GainWeights`.
-    weight : (P, K) ndarray
-        int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of levels
-        j = first[p] + 1 <= k = second[p] + 1.
-    first, second : (P,) ndarray
+    frequency: (K,), as in `GainWeights`.
+    weight: (P, K), int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of
+        levels j = first[p] + 1 <= k = second[p] + 1.
+    first, second: (P,).
     """
 
     frequency: FloatArray

@@ -42,14 +42,9 @@ NAMES = (
 class Wavelet:
     """A wavelet: its filters and what follows from them.
 
-    Attributes
-    ----------
-    name : str
-        As in PyWavelets; "haar" for "db1".
-    scaling, detail : (L,) ndarray
-        MODWT scaling filter g and wavelet filter h.
-    vanishing_moments : int
-        r: polynomials of degree below r give coefficients of zero.
+    name: As in PyWavelets; "haar" for "db1".
+    scaling, detail: (L,), MODWT scaling filter g and wavelet filter h.
+    vanishing_moments: r: polynomials of degree below r give coefficients of zero.
     """
 
     name: str
@@ -89,17 +84,9 @@ class Wavelet:
     def gain(self, level: int, f: FloatArray) -> FloatArray:
         """Squared gain of a level's equivalent filter, to full relative precision at small f.
 
-        Parameters
-        ----------
-        level : int
-            j = 1, 2, ...; the averaging time is 2^(j-1) samples.
-        f : array_like
-            Frequencies in cycles per sample.
-
-        Returns
-        -------
-        ndarray
-            |H_j(f)|^2 = |H(2^(j-1) f)|^2 prod_{l<j-1} |G(2^l f)|^2, same shape as ``f``.
+        level: j = 1, 2, ...; the averaging time is 2^(j-1) samples.
+        f: Frequencies in cycles per sample.
+        Returns: |H_j(f)|^2 = |H(2^(j-1) f)|^2 prod_{l<j-1} |G(2^l f)|^2, same shape as ``f``.
         """
         return np.asarray(self.gains(level, f)[-1])
 
@@ -136,16 +123,9 @@ def _response(taps: FloatArray, f: FloatArray) -> ComplexArray:
 def wavelet(name: str) -> Wavelet:
     """The wavelet of a name.
 
-    Parameters
-    ----------
-    name : str
-        As in PyWavelets: "haar" (or "db1"), "db2" to "db10", "sym2" to "sym10", "coif1" to
+    name: As in PyWavelets: "haar" (or "db1"), "db2" to "db10", "sym2" to "sym10", "coif1" to
         "coif5". The number is that of vanishing moments, for "coif" half of it.
-
-    Raises
-    ------
-    InputError
-        For a name that is not known.
+    Raises InputError for a name that is not known.
     """
     if not isinstance(name, str) or name not in NAMES:
         raise InputError(

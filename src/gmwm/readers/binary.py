@@ -27,15 +27,10 @@ from gmwm.readers.table import LARGEST, usable
 class BinaryLayout:
     """How a record is laid out: time (float64), then six numbers, gyro and accelerometer x, y, z.
 
-    Attributes
-    ----------
-    kind : str
-        numpy type of the six numbers.
-    gyro, accel : float
-        What one is worth: rad and m/s if they are increments, rad/s and m/s^2 if they are rates.
-    increments : bool
-    order : {"=", "<", ">"}
-        Native, little- or big-endian.
+    kind: numpy type of the six numbers.
+    gyro, accel: What one is worth: rad and m/s if they are increments, rad/s and m/s^2 if they are
+        rates.
+    order: {"=", "<", ">"}, native, little- or big-endian.
     """
 
     kind: str
@@ -70,10 +65,7 @@ _FORM = "TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"
 def layout_of(text: str) -> BinaryLayout:
     """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``.
 
-    Raises
-    ------
-    InputError
-        If it is neither.
+    Raises InputError if it is neither.
     """
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
@@ -118,10 +110,7 @@ class BinaryTable:
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
         """Look at the size of a file and its first times.
 
-        Raises
-        ------
-        InputError
-            If it is too short, or its times are not those of this layout.
+        Raises InputError if it is too short, or its times are not those of this layout.
         """
         size, record = path.stat().st_size, layout.record.itemsize
         count, rest = divmod(size, record)
@@ -167,10 +156,7 @@ class BinaryTable:
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns, block by block.
 
-        Raises
-        ------
-        InputError
-            If a number is infinite, or there is not enough memory.
+        Raises InputError if a number is infinite, or there is not enough memory.
         """
         memory.require(tuning.BYTES_PER_SAMPLE * self.count * (len(columns) + 1), self.source)
         found = {column: np.empty(self.count) for column in {0, *columns}}

@@ -51,10 +51,7 @@ _MINUTE, _LEAP_MINUTE = 60.0, 61.0  # s
 def split_line(line: str, delimiter: str) -> list[str]:
     """Fields of a line, without blanks around them and without quotes.
 
-    Raises
-    ------
-    ValueError
-        If the quotes do not match.
+    Raises ValueError if the quotes do not match.
     """
     if delimiter == BLANKS:
         return [cell.strip('"') for cell in _RUN_OF_BLANKS.split(line.strip(" \t"))]
@@ -77,18 +74,10 @@ def split_header(line: str, delimiter: str) -> list[str]:
 def number(cell: str, decimal: str) -> float | None:
     """The number in a field.
 
-    Parameters
-    ----------
-    cell : str
-        Without blanks around it.
-    decimal : {".", ","}
-        Decimal mark.
-
-    Returns
-    -------
-    float or None
-        NaN where the field is empty or one of the usual words for a missing sample, infinity where
-        the number is infinite or too large for use, ``None`` where the field is text.
+    cell: Without blanks around it.
+    decimal: {".", ","}, decimal mark.
+    Returns: NaN where the field is empty or one of the usual words for a missing sample, infinity
+        where the number is infinite or too large for use, ``None`` where the field is text.
     """
     if _NUMBERS[decimal].fullmatch(cell):
         value = float(cell.replace(",", "."))
@@ -104,15 +93,8 @@ def seconds_of(found: re.Match[str]) -> float:
     Whole days and minutes are counted by the calendar; the last minute of a day of UTC may have
     61 s.
 
-    Parameters
-    ----------
-    found : re.Match
-        Of `DATE` or `FIELD_OF_DATE`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such day, minute, second or zone.
+    found: Of `DATE` or `FIELD_OF_DATE`.
+    Raises ValueError if there is no such day, minute, second or zone.
     """
     day, hour, minute, second = (part for part in found.groups()[:8] if part is not None)
     start = datetime.combine(_day(day), time(int(hour), int(minute)), tzinfo=UTC)
@@ -148,10 +130,7 @@ def has_zone(found: re.Match[str]) -> bool:
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
     """Columns whose every field is a date, or empty; whether they have a zone.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of str
-        Fields of the first lines.
+    rows: Fields of the first lines.
     """
     result = {}
     for column in range(min(map(len, rows), default=0)):

@@ -21,25 +21,11 @@ def channel_units(
 ) -> tuple[dict[str, str], tuple[Notice, ...]]:
     """Find the unit of every channel.
 
-    Parameters
-    ----------
-    units : mapping of str to str
-        What the user gave, by sensor or by channel; the latter goes first.
-    lacks_rate : bool, optional
-        Whether the sampling rate is missing too, which is then asked for at once.
-
-    Returns
-    -------
-    units : dict of str to str
-        By channel.
-    notices : tuple of Notice
-        Where they come from, if not from the user alone.
-
-    Raises
-    ------
-    InputError
-        If a unit is missing, unknown, or not one of what the channel measures; or the rate is
-        missing.
+    units: What the user gave, by sensor or by channel; the latter goes first.
+    lacks_rate: Whether the sampling rate is missing too, which is then asked for at once.
+    Returns: units, by channel; notices, where they come from, if not from the user alone.
+    Raises InputError if a unit is missing, unknown, or not one of what the channel measures; or the
+        rate is missing.
     """
     _check_keys(units, roles)
     found: dict[str, str] = {}

@@ -48,10 +48,7 @@ class CsvTable:
     def open(cls, path: Path) -> CsvTable:
         """Look at the beginning of a file.
 
-        Raises
-        ------
-        InputError
-            If it cannot be read or is not a table.
+        Raises InputError if it cannot be read or is not a table.
         """
         _, head = next(blocks(path, size=_HEAD), (1, b""))
         return cls(path, with_dialect(find_layout(path.name, head), path.name, head))
@@ -84,11 +81,8 @@ class CsvTable:
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns; see `Table`.
 
-        Raises
-        ------
-        InputError
-            At the first line with a wrong number of fields or with text for a number; if there
-            is none, for the first number that is infinite; if there is not enough memory.
+        Raises InputError at the first line with a wrong number of fields or with text for a number;
+            if there is none, for the first number that is infinite; if there is not enough memory.
         """
         import pyarrow
 

@@ -21,12 +21,8 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     which the preamble has the number per g. Sensor Logger: axes without the sensor, which is in the
     name of the file, and time in nanoseconds.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file.
-    head : bytes
-        Its beginning.
+    source: Name of the file.
+    head: Its beginning.
     """
     names = layout.names
     if names[:1] == ("loopIteration",):

@@ -28,26 +28,15 @@ _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 class Layout:
     """How to read a delimited text.
 
-    Attributes
-    ----------
-    delimiter : str
-        One character; a space stands for runs of spaces and tabs.
-    decimal : {".", ","}
-    names : tuple of str
-        Of the columns, ``""`` where there is none.
-    tentative : bool
-        Whether the names, if any, are those of a comment line.
-    trailing : bool
-        Whether every line of data ends with a delimiter.
-    offset : int
-        Bytes before the first line of data.
-    line : int
-        Number of that line, counted from 1.
-    notices : tuple of Notice
-    scales : dict
-        Index of a column -> what its numbers are multiplied by.
-    dates : dict
-        Index of a column of dates -> whether they have a zone.
+    delimiter: One character; a space stands for runs of spaces and tabs.
+    decimal: {".", ","}.
+    names: Of the columns, ``""`` where there is none.
+    tentative: Whether the names, if any, are those of a comment line.
+    trailing: Whether every line of data ends with a delimiter.
+    offset: Bytes before the first line of data.
+    line: Number of that line, counted from 1.
+    scales: Index of a column -> what its numbers are multiplied by.
+    dates: Index of a column of dates -> whether they have a zone.
     """
 
     delimiter: str
@@ -77,17 +66,9 @@ class _Line:
 def find_layout(source: str, head: bytes) -> Layout:
     """Find out how a text is laid out from its first lines.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file, for messages.
-    head : bytes
-        The beginning of the file, whole lines.
-
-    Raises
-    ------
-    InputError
-        If this is not a text, has no data, or its header does not fit the data.
+    source: Name of the file, for messages.
+    head: The beginning of the file, whole lines.
+    Raises InputError if this is not a text, has no data, or its header does not fit the data.
     """
     _check_is_text(source, head)
     comments, lines = _first_lines(source, head)

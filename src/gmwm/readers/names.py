@@ -107,16 +107,10 @@ _POWER = re.compile(r"(?<=[A-Za-z])(?:\^|\*\*)?(-?[1-3])")
 class Meaning:
     """What a name says.
 
-    Attributes
-    ----------
-    role : str or None
-        One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
-    unit : str or None
-        Its unit, if the name has one that is understood.
-    seconds : float or None
-        For a time column, its unit in seconds.
-    stated : str
-        For a time column, what stands in brackets after its name, understood or not.
+    role: One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
+    unit: Its unit, if the name has one that is understood.
+    seconds: For a time column, its unit in seconds.
+    stated: For a time column, what stands in brackets after its name, understood or not.
     """
 
     role: str | None
@@ -128,10 +122,7 @@ class Meaning:
 def stated_seconds(source: str, name: str) -> float | None:
     """Unit of a time column in seconds, ``None`` if its name states none.
 
-    Raises
-    ------
-    InputError
-        If the name states a unit that is not one of time.
+    Raises InputError if the name states a unit that is not one of time.
     """
     found = meaning(name)
     if found.stated and found.seconds is None:
@@ -147,10 +138,7 @@ def stated_seconds(source: str, name: str) -> float | None:
 def meaning(name: str) -> Meaning:
     """Interpret the name of a column.
 
-    Parameters
-    ----------
-    name : str
-        As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
+    name: As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
     """
     plain = unicodedata.normalize("NFKC", name.replace("²", "^2")).replace("μ", "u")
     base, bracket = _split_brackets(plain)

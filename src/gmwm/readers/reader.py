@@ -149,8 +149,8 @@ def _read(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def part_of(table: Table, given: Given, fewest: int = tuning.FEWEST_SAMPLES) -> Part:
-    """The recording of a table, and when it begins; of so many samples of one channel at least."""
+def part_of(table: Table, given: Given, before: int = 0) -> Part:
+    """The recording of a table, and when it begins; ``before`` are rows of parts before this."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     # Complain before a long file is read, not after.
@@ -160,7 +160,8 @@ def part_of(table: Table, given: Given, fewest: int = tuning.FEWEST_SAMPLES) -> 
     unit_of, unit_notices = channel_units(table, roles, given.units, lacks_rate)
 
     arrays, auxiliary, unreadable = _load(table, roles)
-    _check_size(table, roles, arrays, fewest)
+    if not before:  # later parts may hold no samples at all
+        _check_size(table, roles, arrays)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
         if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
@@ -177,7 +178,7 @@ def part_of(table: Table, given: Given, fewest: int = tuning.FEWEST_SAMPLES) -> 
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
+    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated, before)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -203,7 +204,7 @@ def part_of(table: Table, given: Given, fewest: int = tuning.FEWEST_SAMPLES) -> 
         notices=(*at_rest, *recording.notices),
         jitter=timing.jitter if timing is not None else None,
     )
-    return Part(recording, start)
+    return Part(recording, start, timing.jumps if timing is not None else None)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:
@@ -247,14 +248,14 @@ def _load(
     return arrays, kept, [Notice("columns-unreadable", "note", "", text)]
 
 
-def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray], fewest: int) -> None:
+def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
-    if most < fewest:
+    if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
         raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least {fewest} are "
-            "needed: record longer"
+            f"{table.source} has {most} samples{of_any} where at least "
+            f"{tuning.FEWEST_SAMPLES} are needed: record longer"
         )
 
 
@@ -270,12 +271,16 @@ def _repeated(columns: Sequence[FloatArray], order: IntArray) -> BoolArray:
 
 
 def _timing(
-    table: Table, time: int | None, arrays: Mapping[int, FloatArray], stated: float | None
+    table: Table,
+    time: int | None,
+    arrays: Mapping[int, FloatArray],
+    stated: float | None,
+    before: int,
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return stated or 0.0, None, ()  # without one, it was asked for with the units
-    name = table.names[time]
+    name, n = table.names[time], arrays[time].size
     clock = Clock(
         source=table.source,
         column=label(table.names, time),
@@ -284,6 +289,7 @@ def _timing(
         own_unit=meaning(name).stated,
         where=table.where,
         same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
+        extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
     )
     timing = clock.timing(stated)
     if stated is None:

@@ -32,16 +32,10 @@ class Given:
 class Roles:
     """What the columns are.
 
-    Attributes
-    ----------
-    channels : dict of str to int
-        Name of a gyro's or accelerometer's channel -> index of its column.
-    auxiliary : tuple of AuxiliaryColumn
-        Other channels that are kept.
-    time : int or None
-        Index of the column of time stamps.
-    notices : tuple of Notice
-        Which columns are auxiliary, and which are not used.
+    channels: Name of a gyro's or accelerometer's channel -> index of its column.
+    auxiliary: Other channels that are kept.
+    time: Index of the column of time stamps.
+    notices: Which columns are auxiliary, and which are not used.
     """
 
     channels: dict[str, int]
@@ -60,15 +54,9 @@ class Roles:
 class AuxiliaryColumn:
     """A column of temperatures, voltages or time stamps of another clock.
 
-    Attributes
-    ----------
-    name : str
-        Of its channel.
-    index : int
-    quantity : str
-        One of `AUXILIARY`.
-    unit : AuxiliaryUnit or None
-        That of the file, if it is known.
+    name: Of its channel.
+    quantity: One of `AUXILIARY`.
+    unit: That of the file, if it is known.
     """
 
     name: str
@@ -90,16 +78,8 @@ class Columns:
     def find(self, reference: Reference, what: str) -> int:
         """Index of a column.
 
-        Parameters
-        ----------
-        reference : str or int
-        what : str
-            What it is for, in messages.
-
-        Raises
-        ------
-        InputError
-            If there is no such column, or more than one.
+        what: What it is for, in messages.
+        Raises InputError if there is no such column, or more than one.
         """
         if isinstance(reference, bool) or not isinstance(reference, str | int):
             raise InputError(
@@ -146,10 +126,7 @@ def roles_of(table: Table, given: Given) -> Roles:
     What the caller says goes first, then the columns' names, then their number; the units decide
     what one or three columns without names are.
 
-    Raises
-    ------
-    InputError
-        If it cannot be decided, or no channel is a gyro's or an accelerometer's.
+    Raises InputError if it cannot be decided, or no channel is a gyro's or an accelerometer's.
     """
     columns = Columns(table.source, table.names)
     units, channels, time = given.units, given.channels, given.time

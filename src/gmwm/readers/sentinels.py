@@ -30,23 +30,12 @@ def without_sentinels(
     (999, -9999, ...) or the smallest or largest integer of 16, 24, 32 or 64 bit, or one that comes
     again and again, exactly, with nothing between it and the others: what moves passes through.
 
-    Parameters
-    ----------
-    name : str
-        Of the channel.
-    values : (n,) ndarray
-        In the unit of the file; NaN where one is missing.
-    largest : float
-        Magnitude beyond the range of any sensor, in the same unit.
-    where : callable
-        Row -> where that is in the file.
-
-    Returns
-    -------
-    ndarray
-        A copy if any number is made missing, else ``values``.
-    list of Notice
-        One for each number that occurs, of code "sentinel".
+    name: Of the channel.
+    values: (n,), in the unit of the file; NaN where one is missing.
+    largest: Magnitude beyond the range of any sensor, in the same unit.
+    where: Row -> where that is in the file.
+    Returns: a copy if any number is made missing, else ``values``; list of Notice, one for each
+        number that occurs, of code "sentinel".
     """
     some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
     some = some[~np.isnan(some)]

@@ -24,18 +24,11 @@ LARGEST = 1e150
 class Table(Protocol):
     """A file of columns of equal length.
 
-    Attributes
-    ----------
-    source : str
-        The file's name, for messages.
-    names : tuple of str
-        One for each column, as written in the file; ``""`` where a column has none.
-    tentative : bool
-        Whether the names come from a comment and may be something else.
-    rate : float or None
-        Sampling rate that the file itself states, Hz.
-    notices : tuple of Notice
-        What was noticed while opening it.
+    source: The file's name, for messages.
+    names: One for each column, as written in the file; ``""`` where a column has none.
+    tentative: Whether the names come from a comment and may be something else.
+    rate: Sampling rate that the file itself states, Hz.
+    notices: What was noticed while opening it.
     """
 
     @property
@@ -52,10 +45,7 @@ class Table(Protocol):
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns, by their indices, each once.
 
-        Returns
-        -------
-        dict of int to (n,) ndarray
-            Finite values, NaN where a sample is missing.
+        Returns: finite values, NaN where a sample is missing.
         """
 
     def where(self, row: int) -> str:

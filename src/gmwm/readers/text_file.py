@@ -28,26 +28,12 @@ def blocks(
 
     Blank lines at the end of the file are left out, so that they need no care further on.
 
-    Parameters
-    ----------
-    offset : int, optional
-        Bytes (after decompression) to leave out at the beginning.
-    line : int, optional
-        Number of the line that begins there.
-    size : int, optional
-        Bytes to read at once.
-
-    Yields
-    ------
-    line : int
-        Number of the first line of the block, counted from 1.
-    block : bytes
-        Whole lines; ends may be ``\n``, ``\r\n`` or ``\r``.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or its compression is damaged.
+    offset: Bytes (after decompression) to leave out at the beginning.
+    line: Number of the line that begins there.
+    size: Bytes to read at once.
+    Yields: line, number of the first line of the block, counted from 1; block, whole lines; ends
+        may be ``\n``, ``\r\n`` or ``\r``.
+    Raises InputError if the file cannot be read or its compression is damaged.
     """
     with _open(path) as stream:
         _read(stream, offset, path.name)

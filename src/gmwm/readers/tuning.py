@@ -205,7 +205,9 @@ FEWEST_OF_BLOCK = 4096
 """Rows of which a clock is seen as well as of a long recording."""
 
 LONGEST_GAP_OF_BLOCK = 1 << 24
-"""Rows that may be missing at the seam of two blocks, 46 h at 100 Hz and 134 MB a channel."""
+"""Rows that may be missing in a gap of a block, 46 h at 100 Hz and 134 MB a channel, if as many
+were read before it."""
 
-ROWS_BACK_OF_BLOCK = 2
-"""By which stamps may be early at the seam of two blocks: a late row before."""
+ROWS_BESIDE = 2 * MOST_OF_ONE_STAMP
+"""Rows on either side of a block from which its clock is followed: the longest burst, of which the
+last row has the stamp, and rows after it that decide."""

@@ -29,12 +29,8 @@ _MEND = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
 class Datasheet:
     """N, B and K by sensor or channel.
 
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    entries : dict of str to dict
-        "gyro", "accel" or a channel -> letter -> value, SI.
+    name: Of the file.
+    entries: "gyro", "accel" or a channel -> letter -> value, SI.
     """
 
     name: str

@@ -87,12 +87,8 @@ def deviation_figure(
 ) -> Figure:
     """Allan deviation of the data with intervals, model, terms, and what a filter believes.
 
-    Parameters
-    ----------
-    filter_numbers : (float, float), optional
-        N and K of the curve that the sliders move, SI.
-    rivals : sequence of Model, optional
-        That describe the data as well: drawn faintly.
+    filter_numbers: (float, float), n and K of the curve that the sliders move, SI.
+    rivals: That describe the data as well: drawn faintly.
     """
     wv, factor = fitted.wv, per_si("u", fitted)
     tau, components = dense_curves(fitted)

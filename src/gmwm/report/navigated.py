@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gmwm.ins.field import Comparison, Navigated, outage_pictures
 from gmwm.report.page import write_page
+from gmwm.report.text import duration_text, model_text
 from gmwm.report.validation import svg
 
 
@@ -18,18 +19,21 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
     InputError
         If the file cannot be written.
     """
-    sensors = navigated.measured.sensors
+    measured, alignment = navigated.measured, navigated.alignment
+    imu, sensors = measured.imu, measured.sensors
     return write_page(
         path,
         "navigated.html",
-        title=navigated.measured.title,
-        verdict=navigated.verdict.text,
+        n=navigated,
+        length=duration_text((imu.n - alignment.epoch) * imu.dt),
         track=svg(navigated.plot_track()),
         outages=[(title, svg(figure)) for title, figure in outage_pictures(navigated)],
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
-        summary=str(navigated),
-        models=[(axis, model, sensors.bias_sd[axis]) for axis, model in sensors.models.items()],
+        models=[
+            (axis, model_text(model), sensors.bias_sd[axis])
+            for axis, model in sensors.models.items()
+        ],
     )
 
 
@@ -45,6 +49,6 @@ def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]
         path,
         "comparison.html",
         c=comparison,
-        summary=str(comparison),
+        length=duration_text(comparison.duration),
         errors=svg(comparison.plot()),
     )

@@ -31,20 +31,12 @@ _NOT_VALID = "not valid: the fit is not, nor are numbers from it"
 class Certified:
     """What a filter should believe for one time without aiding.
 
-    Attributes
-    ----------
-    horizon : float
-        s.
-    axes : dict of str to Axis
-        The numbers of each channel for which there are some.
-    triads : tuple of Triad
-        Gyros and accelerometers, with one value for the axes of each, where both are there.
-    problem : str
-        Why a channel has none, if one has none.
-    texts : dict of str to str
-        Title -> text for the clipboard: the files that `gmwm.export` writes.
-    notes : tuple of str
-        Why there is no text for some program.
+    horizon: s.
+    axes: The numbers of each channel for which there are some.
+    triads: Gyros and accelerometers, with one value for the axes of each, where both are there.
+    problem: Why a channel has none, if one has none.
+    texts: Title -> text for the clipboard: the files that `gmwm.export` writes.
+    notes: Why there is no text for some program.
     """
 
     horizon: float

@@ -33,10 +33,7 @@ def resource(name: str) -> str:
 def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Path:
     """Write a page from its template; see `rendered`.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     text = rendered(template, **values)
     with written(path) as stream:
@@ -47,16 +44,11 @@ def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Pa
 def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     """A page from its template.
 
-    Parameters
-    ----------
-    template : str
-        Name of the file in this folder.
-    scripts : sequence of str, optional
-        The only ones that a browser will run, by a Content-Security-Policy; nothing is loaded from
-        any network.
-    **values
-        Of the template, where ``tojson`` writes figures and ``scripts`` are those above; it has the
-        ``style`` of reports and the ``version`` of this package too.
+    template: Name of the file in this folder.
+    scripts: The only ones that a browser will run, by a Content-Security-Policy; nothing is loaded
+        from any network.
+    **values: Of the template, where ``tojson`` writes figures and ``scripts`` are those above; it
+        has the ``style`` of reports and the ``version`` of this package too.
     """
     return (
         _environment()

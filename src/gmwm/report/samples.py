@@ -25,16 +25,11 @@ Spans = Sequence[tuple[int, int]]
 class Series:
     """A time series in bins.
 
-    Attributes
-    ----------
-    time : (b,) ndarray
-        Middle of each bin, s.
-    mean, low, high : (b,) ndarray
-        Of the samples that are used, less the mean of all, u; NaN where there are none.
-    left_out : sequence of (float, float)
-        First and last time of what was left out, s.
-    offset : float
-        The mean, u.
+    time: (b,), middle of each bin, s.
+    mean, low, high: (b,), of the samples that are used, less the mean of all, u; NaN where there
+        are none.
+    left_out: First and last time of what was left out, s.
+    offset: The mean, u.
     """
 
     time: FloatArray

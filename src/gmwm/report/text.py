@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
+from gmwm.process import Model
+
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
 _DAYS, _YEARS = 5.0, 2.0  # from which on durations are given so
 _MANY_YEARS = 100.0
@@ -24,7 +28,7 @@ def duration_text(seconds: float) -> str:
 
 def number(value: float) -> str:
     """Four significant digits, without an exponent where a person would write none."""
-    text = f"{value:.4g}"
+    text = f"{value:,.4g}"
     return text if "e" not in text else f"{value:.3e}"
 
 
@@ -32,6 +36,11 @@ def short(value: float) -> str:
     """Three significant digits, likewise."""
     text = f"{value:.3g}"
     return f"{float(text):,.0f}" if abs(value) >= 1000.0 else text
+
+
+def model_text(model: Model) -> str:
+    """A model as Python writes it, with four significant digits."""
+    return re.sub(r"(?<==)[-+.\de]+", lambda found: f"{float(found[0]):.4g}", repr(model))
 
 
 def needed(seconds: float | None, duration: float) -> str:

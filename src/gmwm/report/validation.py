@@ -12,6 +12,7 @@ import numpy as np
 
 from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
+from gmwm.report.text import model_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,17 +42,17 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         runs=study[validation.names[0]].runs,
         seed=experiment.seed,
         notes=validation.notices,
-        names=validation.names,
-        reached=validation.reached,
         sentences=_sentences(validation),
         track=svg(validation.plot_track()),
         growth=svg(validation.plot_growth()) if outages else "",
         outages=outages,
         groups=_GROUPS,
-        covered=_COVERED,
         gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
-        models=[(name, models.models) for name, models in experiment.filters.items()],
+        models=[
+            (name, [(axis, model_text(model)) for axis, model in each.models.items()])
+            for name, each in experiment.filters.items()
+        ],
     )
 
 
@@ -61,8 +62,8 @@ def svg(figure: Figure) -> str:
 
     stream = io.StringIO()
     # Without a date and with a salt of its own, the same study gives the same file.
-    with plt.rc_context({"svg.hashsalt": "gmwm"}):
-        figure.savefig(stream, format="svg", metadata={"Date": None})
+    with plt.rc_context({"svg.hashsalt": "gmwm", "svg.fonttype": "none"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None}, transparent=True)
     plt.close(figure)
     text = stream.getvalue()
     return text[text.index("<svg") :]
@@ -81,8 +82,7 @@ def _outage(validation: Validation, index: int) -> dict[str, Any]:
         "rows": rows,
         "nees": [(name, _cells(each)) for name, each in found.items()],
         "coverage": [
-            (name, [c for part in _COVERED for c in each.coverage[part]])
-            for name, each in found.items()
+            (part, name, each.coverage[part]) for part in _COVERED for name, each in found.items()
         ],
     }
 

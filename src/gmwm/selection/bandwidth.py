@@ -42,15 +42,10 @@ _REACH = 3.0  # of the search from the best shape of the grid, in logarithms
 class Bandwidth:
     """Filtered white noise that a model may have.
 
-    Attributes
-    ----------
-    given : Process
-        Of open amplitude, with the shape that was found.
-    free : Process
-        The same as the fit is to have it: with an open bandwidth, as a low-pass, but of the order
+    given: Of open amplitude, with the shape that was found.
+    free: The same as the fit is to have it: with an open bandwidth, as a low-pass, but of the order
         and damping that were found, which two or three levels know only together.
-    n_shapes : int
-        Number of shape parameters that were searched.
+    n_shapes: Number of shape parameters that were searched.
     """
 
     given: Process
@@ -63,13 +58,8 @@ def sensor_bandwidth(
 ) -> Bandwidth | None:
     """The low-pass or moving average that describes the finest levels, if one is needed there.
 
-    Parameters
-    ----------
-    wv : WaveletVariance
-    extra : tuple of Process
-        Lines and resonances that the series may have.
-    penalty : float
-        Of the criterion, for each parameter.
+    extra: Lines and resonances that the series may have.
+    penalty: Of the criterion, for each parameter.
     """
     reference = dictionary_fit(wv, wv.variance, extra)
     if reference.discrepancy == 0.0:

@@ -45,14 +45,9 @@ MAX_GAUSS_MARKOV = 5
 class Choices:
     """What a model may be made of.
 
-    Attributes
-    ----------
-    max_gauss_markov : int
-        Largest number of Gauss-Markov terms.
-    extra : tuple of Process
-        Further terms of open amplitude and given shape, each of which a candidate may have.
-    bandwidth : Bandwidth or None
-        The sensor's own low-pass, where the finest levels show one.
+    max_gauss_markov: Largest number of Gauss-Markov terms.
+    extra: Further terms of open amplitude and given shape, each of which a candidate may have.
+    bandwidth: The sensor's own low-pass, where the finest levels show one.
     """
 
     max_gauss_markov: int = MAX_GAUSS_MARKOV
@@ -118,20 +113,13 @@ class Choices:
 class Candidate:
     """A model of the ranking.
 
-    Attributes
-    ----------
-    model : Model
-        With open parameters.
-    criterion : float
-        Chi-square plus ``3 p ln ln n``; less is better.
-    objective : float
-        Weighted sum of squares under weights common to all candidates.
-    chi_square : float
-        The same on cube roots of the wavelet variances, which are close to normal at coarse levels
-        too: a level of few degrees of freedom that is high by chance asks for a term otherwise.
-    n_parameters : int
-    dof : int
-        Moments less parameters.
+    model: With open parameters.
+    criterion: Chi-square plus ``3 p ln ln n``; less is better.
+    objective: Weighted sum of squares under weights common to all candidates.
+    chi_square: The same on cube roots of the wavelet variances, which are close to normal at coarse
+        levels too: a level of few degrees of freedom that is high by chance asks for a term
+        otherwise.
+    dof: Moments less parameters.
     """
 
     model: Model
@@ -160,11 +148,7 @@ class Candidate:
 def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope | None]:
     """All candidates, best first, and a slope that an unresolved walk explains as well as a ramp.
 
-    Parameters
-    ----------
-    wv : WaveletVariance
-        Of one recording, or pooled of several; a drift is sought in one recording only.
-    choices : Choices
+    wv: Of one recording, or pooled of several; a drift is sought in one recording only.
     """
     reference = dictionary_fit(wv, wv.variance, choices.given)
     allowed = reference.discrepancy

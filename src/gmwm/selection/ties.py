@@ -24,19 +24,10 @@ Ranges = dict[str, tuple[float, float]]
 def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
     """Union of the intervals of each parameter over several models.
 
-    Parameters
-    ----------
-    fitted : Fit
-        Of the chosen model.
-    others : sequence of Fit
-        Of the models that are as good.
-    level : float, optional
-
-    Returns
-    -------
-    dict
-        Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model. An
-        amplitude or slope of a term that one of the others does without has zero in its range.
+    fitted: Of the chosen model.
+    others: Of the models that are as good.
+    Returns: key -> (lower, upper) in SI units, for every estimated parameter of the chosen model.
+        An amplitude or slope of a term that one of the others does without has zero in its range.
     """
     result = dict(fitted.interval(level))
     for other in others:
@@ -120,12 +111,8 @@ def _correlation_times(model: Model) -> dict[int, float]:
 def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
     """The parameters whose range is more than 20 % wider than their interval, in words.
 
-    Parameters
-    ----------
-    fitted : Fit
-        Of the chosen model.
-    found : dict
-        From `ranges`, at 95 %.
+    fitted: Of the chosen model.
+    found: From `ranges`, at 95 %.
     """
     intervals = fitted.interval()
     texts = []

@@ -2,8 +2,11 @@
 
 from gmwm.study.appendix import converge as converge, convergence_table as convergence_table
 from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
-from gmwm.study.demo import compare as compare, simulated_imu as simulated_imu
-from gmwm.study.demo_files import write_demo_files as write_demo_files
+from gmwm.study.demo import (
+    compare as compare,
+    simulated_imu as simulated_imu,
+    write_demo_files as write_demo_files,
+)
 from gmwm.study.emulated_logs import (
     FAULTS as FAULTS,
     emulated_log as emulated_log,

@@ -34,15 +34,9 @@ _FIRST = 4
 class Convergence:
     """Means over the runs at one length.
 
-    Attributes
-    ----------
-    n, runs : int
-    expected : (2,) ndarray
-        Of the Allan estimates of sigma2_WN and sigma2_RW, computed.
-    allan, allan_error : (2,) ndarray
-        Their mean over the runs, and its standard error.
-    gmwm, gmwm_error : (2,) ndarray
-        The same of GMWM.
+    expected: (2,), of the Allan estimates of sigma2_WN and sigma2_RW, computed.
+    allan, allan_error: (2,), their mean over the runs, and its standard error.
+    gmwm, gmwm_error: (2,), the same of GMWM.
     """
 
     n: int
@@ -57,13 +51,9 @@ class Convergence:
 def allan_least_squares(tau: FloatArray, allan_variance: FloatArray, k: int = _FIRST) -> FloatArray:
     """Least-squares lines through the first k scales and the others to 128 s, (2,).
 
-    Parameters
-    ----------
-    tau : (J,) ndarray
-        Averaging times 1, 2, 4, ... s, at least to 128 s.
-    allan_variance : (J,) ndarray
-    k : int, optional
-        From 1 to 7.
+    tau: (J,), averaging times 1, 2, 4, ... s, at least to 128 s.
+    allan_variance: (J,).
+    k: From 1 to 7.
     """
     white, walk = _SCALES[:k], _SCALES[k:]
     return np.array(

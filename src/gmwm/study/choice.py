@@ -49,15 +49,8 @@ TRUTHS: tuple[Model, ...] = (
 class Choice:
     """What was chosen for one true model at one length.
 
-    Attributes
-    ----------
-    truth : Model
-    n : int
-    runs : int
-    right : int
-        Runs in which the very model was chosen.
-    surplus : mapping of int to int
-        Terms more than the truth has -> runs.
+    right: Runs in which the very model was chosen.
+    surplus: Terms more than the truth has -> runs.
     """
 
     truth: Model

@@ -48,12 +48,8 @@ def sensors(
 ) -> SensorModels:
     """Sensors of a small tactical IMU, with factors on white noise and on slow errors.
 
-    Parameters
-    ----------
-    gyro, accel, slow : float, optional
-        Factors on N of the gyros, N of the accelerometers, and sigma of all.
-    tau : float, optional
-        Correlation time of the slow errors, s.
+    gyro, accel, slow: Factors on N of the gyros, N of the accelerometers, and sigma of all.
+    tau: Correlation time of the slow errors, s.
     """
     return SensorModels.of(
         {
@@ -79,23 +75,12 @@ def emulated_log(
 ) -> tuple[Measured, Trajectory]:
     """A log, and the trajectory that was driven or flown.
 
-    Parameters
-    ----------
-    seed : int
-    vehicle : {"car", "helicopter", "loiter"}, optional
-    duration, rate : float, optional
-        s; Hz, of the IMU. Fixes come once a second, with 1, 1 and 1.5 m.
-    velocity : bool, optional
-        Whether the fixes have velocities too.
-    faults : tuple of str, optional
-        Of `FAULTS`.
-    truth, believed : SensorModels, optional
-        Of the errors, and of the filter; by default `sensors`, both.
-
-    Raises
-    ------
-    InputError
-        For an unknown fault.
+    vehicle: {"car", "helicopter", "loiter"}.
+    duration, rate: s; Hz, of the IMU. Fixes come once a second, with 1, 1 and 1.5 m.
+    velocity: Whether the fixes have velocities too.
+    faults: Of `FAULTS`.
+    truth, believed: Of the errors, and of the filter; by default `sensors`, both.
+    Raises InputError for an unknown fault.
     """
     for fault in faults:
         if fault not in FAULTS:

@@ -20,13 +20,8 @@ if TYPE_CHECKING:
 def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
     """Draw one panel a quantity, one box a method; returns the PNG and the SVG.
 
-    Parameters
-    ----------
-    study : Study
-    table : pyarrow.Table
-        As `gmwm.study.runs.run_study` gives it.
-    stem : Path
-        Where to, without suffix.
+    table: As `gmwm.study.runs.run_study` gives it.
+    stem: Where to, without suffix.
     """
     names = np.array(table["method"].to_pylist())
     methods = [m for m in study.methods if m in set(names)]

@@ -50,11 +50,7 @@ _CAR = (Outage(500.0, 60.0), Outage(900.0, 60.0))
 class Calibrated:
     """A static recording, calibrated by lines and by GMWM.
 
-    Attributes
-    ----------
-    lines : dict
-        Axis -> fit by ``method="allan"``.
-    gmwm : Calibration
+    lines: Axis -> fit by ``method="allan"``.
     """
 
     lines: dict[str, Fit]
@@ -144,12 +140,9 @@ def experiment(
 ) -> Experiment:
     """Filters that believe different calibrations, on a helicopter or in a car.
 
-    Parameters
-    ----------
-    vehicle : {"helicopter", "car"}
-    recordings : sequence of Recording, optional
-        The one that was calibrated, and those whose errors are navigated with; by default errors
-        of Table VI are drawn.
+    vehicle: {"helicopter", "car"}.
+    recordings: The one that was calibrated, and those whose errors are navigated with; by default
+        errors of Table VI are drawn.
     """
     scenario = scenario_of(vehicle)
     lines = calibrated.line_models()
@@ -176,12 +169,9 @@ def scenario_of(vehicle: str) -> Scenario:
 def aligned(models: SensorModels, start: Mapping[str, float]) -> SensorModels:
     """Models of filters that are switched on at any time, when the slow error is not zero.
 
-    Parameters
-    ----------
-    start : mapping of str to float
-        Axis -> scatter of the means over a minute of the recording that was calibrated. What a
-        model's stationary terms do not explain of it is the standard deviation of a constant, or
-        of the start of a random walk.
+    start: Axis -> scatter of the means over a minute of the recording that was calibrated. What a
+        model's stationary terms do not explain of it is the standard deviation of a constant, or of
+        the start of a random walk.
     """
     bias = {}
     for axis, model in models.models.items():
@@ -226,23 +216,11 @@ def reproduce_figure(
 ) -> tuple[str, list[Path]]:
     """Draw one of the paper's Figures 5 to 9.
 
-    Parameters
-    ----------
-    figure : str
-        One of `FIGURES`.
-    folder : Path
-        Where figures and tables go.
-    runs : int or None
-    seed, jobs : int
-    recordings : sequence of Recording, optional
-        The first is calibrated, the others are navigated with.
-    progress : callable, optional
-        Called with the number of runs done.
-
-    Returns
-    -------
-    text, paths
-        What to print, and the files that were written.
+    figure: One of `FIGURES`.
+    folder: Where figures and tables go.
+    recordings: The first is calibrated, the others are navigated with.
+    progress: Called with the number of runs done.
+    Returns: what to print, and the files that were written.
     """
     if figure not in _OF_ONE_GYRO and len(recordings) == 1:
         raise InputError("give two recordings or more: one to calibrate, others to navigate with")

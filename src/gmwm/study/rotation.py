@@ -43,15 +43,9 @@ class Interval:
 class Rotation:
     """How filters navigated with each recording calibrated in turn.
 
-    Attributes
-    ----------
-    sources : tuple of str
-        The n recordings.
-    stretches : tuple of int
-        How many of each are navigated with.
-    turns : tuple of Validation
-        With each recording calibrated; its runs are the stretches of the others, in their order.
-    notices : tuple of Notice
+    sources: The n recordings.
+    stretches: How many of each are navigated with.
+    turns: With each recording calibrated; its runs are the stretches of the others, in their order.
     """
 
     sources: tuple[str, ...]
@@ -69,12 +63,8 @@ class Rotation:
     def ratio(self, name: str, quantity: str, turn: int | None = None) -> Interval:
         """Root mean square of an error at the ends of outages against the first filter's.
 
-        Parameters
-        ----------
-        name : str
-        quantity : {"horizontal", "vertical"}
-        turn : int, optional
-            With this recording calibrated; by default all of them.
+        quantity: {"horizontal", "vertical"}.
+        turn: With this recording calibrated; by default all of them.
         """
         part = slice(0, 2) if quantity == "horizontal" else slice(2, 3)
 
@@ -280,12 +270,8 @@ def crossed_weights(
     truth in 99 % of simulated studies where recordings do not differ, in 90 % where they differ as
     much as stretches, and in 84 % where they differ twice as much.
 
-    Parameters
-    ----------
-    stretches : sequence of int
-        Of each of the n recordings, S at most.
-    calibrated : (n,) ndarray or None
-        Weights of those that are calibrated, if they are not drawn.
+    stretches: Of each of the n recordings, S at most.
+    calibrated: (n,) or None, weights of those that are calibrated, if they are not drawn.
     """
     n = len(stretches)
     even = np.full(n, 1.0 / n)

@@ -25,17 +25,9 @@ from gmwm.variance import wavelet_variance
 def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str, npt.NDArray[Any]]:
     """Simulate one series and estimate it by every method.
 
-    Parameters
-    ----------
-    name : str
-        Of the study.
-    seed, run : int
-        Together the seed of the series.
-
-    Returns
-    -------
-    dict
-        Column -> its values by method.
+    name: Of the study.
+    seed, run: Together the seed of the series.
+    Returns: column -> its values by method.
     """
     study = STUDIES[name]
     series = study.truth.simulate(study.n, study.dt, np.random.default_rng([seed, run]))
@@ -106,32 +98,13 @@ def run_study(
     Finished runs are kept in ``folder/NAME-runs`` every few seconds, also when the work is
     interrupted.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-    runs : int
-    seed : int, optional
-    methods : sequence of str, optional
-        Some of ``study.methods``; all by default.
-    jobs : int, optional
-        Processes on this machine.
-    resume : bool, optional
-        Go on where an earlier call stopped.
-    cluster : str, optional
-        Address of a Dask scheduler that does the work instead.
-    progress : callable, optional
-
-    Returns
-    -------
-    pyarrow.Table
-        One row a run and method: estimates, intervals, validity, seconds.
-
-    Raises
-    ------
-    InputError
-        If a method is unknown, or the folder holds runs and ``resume`` is not set, or it is and
-        they are not of the same study.
+    methods: Some of ``study.methods``; all by default.
+    jobs: Processes on this machine.
+    resume: Go on where an earlier call stopped.
+    cluster: Address of a Dask scheduler that does the work instead.
+    Returns: one row a run and method: estimates, intervals, validity, seconds.
+    Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
+        it is and they are not of the same study.
     """
     chosen = tuple(methods or study.methods)
     for method in chosen:

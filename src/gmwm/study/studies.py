@@ -17,14 +17,8 @@ from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
 class Quantity:
     """A parameter as the paper writes it.
 
-    Attributes
-    ----------
-    name : str
-    key : str
-        The package's parameter that it is a power of, at dt = 1 s.
-    power : int
-    published : mapping of str to float
-        Method -> relative root mean square error in the paper.
+    key: The package's parameter that it is a power of, at dt = 1 s.
+    published: Method -> relative root mean square error in the paper.
     """
 
     name: str
@@ -37,12 +31,8 @@ class Quantity:
 class Estimation:
     """A method with its options, and what it is given.
 
-    Attributes
-    ----------
-    method : method object
-        See `gmwm.fit`.
-    wavelet, robust
-        Of the wavelet variance; see `gmwm.wavelet_variance`.
+    method: See `gmwm.fit`.
+    wavelet, robust: Of the wavelet variance; see `gmwm.wavelet_variance`.
     """
 
     method: Method = field(default_factory=GMWM)
@@ -54,20 +44,10 @@ class Estimation:
 class Study:
     """A true model, the quantities to estimate, and the ways to do so.
 
-    Attributes
-    ----------
-    name, title : str
-    truth : Model
-    n : int
-        Samples of a run.
-    dt : float
-        Sampling interval, s.
-    runs : int
-        Customary number of runs.
-    quantities : tuple of Quantity
-    methods : mapping of str to Estimation
-    notes : tuple of str
-        What a reader of the table has to know.
+    n: Samples of a run.
+    dt: Sampling interval, s.
+    runs: Customary number of runs.
+    notes: What a reader of the table has to know.
     """
 
     name: str

@@ -18,24 +18,14 @@ from gmwm.study.studies import Quantity, Study
 class Score:
     """One method on one quantity.
 
-    Attributes
-    ----------
-    rmse : float
-        Root mean square error of the runs with an estimate.
-    relative : float
-        The same over the true value.
-    bias : float
-        Mean error over the true value.
-    ratio : float
-        ``relative`` over the Cramer-Rao bound.
-    moment_ratio : float
-        ``relative`` over the bound of estimators by wavelet variances.
-    coverage : float
-        Fraction of the runs whose 95 % interval holds the truth.
-    missing : int
-        Runs without an estimate.
-    published : float
-        Relative error in the paper, NaN where there is none.
+    rmse: Root mean square error of the runs with an estimate.
+    relative: The same over the true value.
+    bias: Mean error over the true value.
+    ratio: ``relative`` over the Cramer-Rao bound.
+    moment_ratio: ``relative`` over the bound of estimators by wavelet variances.
+    coverage: Fraction of the runs whose 95 % interval holds the truth.
+    missing: Runs without an estimate.
+    published: Relative error in the paper, NaN where there is none.
     """
 
     rmse: float
@@ -52,21 +42,11 @@ class Score:
 class Summary:
     """All methods on all quantities of a study.
 
-    Attributes
-    ----------
-    study : Study
-    runs : int
-    seed : int
-    scores : mapping
-        (quantity, method) -> Score.
-    bounds : mapping
-        Quantity -> relative Cramer-Rao bound.
-    moment_bounds : mapping
-        Quantity -> that of estimates by the wavelet variances only.
-    invalid : mapping
-        Method -> runs that the method itself calls not valid.
-    seconds : mapping
-        Method -> median time of an estimate, s.
+    scores: (quantity, method) -> Score.
+    bounds: Quantity -> relative Cramer-Rao bound.
+    moment_bounds: Quantity -> that of estimates by the wavelet variances only.
+    invalid: Method -> runs that the method itself calls not valid.
+    seconds: Method -> median time of an estimate, s.
     """
 
     study: Study

@@ -46,25 +46,15 @@ def rotate(
 ) -> Rotation:
     """Calibrate every recording in turn, and navigate with the others.
 
-    Parameters
-    ----------
-    vehicle : {"helicopter", "car"}
-    recordings : sequence of Recording
-        Two at least.
-    folder : Path
-        Where calibrations and finished runs are kept, so that work that was interrupted goes on.
-    runs : int, optional
-        Most stretches of each recording; by default all that do not overlap.
-    earlier : {"resume", "replace", "refuse"}, optional
-        What to do with what the folder holds.
-    progress : callable, optional
-        Called as ``progress(done, total, what)``.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two recordings, an axis is missing, one is too short, or the folder
-        holds runs that are not to be resumed.
+    vehicle: {"helicopter", "car"}.
+    recordings: Two at least.
+    folder: Where calibrations and finished runs are kept, so that work that was interrupted goes
+        on.
+    runs: Most stretches of each recording; by default all that do not overlap.
+    earlier: {"resume", "replace", "refuse"}, what to do with what the folder holds.
+    progress: Called as ``progress(done, total, what)``.
+    Raises InputError if there are fewer than two recordings, an axis is missing, one is too short,
+        or the folder holds runs that are not to be resumed.
     """
     if len(recordings) < 2:
         raise InputError("give two recordings or more: each is calibrated in turn")
@@ -123,10 +113,7 @@ def reproduce_rotation(
 ) -> tuple[str, list[Path]]:
     """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
 
-    Returns
-    -------
-    text, paths
-        What to print, and the files that were written.
+    Returns: what to print, and the files that were written.
     """
     for recording in recordings:
         missing = [axis for axis in AXES if axis not in recording.names]

@@ -37,16 +37,10 @@ _TAUS = {"octave": (1.0,), "decade": (1.0, 2.0, 4.0)}
 class _Kind:
     """How a deviation is computed.
 
-    Attributes
-    ----------
-    label : str
-        In legends.
-    reach : int
-        Averaging times that its filter spans.
-    differences : int
-        Of the integrated series, that its filter takes.
-    modified : bool
-        Whether the filter averages the integrated series too.
+    label: In legends.
+    reach: Averaging times that its filter spans.
+    differences: Of the integrated series, that its filter takes.
+    modified: Whether the filter averages the integrated series too.
     """
 
     label: str

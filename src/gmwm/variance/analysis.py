@@ -133,12 +133,8 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
     Cumulants of independent samples add up, so that first differences have twice that of the
     samples.
 
-    Parameters
-    ----------
-    square, fourth : float
-        Mean second and fourth power of the first differences, u^2 and u^4.
-    count : float
-        Number of the first differences.
+    square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
+    count: Number of the first differences.
     """
     excess = fourth / square**2 - 3.0 if square > 0.0 else 0.0
     chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)
@@ -153,11 +149,8 @@ def where_of(channel: Channel) -> str:
 def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
     """The samples of a channel, and which of them exist.
 
-    Raises
-    ------
-    InputError
-        If they are no series of numbers, too few, infinite, constant or of no sensor's size, or
-        the sampling interval is none.
+    Raises InputError if they are no series of numbers, too few, infinite, constant or of no
+        sensor's size, or the sampling interval is none.
     """
     where = where_of(channel)
     checks.sampling_interval(channel.dt)
@@ -186,9 +179,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
 def check_varies(channel: Channel) -> None:
     """Refuse a channel that is constant or varies by what no sensor does.
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     where = where_of(channel)
     if channel.is_constant:
@@ -226,10 +217,7 @@ def as_wavelet_variance(
 ) -> WaveletVariance:
     """A wavelet variance as it is, or that of a series.
 
-    Raises
-    ------
-    InputError
-        If a sampling interval is given for a wavelet variance, which has its own.
+    Raises InputError if a sampling interval is given for a wavelet variance, which has its own.
     """
     if not isinstance(data, WaveletVariance):
         return wavelet_variance(data, dt, data_covariance=data_covariance)
@@ -241,10 +229,7 @@ def as_wavelet_variance(
 def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
     """A channel without a name from an array and its sampling interval (s).
 
-    Raises
-    ------
-    InputError
-        If either is not usable.
+    Raises InputError if either is not usable.
     """
     if dt is None:
         raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")

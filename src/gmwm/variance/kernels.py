@@ -61,18 +61,11 @@ def fine_moments(
     Sums of 2 m samples are those of m samples, m apart: all levels are taken of a chunk that stays
     in the cache, and nothing cancels.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        About their mean.
-    start, stop : int
-        First window, and the one after the last.
-    end : int
-        Of the run.
-    levels : int
-        At most `FINE`.
-    found : (levels, 3) ndarray
-        To which number, sum and sum of squares of the coefficients are added.
+    values: (n,), about their mean.
+    start, stop: First window, and the one after the last.
+    end: Of the run.
+    levels: At most `FINE`.
+    found: (levels, 3), to which number, sum and sum of squares of the coefficients are added.
     """
     reach = 2 << (levels - 1)
     scratch = np.empty((2, CHUNK + reach))
@@ -110,18 +103,11 @@ def coarse_moments(
 
     All levels are taken of a tile of some columns that stays in the cache: one read of the data.
 
-    Parameters
-    ----------
-    integral : (n + 1,) ndarray
-        Cumulative sum of the series, starting with 0.
-    start, end : int
-        Of the run.
-    columns : tuple of int
-        The first, and the one after the last, of `_ROW`.
-    averaging : (L,) ndarray
-        Multiples of `_ROW`, in samples.
-    found : (L, 3) ndarray
-        To which number, sum and sum of squares of the coefficients are added.
+    integral: (n + 1,), cumulative sum of the series, starting with 0.
+    start, end: Of the run.
+    columns: The first, and the one after the last, of `_ROW`.
+    averaging: (L,), multiples of `_ROW`, in samples.
+    found: (L, 3), to which number, sum and sum of squares of the coefficients are added.
     """
     length = end - start + 1
     most = (length - 1) // _ROW + 1
@@ -157,12 +143,8 @@ def coarse_moments(
 def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> FloatArray:
     """Haar MODWT coefficients of the samples from ``start`` to ``stop``, free of end effects.
 
-    Parameters
-    ----------
-    integral : (n + 1,) ndarray
-        Cumulative sum of the series, starting with 0.
-    m : int
-        Averaging time in samples.
+    integral: (n + 1,), cumulative sum of the series, starting with 0.
+    m: Averaging time in samples.
     """
     count = max(stop - start - 2 * m + 1, 0)
     result = np.empty(count)

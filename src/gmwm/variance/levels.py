@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import wavelet as known_wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
 from gmwm.variance.gaps.effects import (
     GapEffects,
     Gaps,
-    IntArray,
     Runs,
     common_share,
     pair_factor,
@@ -24,34 +25,74 @@ from gmwm.variance.gaps.effects import (
     window_count,
 )
 from gmwm.variance.gaps.filling import Filling, levels_apart
-from gmwm.variance.kernels import cumulative, haar_coefficients
-from gmwm.variance.moments import haar_moments
+from gmwm.variance.kernels import FINE, coarse_moments, cumulative, fine_moments, haar_coefficients
 from gmwm.variance.pilot import pilot_psd
+
+_ROW = 1 << FINE
+
+
+def haar_moments(
+    values: FloatArray, integral: FloatArray, runs: IntArray, averaging: FloatArray
+) -> FloatArray:
+    """Mean and mean square of the Haar MODWT coefficients that lie within a run, (L, 2).
+
+    values: (n,), about their mean.
+    integral: (n + 1,), their cumulative sum, starting with 0.
+    runs: (P, 2), first sample of each run, and the one after its last.
+    averaging: (L,), averaging times in samples: powers of two in a row, of each of which a window
+        fits a run.
+    """
+    m = averaging.astype(np.int64)
+    first = int(m[0]).bit_length() - 1
+    fine = m[m < _ROW]
+    coarse = m[m >= _ROW]
+    long = runs[runs[:, 1] - runs[:, 0] >= 2 * m[0]]
+    levels = first + fine.size
+
+    def of_part(part: int, parts: int) -> FloatArray:
+        found = np.zeros((first + m.size, 3))
+        for start, stop in long.tolist():
+            edges = [start + (stop - start) * i // parts for i in (part, part + 1)]
+            if fine.size:
+                fine_moments(values, edges[0], edges[1], stop, levels, found[:levels])
+            if coarse.size and stop - start >= 2 * coarse[0]:
+                columns = (_ROW * part // parts, _ROW * (part + 1) // parts)
+                coarse_moments(integral, start, stop, columns, coarse, found[first + fine.size :])
+        return found[first:]
+
+    number, total, square = np.sum(_in_threads(of_part, values.size), axis=0).T
+    return np.stack([total, square], axis=1) / number[:, None]
+
+
+def _in_threads(work: Callable[[int, int], FloatArray], n: int) -> list[FloatArray]:
+    """What each part gives; a short series is one part."""
+    parts = min(_processors(), n // tuning.SAMPLES_PER_THREAD)
+    if parts < 2:
+        return [work(0, 1)]
+    with ThreadPoolExecutor(parts) as pool:
+        return list(pool.map(work, range(parts), [parts] * parts))
+
+
+def _processors() -> int:
+    """Those that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
     """The levels of a series, gaps included.
 
-    Attributes
-    ----------
-    values : (n,) ndarray
-        About their mean; NaN where samples are missing.
-    runs : Runs
-        The samples that exist.
-    averaging : (J,) ndarray
-        Averaging times, in samples, of the levels with a coefficient.
-    wavelet : str
-    filling : Filling or None
-        How short gaps are filled; ``None`` where none are.
-    change : (J,) ndarray
-        Of the expected variances by filling, relative.
-    error : (J,) ndarray
-        Wavelet variances of the error of the filling, relative.
-    filled : (J,) ndarray of bool
-        Levels for which gaps are filled.
-    parts : (P,) ndarray
-        Where the series begins anew with another level; its line has one level in each part.
+    values: (n,), about their mean; NaN where samples are missing.
+    runs: The samples that exist.
+    averaging: (J,), averaging times, in samples, of the levels with a coefficient.
+    filling: How short gaps are filled; ``None`` where none are.
+    change: (J,), of the expected variances by filling, relative.
+    error: (J,), wavelet variances of the error of the filling, relative.
+    filled: (J,) of bool, levels for which gaps are filled.
+    parts: (P,), where the series begins anew with another level; its line has one level in each
+        part.
     """
 
     values: FloatArray

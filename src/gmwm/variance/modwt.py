@@ -156,23 +156,11 @@ def coefficients(
 
     Only one level is in memory at a time.
 
-    Parameters
-    ----------
-    values : (n,) array_like
-        Finite numbers.
-    levels : int, optional
-        At most so many; by default all that have such a coefficient. A short series has fewer.
-
-    Yields
-    ------
-    (n - width(j) + 1,) ndarray
-        Of level j = 1, 2, ..., in the order of time; element i stems from samples i to
-        i + width(j) - 1.
-
-    Raises
-    ------
-    InputError
-        For a series that cannot be used, an unknown wavelet, or no number of levels.
+    values: (n,), finite numbers.
+    levels: At most so many; by default all that have such a coefficient. A short series has fewer.
+    Yields: (n - width(j) + 1,), of level j = 1, 2, ..., in the order of time; element i stems from
+        samples i to i + width(j) - 1.
+    Raises InputError for a series that cannot be used, an unknown wavelet, or no number of levels.
     """
     filters = wavelet_of(wavelet)
     smooth = _series(values)

@@ -15,19 +15,10 @@ from gmwm.variance import tuning
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """Power-law pieces between the pass bands of the levels, fitted to the wavelet variances.
 
-    Parameters
-    ----------
-    variance : (J,) ndarray
-        Haar wavelet variances, u^2, positive.
-    averaging : (J,) ndarray
-        Averaging times in samples, dyadic.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    callable
-        ``psd(f, dt)``.
+    variance: (J,), haar wavelet variances, u^2, positive.
+    averaging: (J,), averaging times in samples, dyadic.
+    dt: Sampling interval, s.
+    Returns: ``psd(f, dt)``.
     """
     grid = quadrature(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency

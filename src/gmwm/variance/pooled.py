@@ -18,10 +18,7 @@ from gmwm.variance.wavelet import WaveletVariance
 class PooledVariance(WaveletVariance):
     """Mean wavelet variance of several recordings, level by level.
 
-    Attributes
-    ----------
-    parts : tuple of WaveletVariance
-        Of the recordings. All other attributes are as in `WaveletVariance`; there are as many
+    parts: Of the recordings. All other attributes are as in `WaveletVariance`; there are as many
         levels as the longest recording has, and ``n`` is the length of that one.
     """
 
@@ -31,10 +28,7 @@ class PooledVariance(WaveletVariance):
     def of(cls, parts: Sequence[WaveletVariance]) -> PooledVariance:
         """Weighted by the equivalent degrees of freedom of each recording at each level.
 
-        Raises
-        ------
-        InputError
-            If there are none, or they do not belong together.
+        Raises InputError if there are none, or they do not belong together.
         """
         if not parts:
             raise InputError("there is no recording: give one wavelet variance at least")

@@ -82,16 +82,9 @@ def _signed_efficiency(c: float) -> float:
 def tuning_constant(efficiency: float = EFFICIENCY) -> float:
     """Distance c, in standard deviations, beyond which a coefficient has no weight.
 
-    Parameters
-    ----------
-    efficiency : float
-        Variance of the classical estimate over that of the robust one, for independent Gaussian
-        coefficients; between 0 and 1.
-
-    Raises
-    ------
-    InputError
-        For an efficiency outside (0, 1).
+    efficiency: Variance of the classical estimate over that of the robust one, for independent
+        Gaussian coefficients; between 0 and 1.
+    Raises InputError for an efficiency outside (0, 1).
     """
     if not 0.0 < efficiency < 1.0:
         raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")

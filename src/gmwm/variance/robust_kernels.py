@@ -19,10 +19,7 @@ def middle_bin(values: FloatArray) -> tuple[FloatArray, int]:
     values that share those of the wanted one need to be sorted: several times faster than to
     partition all.
 
-    Parameters
-    ----------
-    values : (M,) ndarray
-        Contiguous, without NaN.
+    values: (M,), contiguous, without NaN.
     """
     bits = values.view(np.int64)
     counts = np.zeros(_BIN_MASK + 1, np.int64)
@@ -47,12 +44,8 @@ def middle_bin(values: FloatArray) -> tuple[FloatArray, int]:
 def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, float]:
     """Means of u t^4 and of its derivative by log u, with u = (factor W)^2 and t = max(1 - u, 0).
 
-    Parameters
-    ----------
-    coefficients : (M,) ndarray
-        W.
-    factor : float
-        One over the distance beyond which a coefficient has no weight.
+    coefficients: (M,), W.
+    factor: One over the distance beyond which a coefficient has no weight.
     """
     value = 0.0
     slope = 0.0
@@ -70,10 +63,8 @@ def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, floa
 def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatArray) -> float:
     """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
 
-    Parameters
-    ----------
-    correlation, weight : (L,) ndarray
-    series : (P,) ndarray
+    correlation, weight: (L,).
+    series: (P,).
     """
     total = 0.0
     for i in range(correlation.size):

@@ -93,14 +93,67 @@ def test_a_stream_is_screened_as_a_recording_is(spoilt):
     assert raw["gyro_x"].params["N"] > 2.0 * found["gyro_x"].params["N"]
 
 
-def test_a_channel_that_is_written_twice_or_moved_is_not_silent(tmp_path):
-    rng = np.random.default_rng(5)
-    x = rng.normal(size=(60_000, 2)) * 1e-3
-    x[:, 1] = np.repeat(x[:30_000, 1], 2)
+@pytest.mark.parametrize("times", [2, 3])
+def test_a_channel_that_is_written_several_times_has_its_own_rate(tmp_path, times):
+    x = np.random.default_rng(5).normal(size=(60_000, 2)) * 1e-3
+    x[:, 1] = np.repeat(x[:, 1], times)[1:60_001]
     np.save(tmp_path / "twice.npy", x)
-    found = gmwm.calibrate_stream(tmp_path / "twice.npy", MODEL, **READING)
+    reading = {key: value for key, value in READING.items() if key != "rows"}
+    whole = gmwm.calibrate(gmwm.read(tmp_path / "twice.npy", **reading), MODEL)
+    for rows in (20_000, 13_333):
+        found = gmwm.calibrate_stream(tmp_path / "twice.npy", MODEL, **{**READING, "rows": rows})
+        assert list(found) == list(whole) == ["gyro_x", "gyro_y"]
+        fit, of_whole = found["gyro_y"], whole["gyro_y"]
+        assert (fit.wv.dt, fit.wv.n) == (pytest.approx(0.01 * times), of_whole.wv.n)
+        assert fit.wv.gaps is None
+        assert abs(fit.params["N"] - of_whole.params["N"]) < 0.02 * of_whole.stderr["N"]
+
+
+def repeats(x):
+    x[:10_000] = np.repeat(x[:10_000:3], 3)[:10_000]
+
+
+def straightens(x):
+    x[:10_000] = np.interp(np.arange(10_000) / 4.0, np.arange(10_000), x[:10_000])
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "missing"),
+    [(repeats, "repeated-samples", 6666), (straightens, "interpolated", 10_000)],
+)
+def test_samples_of_one_stretch_that_were_not_measured_cost_that_stretch(
+    tmp_path, change, code, missing
+):
+    found = stretched(tmp_path, change)
+    fit = found["gyro_x"]
+    assert fit.valid and abs(fit.params["N"] / 1e-4 - 1.0) < 4.0 * fit.stderr["N"] / 1e-4
+    assert fit.wv.gaps is not None
+    assert fit.wv.gaps.missing == pytest.approx(missing, abs=1)
+    (notice,) = [n for n in found.notices if n.code == code]
+    assert notice.values["stretches"] == 1.0
+
+
+def test_a_channel_that_is_interpolated_all_over_is_skipped(tmp_path):
+    x = np.random.default_rng(5).normal(size=(60_000, 2)) * 1e-3
+    x[:, 1] = np.interp(np.arange(60_000) / 4.0, np.arange(60_000), x[:, 1])
+    np.save(tmp_path / "straight.npy", x)
+    found = gmwm.calibrate_stream(tmp_path / "straight.npy", MODEL, **READING)
     assert list(found) == ["gyro_x"]
-    assert found.skipped["gyro_y"].code == "repeated-samples"
+    assert found.skipped["gyro_y"].code == "interpolated"
+
+
+def test_what_stretches_do_not_show_is_reported(spoilt):
+    found = gmwm.calibrate_stream(spoilt, MODEL, **READING)
+    texts = [notice.text for notice in found.notices if notice.code == "streamed"]
+    assert len(texts) == 2
+    for lost in ("drift, tilt, motion and temperature", "2 times", "at rest", "robust"):
+        assert any(lost in text for text in texts)
+    (streamed,) = gmwm.health_stream(spoilt, **READING).of(code="streamed")
+    assert streamed.values == {"stretches": 4}
+
+
+def test_a_channel_that_moved_is_not_silent(tmp_path):
+    x = np.random.default_rng(5).normal(size=(60_000, 2)) * 1e-3
     x[45_000:47_000] += np.sin(0.01 * np.arange(2_000))[:, None]
     np.save(tmp_path / "moved.npy", x[:, :1])
     reading = {**READING, "channels": {"gyro_x": 0}}
@@ -164,15 +217,19 @@ def test_the_row_of_a_number_that_is_none_is_that_of_the_file(tmp_path):
         stretched(tmp_path, breaks)
 
 
-def test_a_clock_that_was_set_between_stretches_takes_no_memory(tmp_path):
+def test_a_clock_that_was_set_between_stretches_is_reported(tmp_path):
     table = np.zeros((40_000, 2))
     table[:, 0] = 0.01 * np.arange(40_000)
-    table[10_000:, 0] += 1.7e9
+    table[20_000:, 0] += 1.7e9
     table[:, 1] = np.random.default_rng(7).normal(size=40_000)
     np.save(tmp_path / "set.npy", table)
     reading = {**READING, "rate": None, "channels": {"gyro_x": 1}, "time": 0, "rows": 10_000}
-    with pytest.raises(InputError, match=r"go forward by 1\.7e\+09 about row 10,000"):
-        gmwm.calibrate_stream(tmp_path / "set.npy", gmwm.WhiteNoise(), **reading)
+    for screening in ((), ("events",)):
+        found = gmwm.calibrate_stream(
+            tmp_path / "set.npy", gmwm.WhiteNoise(), screening=screening, **reading
+        )
+        assert found.n == 40_000
+        assert [n.severity for n in found.notices if n.code == "clock-set"] == ["warning"]
 
 
 def test_health_of_one_stretch_is_that_of_the_whole(spoilt):

@@ -79,7 +79,7 @@ KINDS = (
 @pytest.mark.parametrize(("rate", "seed"), [(63.0, 1), (200.0, 2), (200.0, 3), (1000.0, 4)])
 def test_every_row_has_its_number(kind, rate, seed):
     clock = made(kind, seed, rate)
-    found = followed(clock.stamps, clock.same)
+    found = followed(clock.stamps, clock.same, clock.stamps.size)
     assert np.array_equal(np.cumsum(found.advance), clock.number - clock.number[0])
     assert found.interval * rate == pytest.approx(1.0, abs=1e-5)
     assert np.count_nonzero(found.is_set) == (kind in ("backward steps", "a clock that is set"))
@@ -145,7 +145,7 @@ def test_rows_that_only_look_alike_are_no_copies(recorded):
     clock = made("bursts of four", 8, 200.0)
     coarse = np.round(np.random.default_rng(2).normal(size=N))
     same = np.r_[False, (np.diff(coarse) == 0.0) & (np.diff(clock.stamps) == 0.0)]
-    found = followed(clock.stamps, same)
+    found = followed(clock.stamps, same, clock.stamps.size)
     assert np.all(found.advance[1:] == 1)
 
 

@@ -272,7 +272,9 @@ def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
         (calibration["voltage"].params["N"], "u/sqrt(Hz)"),
     ):
         rows = [row for row in parsed.cells if row[4:5] == [unit]]
-        assert any(float(row[2]) == pytest.approx(value, rel=1e-3) for row in rows), unit
+        assert any(
+            float(row[2].replace(",", "")) == pytest.approx(value, rel=1e-3) for row in rows
+        ), unit
 
 
 def test_interval_of_a_parameter(parsed, calibration):
@@ -291,7 +293,9 @@ def test_upper_bounds_are_shown_as_such(parsed, calibration):
     for key in bounds:
         row = next(row for row in shown if row[0] == key)
         assert row[2].startswith("< ")
-        assert float(row[2][2:]) == pytest.approx(calibration["accel_x"][key].usual.upper, rel=1e-3)
+        assert float(row[2][2:].replace(",", "")) == pytest.approx(
+            calibration["accel_x"][key].usual.upper, rel=1e-3
+        )
 
 
 def test_fitness_is_told(parsed, calibration):
@@ -794,7 +798,7 @@ def test_duration(seconds, words):
         (1.0, "1"),
         (2.33333, "2.333"),
         (-0.00123456, "-0.001235"),
-        (1234.56, "1235"),
+        (1234.56, "1,235"),
         (1.23456e-7, "1.235e-07"),
         (1e-7, "1.000e-07"),
     ],

@@ -303,3 +303,17 @@ def test_a_comparison_fits_a_telephone_and_fetches_nothing(calibration, tab, tmp
     assert tab.run("document.documentElement.scrollWidth") <= 420
     assert tab.run("document.querySelectorAll('.multiples svg').length") == 1
     assert [each for each in tab.requests() if not each.startswith(("file:", "data:"))] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_validation_fits_a_telephone_and_can_be_read(tab, tmp_path, made_up, scheme):
+    found = made_up({"A": 3.0, "B": 1.0}, ((20, 10),))
+    try:
+        tab.size(420)
+        tab.scheme(scheme)
+        tab.open(found.report(tmp_path / "validation.html"))
+        assert tab.run("document.documentElement.scrollWidth") <= 420
+        ratio, where = tab.run(CONTRAST)
+        assert ratio >= 4.5, where
+    finally:
+        tab.scheme("light")

@@ -17,7 +17,7 @@ def test_every_filter_is_on_the_page_and_no_name_is_markup(tmp_path, made_up):
     for shown in ("&lt;b&gt;bold&lt;/b&gt;", "a&amp;b", "&#34;&#39;", "x$y$", "_z", "w" * 40):
         assert text.count(shown) >= 5
     assert "<b>bold" not in text
-    assert text.count('class="figure"') == 3
+    assert text.count('<figure class="picture') == 3
 
 
 def test_the_page_needs_no_network_and_is_the_same_each_time(tmp_path, made_up):

@@ -8,8 +8,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, ins
-from gmwm.study.demo import RATE, compare, simulated_imu
-from gmwm.study.demo_files import DRIVE, write_demo_files
+from gmwm.study.demo import DRIVE, RATE, compare, simulated_imu, write_demo_files
 from gmwm.study.emulated_logs import emulated_log
 from gmwm.study.sensor_tables import TABLE_6
 

@@ -51,32 +51,15 @@ def do_runs(
 ) -> Values:
     """Do the runs 0 to ``runs - 1``, or those that are missing.
 
-    Parameters
-    ----------
-    work : callable
-        Can be pickled.
-    study : mapping
-        What runs depend on, in JSON types. Those of another study are never mixed in.
-    folder : Path, optional
-        Where finished runs are kept every few seconds, also when the work is interrupted.
-    earlier : {"resume", "replace", "refuse"}, optional
-        What to do with runs that the folder holds already.
-    jobs : int, optional
-        Processes on this machine; -1 for one a core.
-    cluster : str, optional
-        Address of a Dask scheduler that does the work instead.
-    progress : callable, optional
-        Called as ``progress(done, runs, "")``.
-
-    Returns
-    -------
-    dict
-        Name -> values of all runs in order, the run on the first axis.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be used, is in use, or holds runs of another study (code
+    work: Can be pickled.
+    study: What runs depend on, in JSON types. Those of another study are never mixed in.
+    folder: Where finished runs are kept every few seconds, also when the work is interrupted.
+    earlier: {"resume", "replace", "refuse"}, what to do with runs that the folder holds already.
+    jobs: Processes on this machine; -1 for one a core.
+    cluster: Address of a Dask scheduler that does the work instead.
+    progress: Called as ``progress(done, runs, "")``.
+    Returns: name -> values of all runs in order, the run on the first axis.
+    Raises InputError if the folder cannot be used, is in use, or holds runs of another study (code
         "other-runs") or runs that are not to be resumed (code "earlier-runs"); or if no scheduler
         answers.
     """
@@ -97,12 +80,8 @@ def do_runs(
 class _Store:
     """Finished runs, and the files that hold them; a file appears whole or not at all.
 
-    Parameters
-    ----------
-    folder : Path or None
-        ``None`` keeps nothing on disk.
-    study : dict
-        In JSON types; kept in every file.
+    folder: ``None`` keeps nothing on disk.
+    study: In JSON types; kept in every file.
     """
 
     def __init__(self, folder: Path | None, study: dict[str, Any]) -> None:

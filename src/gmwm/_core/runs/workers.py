@@ -53,21 +53,12 @@ def results(
 ) -> Done[T, R]:
     """Do the work of every item, in any order.
 
-    Parameters
-    ----------
-    items : sequence
-        Hashable and different.
-    jobs : int, optional
-        Processes on this machine; -1 for one a core. One does the work itself.
-    cluster : str, optional
-        Address of a Dask scheduler that does the work instead.
-    lost : callable, optional
-        Gives the result of an item at which `ENDED` processes ended; by default that is an error.
-
-    Raises
-    ------
-    InputError
-        If no scheduler answers, it has no workers, or an item is lost (code "worker-lost").
+    items: Hashable and different.
+    jobs: Processes on this machine; -1 for one a core. One does the work itself.
+    cluster: Address of a Dask scheduler that does the work instead.
+    lost: Gives the result of an item at which `ENDED` processes ended; by default that is an error.
+    Raises InputError if no scheduler answers, it has no workers, or an item is lost (code
+        "worker-lost").
     """
     given_up = _refused if lost is None else lost
     if cluster is not None:
@@ -78,12 +69,8 @@ def results(
 def spare(jobs: int, items: int) -> int:
     """How many processes beside this one are of use, of which ``jobs`` are to share the work.
 
-    Parameters
-    ----------
-    jobs : int
-        -1 for one a core.
-    items : int
-        That can be worked on side by side.
+    jobs: -1 for one a core.
+    items: That can be worked on side by side.
     """
     if current_process().name != "MainProcess":  # whoever started it has shared the cores out
         return 0

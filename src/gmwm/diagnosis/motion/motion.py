@@ -27,16 +27,10 @@ _LIMIT = {"gyro": tuning.TURNS, "accel": tuning.TILTS * _GRAVITY}
 class Move:
     """One stretch that is not static.
 
-    Attributes
-    ----------
-    start, stop : float
-        s.
-    length : float
-        The same without missing samples, s.
-    rate : float
-        Largest angular rate beyond that at rest, rad/s; 0 without gyros.
-    tilt : float
-        Angle between gravity before and after, rad; 0 where either is unknown.
+    start, stop: s.
+    length: The same without missing samples, s.
+    rate: Largest angular rate beyond that at rest, rad/s; 0 without gyros.
+    tilt: Angle between gravity before and after, rad; 0 where either is unknown.
     """
 
     start: float
@@ -125,14 +119,7 @@ def find_motion(recording: Recording) -> Motion:
     static if its rate is that of the level nearest to zero. Slow drifts change too little at a
     time; slow motion is found where gravity turns as the gyros say.
 
-    Parameters
-    ----------
-    recording : Recording
-
-    Returns
-    -------
-    Motion
-        Without moves if it is static, or too short to be examined.
+    Returns: stretches, without moves if it is static, or too short to be examined.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)

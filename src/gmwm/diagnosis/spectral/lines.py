@@ -22,18 +22,11 @@ _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 +
 class Line:
     """A periodic line.
 
-    Attributes
-    ----------
-    frequency : float
-        Hz.
-    amplitude : float
-        Of a sinusoid of the same power, u.
-    ratio : float
-        Density over that of the surroundings, over the width.
-    width : float
-        Over which it is smeared, Hz.
-    start, stop : int
-        Bins that it takes.
+    frequency: Hz.
+    amplitude: Of a sinusoid of the same power, u.
+    ratio: Density over that of the surroundings, over the width.
+    width: Over which it is smeared, Hz.
+    start, stop: Bins that it takes.
     """
 
     frequency: float
@@ -52,11 +45,7 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     widths together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
     correlation between Hann bins, which rules the tail. Wider means find lines that wander.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    smooth : (n // 2 + 1,) ndarray
-        Background, u^2/Hz.
+    smooth: (n // 2 + 1,), background, u^2/Hz.
     """
     last = spectrum.density.size - 1
     if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
@@ -178,16 +167,10 @@ def _scores(
 ) -> tuple[FloatArray, IntArray]:
     """Largest ratio to the limit over all widths, and the width that has it, of some bins.
 
-    Parameters
-    ----------
-    ratio : (n // 2 + 1,) ndarray
-        Density over background.
-    freedom : (n // 2 + 1,) ndarray
-        Degrees of freedom of the background.
-    grid, limits : (K,) ndarray and dict
-        See `_limits`.
-    start, stop : int
-        Bins.
+    ratio: (n // 2 + 1,), density over background.
+    freedom: (n // 2 + 1,), degrees of freedom of the background.
+    grid, limits: (K,) and dict, see `_limits`.
+    start, stop: Bins.
     """
     last = ratio.size - 1
     widths = np.array(list(limits))

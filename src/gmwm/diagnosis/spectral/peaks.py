@@ -14,17 +14,9 @@ from gmwm.diagnosis.spectral.spectrum import background, bands, spectrum
 def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
     """Lines, and resonances of what they leave.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples, NaN where missing.
-    dt : float
-        s.
-
-    Returns
-    -------
-    tuple of Line, tuple of Bump
-        None of a series that is too short, or of which more than half is missing.
+    values: (n,), samples, NaN where missing.
+    dt: s.
+    Returns: None of a series that is too short, or of which more than half is missing.
     """
     if (
         values.size < tuning.FEWEST_OF_SPECTRUM

@@ -27,16 +27,10 @@ _GAIN = 1e-9  # of the deviance
 class Bump:
     """A resonance of second order on a smooth background.
 
-    Attributes
-    ----------
-    frequency : float
-        Undamped natural frequency, Hz.
-    damping : float
-        Damping ratio: half of the half-power width over the frequency, where that is small.
-    sigma : float
-        Standard deviation, u.
-    ratio : float
-        Of the density at the peak, background included, to the background.
+    frequency: Undamped natural frequency, Hz.
+    damping: Damping ratio: half of the half-power width over the frequency, where that is small.
+    sigma: Standard deviation, u.
+    ratio: Of the density at the peak, background included, to the background.
     """
 
     frequency: float
@@ -54,15 +48,9 @@ def find_resonances(
     and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
     around it by Whittle's likelihood, which gives frequency and damping.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    found : Bands
-        Without the lines.
-    smooth : (n // 2 + 1,) ndarray
-        Background, u^2/Hz.
-    left_out : (n // 2 + 1,) ndarray of bool
-        Bins of lines.
+    found: Without the lines.
+    smooth: (n // 2 + 1,), background, u^2/Hz.
+    left_out: (n // 2 + 1,) of bool, bins of lines.
     """
     height = found.level - found.smooth
     count = height.size

@@ -21,18 +21,11 @@ _LOG_VARIANCE = np.pi**2 / 6.0  # of the logarithm of an exponential variate
 class Bands:
     """Mean logarithm of the spectrum in bands of equal width in log frequency.
 
-    Attributes
-    ----------
-    edges : (J + 1,) ndarray of int
-        Bins of the spectrum.
-    frequency : (J,) ndarray
-        Hz.
-    level : (J,) ndarray
-        Logarithm of the density.
-    variance : (J,) ndarray
-        Of ``level``.
-    smooth : (J,) ndarray
-        Running median of ``level`` over an octave.
+    edges: (J + 1,) of int, bins of the spectrum.
+    frequency: (J,), hz.
+    level: (J,), logarithm of the density.
+    variance: (J,), of ``level``.
+    smooth: (J,), running median of ``level`` over an octave.
     """
 
     edges: IntArray
@@ -46,14 +39,9 @@ class Bands:
 class Spectrum:
     """One-sided periodogram with a Hann window.
 
-    Attributes
-    ----------
-    density : (n // 2 + 1,) ndarray
-        u^2/Hz.
-    resolution : float
-        Distance of the bins, Hz.
-    dt : float
-        Sampling interval, s.
+    density: (n // 2 + 1,), u^2/Hz.
+    resolution: Distance of the bins, Hz.
+    dt: Sampling interval, s.
     """
 
     density: FloatArray
@@ -69,17 +57,9 @@ class Spectrum:
 def spectrum(values: FloatArray, dt: float) -> Spectrum:
     """Periodogram of a series without its linear trend.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Samples, NaN where missing: there a straight line takes their place.
-    dt : float
-        s.
-
-    Returns
-    -------
-    Spectrum
-        Of unit gain for density; a line of amplitude A has the area A^2/2.
+    values: (n,), samples, NaN where missing: there a straight line takes their place.
+    dt: s.
+    Returns: a spectrum of unit gain for density; a line of amplitude A has the area A^2/2.
     """
     n = values.size
     place = np.arange(n, dtype=float)
@@ -106,11 +86,7 @@ def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
     The mean of logarithms is little moved by lines, and the running median by bumps narrower than
     half an octave; where the spectrum rises or falls steadily the median is exact.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    left_out : (n // 2 + 1,) ndarray of bool, optional
-        Bins that do not count.
+    left_out: (n // 2 + 1,) of bool, bins that do not count.
     """
     logs = np.log(np.maximum(spectrum.density, np.finfo(float).tiny)) + np.euler_gamma
     used = np.ones(logs.size)

@@ -22,13 +22,9 @@ _LISTED = 3
 class Blocks:
     """Blocks of a quarter of a second, of the channels that motion can be seen in.
 
-    Attributes
-    ----------
-    channels : tuple of Channel
-    size : int
-        Samples of a block.
-    means, scatter : (blocks, axes) ndarray
-        Mean and variance of each block, u and u^2; NaN where half is missing.
+    size: Samples of a block.
+    means, scatter: (blocks, axes), mean and variance of each block, u and u^2; NaN where half is
+        missing.
     """
 
     channels: tuple[Channel, ...]

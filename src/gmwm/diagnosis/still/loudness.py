@@ -22,11 +22,8 @@ from gmwm.diagnosis import tuning
 class Loudness:
     """When some axes scatter more than at their quietest.
 
-    Attributes
-    ----------
-    loud : (blocks,) ndarray of bool
-    ratio : float
-        Largest standard deviation in a loud stretch over that at rest, of any axis.
+    loud: (blocks,) of bool.
+    ratio: Largest standard deviation in a loud stretch over that at rest, of any axis.
     """
 
     loud: BoolArray
@@ -36,17 +33,9 @@ class Loudness:
 def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
     """Find the loud stretches of a recording from the scatter of its blocks.
 
-    Parameters
-    ----------
-    scatter : (blocks, axes) ndarray
-        Variance within each block, u^2; NaN where it is not known.
-    step : (axes,) ndarray
-        To which samples are rounded, u; 0 where they are not.
-
-    Returns
-    -------
-    Loudness
-        Without loud blocks where their scatter does no harm.
+    scatter: (blocks, axes), variance within each block, u^2; NaN where it is not known.
+    step: (axes,), to which samples are rounded, u; 0 where they are not.
+    Returns: no loud block where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
     # Without rounding a block that does not scatter at all is dead, not quiet.

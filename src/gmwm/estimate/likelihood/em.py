@@ -21,7 +21,12 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.likelihood.conclusion import conclude_likelihood
+from gmwm.estimate.likelihood.conclusion import (
+    Top,
+    conclude_likelihood,
+    redundant_term,
+    upper_bound,
+)
 from gmwm.estimate.likelihood.expectation import Expectation, expect
 from gmwm.estimate.likelihood.likelihood import (
     Columns,
@@ -38,7 +43,6 @@ from gmwm.estimate.likelihood.maximization import (
 )
 from gmwm.estimate.likelihood.scoring import Maximum, observed_information, regular_inverse
 from gmwm.estimate.likelihood.series import Series
-from gmwm.estimate.likelihood.vanishing import Top, redundant_term, upper_bound
 from gmwm.estimate.problem import Coordinates, Slope, spectral_information
 from gmwm.estimate.result import Estimates, Fit
 from gmwm.process import Model, Process, StateSpace, as_model
@@ -52,11 +56,8 @@ _TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zer
 class Stage:
     """Parameters during the iteration.
 
-    Attributes
-    ----------
-    processes : tuple of Process
-    initial, drive : (p,) ndarray or None
-        Mean of the first state and input of each step, where the drift enters a state.
+    initial, drive: (p,) or None, mean of the first state and input of each step, where the drift
+        enters a state.
     """
 
     processes: tuple[Process, ...]
@@ -116,18 +117,10 @@ class EM:
 class Iteration:
     """The EM iteration of one series.
 
-    Parameters
-    ----------
-    series : Series
-    in_state : bool
-        Whether the drift is an input to the first state, as in Stebler et al. (2011). Then the
-        mean of the series is removed, the mean of the first state is estimated, and its covariance
-        is that of one step.
-
-    Raises
-    ------
-    InputError
-        If the drift is to enter a state and there is none, or no drift to estimate.
+    in_state: Whether the drift is an input to the first state, as in Stebler et al. (2011). Then
+        the mean of the series is removed, the mean of the first state is estimated, and its
+        covariance is that of one step.
+    Raises InputError if the drift is to enter a state and there is none, or no drift to estimate.
     """
 
     def __init__(self, series: Series, in_state: bool) -> None:

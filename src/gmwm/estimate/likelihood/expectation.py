@@ -16,22 +16,13 @@ from gmwm.process import StateSpace
 class Expectation:
     """What the M step needs.
 
-    Attributes
-    ----------
-    later, cross, earlier : (p, p) ndarray
-        Sums over k of E x[k+1] x[k+1]', E x[k+1] x[k]' and E x[k] x[k]'.
-    first : (p, p) ndarray
-        E x[0] x[0]'.
-    start, later_sum, earlier_sum : (p,) ndarray
-        E x[0] and the sums of E x[k+1] and E x[k].
-    steps : int
-        Number of transitions, n - 1.
-    residual : float
-        Sum of the expected squares of the measurement noise.
-    count : int
-        Number of samples that are not missing.
-    log_likelihood : float
-        Of the parameters that the expectation was taken under.
+    later, cross, earlier: (p, p), sums over k of E x[k+1] x[k+1]', E x[k+1] x[k]' and E x[k] x[k]'.
+    first: (p, p), e x[0] x[0]'.
+    start, later_sum, earlier_sum: (p,), e x[0] and the sums of E x[k+1] and E x[k].
+    steps: Number of transitions, n - 1.
+    residual: Sum of the expected squares of the measurement noise.
+    count: Number of samples that are not missing.
+    log_likelihood: Of the parameters that the expectation was taken under.
     """
 
     later: FloatArray
@@ -56,12 +47,7 @@ def expect(
 ) -> Expectation:
     """Smooth the series under a state space, with the regressors' coefficients integrated out.
 
-    Parameters
-    ----------
-    columns : Columns
-    space : StateSpace
-    initial, drive : (p,) ndarray, optional
-        Mean of the first state and constant input of each step; zero by default.
+    initial, drive: (p,), mean of the first state and constant input of each step; zero by default.
     """
     y, p = columns.matrix, space.n_states
     n, m = y.shape

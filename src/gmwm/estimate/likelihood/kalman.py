@@ -189,27 +189,14 @@ def smooth(
     The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives what that of Rauch, Tung
     and Striebel does without inverting a covariance.
 
-    Parameters
-    ----------
-    F, Q : (p, p) ndarray
-    h : (p,) ndarray
-    r : float
-    P0 : (p, p) ndarray
-    Y : (n, m) ndarray
-        Columns; NaN in the first one is a missing sample.
-    A0, U : (m, p) ndarray
-        Initial mean and constant input of each column.
-
-    Returns
-    -------
-    X : (n, m, p) ndarray
-        Smoothed states of each column.
-    C : (n, p, p) ndarray
-        Their covariance.
-    D : (n - 1, p, p) ndarray
-        Covariance of state k+1 with state k.
-    V, S : ndarray
-        Innovations (n, m) and their variances (n,), infinite where missing.
+    F, Q: (p, p).
+    h: (p,).
+    P0: (p, p).
+    Y: (n, m), columns; NaN in the first one is a missing sample.
+    A0, U: (m, p), initial mean and constant input of each column.
+    Returns: X (n, m, p), smoothed states of each column; C (n, p, p), their covariance; D (n - 1,
+        p, p), covariance of state k+1 with state k; V, S, innovations (n, m) and their variances
+        (n,), infinite where missing.
     """
     n, m = Y.shape
     p = h.size

@@ -29,15 +29,10 @@ _NO_VARIANCE = 1e-12  # of a first sample, as a share of that of one step
 class Regression:
     """Generalized least squares of whitened regressors.
 
-    Attributes
-    ----------
-    beta : (k,) ndarray
-        Coefficients.
-    covariance : (k, k) ndarray
-    residual : float
-        Sum of squares that is left.
-    log_determinant : float
-        Of the regressors' information matrix.
+    beta: (k,), coefficients.
+    covariance: (k, k).
+    residual: Sum of squares that is left.
+    log_determinant: Of the regressors' information matrix.
     """
 
     beta: FloatArray
@@ -61,16 +56,10 @@ class Regression:
 class Columns:
     """A series beside its regressors: a constant and, where the model has one, a ramp.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        NaN where missing.
-    dt : float
-        Sampling interval, s.
-    drift : float or None
-        Given slope, u/s, which is removed; ``None`` to estimate it.
-    has_drift : bool
-        Whether the model has a ramp at all.
+    values: (n,), NaN where missing.
+    dt: Sampling interval, s.
+    drift: Given slope, u/s, which is removed; ``None`` to estimate it.
+    has_drift: Whether the model has a ramp at all.
     """
 
     def __init__(self, values: FloatArray, dt: float, drift: float | None, has_drift: bool) -> None:
@@ -145,12 +134,7 @@ def whitened(columns: Columns, processes: Sequence[Process]) -> tuple[FloatArray
 
 
 class KalmanLikelihood:
-    """Diffuse log-likelihood of a series under sums of processes with a state space.
-
-    Parameters
-    ----------
-    columns : Columns
-    """
+    """Diffuse log-likelihood of a series under sums of processes with a state space."""
 
     def __init__(self, columns: Columns) -> None:
         self.columns = columns

@@ -37,9 +37,7 @@ class StateMoments:
 def check_supported(process: Process) -> None:
     """Raise where EM has no closed form for the process.
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     if process.is_white:
         return

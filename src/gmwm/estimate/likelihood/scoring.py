@@ -27,11 +27,7 @@ _HALVINGS = 12
 class Maximum:
     """Where a log-likelihood is largest.
 
-    Attributes
-    ----------
-    z : (d,) ndarray
-    value : float
-    converged : bool
+    z: (d,).
     """
 
     z: FloatArray

@@ -22,21 +22,13 @@ from gmwm.variance import MIN_SAMPLES, Runs, WaveletVariance, wavelet_variance
 class Series:
     """A channel ready for a likelihood.
 
-    Attributes
-    ----------
-    columns : Columns
-        The samples and regressors.
-    wv : WaveletVariance
-        Of the samples; where gaps leave none, of the series bridged by straight lines.
-    is_bridged : bool
-        Whether it is the latter: fine levels are then too low, so that it is a starting point but
-        no test of a fit.
-    coordinates : Coordinates
-        Of the model's noise.
-    start : tuple of Process
-        Starting values of its terms, all of them positive.
-    start_is_sound : bool
-        Whether they are valid estimates by the method of moments.
+    columns: The samples and regressors.
+    wv: Of the samples; where gaps leave none, of the series bridged by straight lines.
+    is_bridged: Whether it is the latter: fine levels are then too low, so that it is a starting
+        point but no test of a fit.
+    coordinates: Of the model's noise.
+    start: Starting values of its terms, all of them positive.
+    start_is_sound: Whether they are valid estimates by the method of moments.
     """
 
     columns: Columns
@@ -52,11 +44,8 @@ class Series:
     ) -> Series:
         """Check the samples and find starting values.
 
-        Raises
-        ------
-        InputError
-            If the samples are no series of numbers, if some are missing and ``gaps`` are not
-            allowed, or if ``start`` is not the same model.
+        Raises InputError if the samples are no series of numbers, if some are missing and ``gaps``
+            are not allowed, or if ``start`` is not the same model.
         """
         coordinates = Coordinates(model)
         for term in coordinates.noise:
@@ -92,10 +81,7 @@ class Series:
 def _missing(channel: Channel) -> int:
     """Number of missing samples of a series that has enough of them.
 
-    Raises
-    ------
-    InputError
-        If hardly any sample is there.
+    Raises InputError if hardly any sample is there.
     """
     values = np.asarray(channel.values, dtype=float)
     if values.ndim != 1 or np.any(np.isinf(values)):

@@ -90,16 +90,11 @@ def with_doubtful_terms(
     amplitude looks significant under the noise that it is part of. It is needed all the same where
     the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`).
 
-    Parameters
-    ----------
-    fit : Fit
-    redundant : sequence of (int, Notice)
-        Noise terms whose gain is not significant; of several alike each can stand in for another:
-        one of them is too many, not all.
-    places : mapping of str to int
-        Noise term of each amplitude.
-    without : callable
-        How well the fit without a noise term describes the data; None if nothing is left to fit.
+    redundant: Noise terms whose gain is not significant; of several alike each can stand in for
+        another: one of them is too many, not all.
+    places: Noise term of each amplitude.
+    without: How well the fit without a noise term describes the data; None if nothing is left to
+        fit.
     """
     present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
     if not redundant and not present:

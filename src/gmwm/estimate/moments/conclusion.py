@@ -43,25 +43,13 @@ def conclude_moments(
 ) -> Fit:
     """Make the `Fit` of a minimum.
 
-    Parameters
-    ----------
-    design : Design
-    moments : Moments
-        What was fitted.
-    covariance : (J, J) ndarray
-        Of the moments under the fitted model, with the discrepancy, u^4.
-    statistical : (J, J) ndarray
-        The same without it.
-    point : Point
-        The minimum.
-    basis : (J,) ndarray
-        The wavelet variances to which ``covariance`` belongs, u^2.
-    weights : Weights
-    method : str
-    discrepancy : float
-        Relative error allowed for at each level, part of ``covariance``.
-    without : callable
-        How well the fit without a noise term describes the data: whether it is needed.
+    moments: What was fitted.
+    covariance: (J, J), of the moments under the fitted model, with the discrepancy, u^4.
+    statistical: (J, J), the same without it.
+    point: The minimum.
+    basis: (J,), the wavelet variances to which ``covariance`` belongs, u^2.
+    discrepancy: Relative error allowed for at each level, part of ``covariance``.
+    without: How well the fit without a noise term describes the data: whether it is needed.
     """
     target = moments.target
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)

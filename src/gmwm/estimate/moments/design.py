@@ -38,26 +38,12 @@ class Compiled(NamedTuple):
 class Design:
     """The moment curves of a model over the free parameters.
 
-    Parameters
-    ----------
-    model : Model
-        With open parameters.
-    scales : Scales
-
-    Attributes
-    ----------
-    coordinates : Coordinates
-    terms : tuple of Term
-        The noise terms.
-    linear : tuple of int
-        Noise terms of free amplitude.
-    shaped : tuple of int
-        Noise terms of which some shape parameter is free.
-
-    Raises
-    ------
-    InputError
-        If the model has no noise, or a process that cannot be fitted in part is fixed in part.
+    model: With open parameters.
+    terms: The noise terms.
+    linear: Noise terms of free amplitude.
+    shaped: Noise terms of which some shape parameter is free.
+    Raises InputError if the model has no noise, or a process that cannot be fitted in part is fixed
+        in part.
     """
 
     def __init__(self, model: Model, scales: Scales) -> None:

@@ -73,12 +73,8 @@ def _objective(
 class Discrepancy:
     """The level of discrepancy while a fit is iterated.
 
-    Parameters
-    ----------
-    given : float or None
-        Fixed value; ``None`` to estimate it.
-    dof : int
-        Degrees of freedom of the fit.
+    given: Fixed value; ``None`` to estimate it.
+    dof: Degrees of freedom of the fit.
     """
 
     def __init__(self, given: float | None, dof: int) -> None:

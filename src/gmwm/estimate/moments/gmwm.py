@@ -34,14 +34,8 @@ from gmwm.variance import WaveletVariance
 class End:
     """Where an estimation ended, without the series: kept with it, this must not keep it.
 
-    Attributes
-    ----------
-    design : Design
-    slope : Slope or None
-        Drift removed from the wavelet variances.
-    covariance, statistical, point, basis
-        As of `State`.
-    discrepancy : float
+    slope: Drift removed from the wavelet variances.
+    covariance, statistical, point, basis: As of `State`.
     """
 
     design: Design
@@ -196,17 +190,10 @@ class SimulatedMoments(GMWM):
 class State:
     """Where an estimation stands.
 
-    Attributes
-    ----------
-    moments : Moments
-    covariance : (J, J) ndarray
-        Of the moments, with the discrepancy, u^4.
-    statistical : (J, J) ndarray
-        The same without it.
-    point : Point
-        The minimum under it.
-    basis : (J,) ndarray
-        The wavelet variances to which the covariance belongs, u^2.
+    covariance: (J, J), of the moments, with the discrepancy, u^4.
+    statistical: (J, J), the same without it.
+    point: The minimum under it.
+    basis: (J,), the wavelet variances to which the covariance belongs, u^2.
     """
 
     moments: Moments

@@ -28,13 +28,8 @@ _TOLERANCES = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-9}
 class Point:
     """A point of the parameter space and its weighted sum of squares.
 
-    Attributes
-    ----------
-    shapes : list of Shape
-        Of every term.
-    x : (L,) ndarray
-        Free amplitudes, non-negative.
-    objective : float
+    shapes: Of every term.
+    x: (L,), free amplitudes, non-negative.
     """
 
     shapes: Sequence[Shape]
@@ -58,16 +53,10 @@ class _Place(NamedTuple):
 class Profile:
     """The weighted least-squares problem of one design, one set of moments and one weight.
 
-    Parameters
-    ----------
-    design : Design
-    target : (J,) ndarray
-        Observed wavelet variances, u^2.
-    root : (J, J) ndarray
-        L with L'L the weight matrix.
-    beside : (J, k) ndarray, optional
-        Curves of what else the series may hold, each with an amplitude of its own, at the end of
-        `Point.x`.
+    target: (J,), observed wavelet variances, u^2.
+    root: (J, J), l with L'L the weight matrix.
+    beside: (J, k), curves of what else the series may hold, each with an amplitude of its own, at
+        the end of `Point.x`.
     """
 
     def __init__(

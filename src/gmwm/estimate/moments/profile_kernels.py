@@ -15,14 +15,10 @@ def profiled(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals.
 
-    Parameters
-    ----------
-    root : (J, J) ndarray
-        L with L'L the weight matrix.
-    curves : (J, terms) ndarray
-    linear, given : (L,), (G,) ndarray
-        Terms of free and of fixed amplitude.
-    target : (J,) ndarray
+    root: (J, J), l with L'L the weight matrix.
+    curves: (J, terms).
+    linear, given: (L,), (G,), terms of free and of fixed amplitude.
+    target: (J,).
     """
     rows = target.size
     rest = target.copy()
@@ -46,13 +42,10 @@ def projected(
 ) -> FloatArray:
     """Weighted slopes of the curves times factors, without what amplitudes above zero make up.
 
-    Parameters
-    ----------
-    root : (J, J) ndarray
-    columns, x : (J, L), (L,) ndarray
-        Weighted columns and their amplitudes.
-    slopes, factor : (J, z), (z,) ndarray
-        Derivatives of the curves by the shapes, and the amplitudes of the terms they belong to.
+    root: (J, J).
+    columns, x: (J, L), (L,), weighted columns and their amplitudes.
+    slopes, factor: (J, z), (z,), derivatives of the curves by the shapes, and the amplitudes of the
+        terms they belong to.
     """
     rows, count = slopes.shape
     weighted = np.zeros((rows, count))

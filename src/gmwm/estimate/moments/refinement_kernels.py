@@ -257,33 +257,18 @@ def refined(
 ) -> tuple[bool, FloatArray, FloatArray, float]:  # fmt: skip
     """Local minimum of the profiled problem.
 
-    Parameters
-    ----------
-    z : (z,) ndarray
-        Coordinates of the free shapes to start from.
-    bounds : (low, high)
-        How far each may go.
-    terms : tuple of arrays
-        Of the S shaped terms: kinds, columns, first coordinates; (S, 3): which shape parameters are
-        free, their lower and upper limits.
-    shapes : (S, 3) ndarray
-        Their shapes, of which the fixed ones count.
-    fixed : (J, terms) ndarray
-        Curves of the other terms.
-    levels : tuple
-        As `gmwm.process.shaped_curve` has them.
-    weighted : (root, linear, given, owners, target)
-        As `profiled` has them; for each coordinate, the place of its term's amplitude in x.
-    tolerances : (xtol, ftol, gtol, evaluations)
-        As of MINPACK.
-
-    Returns
-    -------
-    found : bool
-        False where a curve is not known in compiled form.
-    z, x : ndarray
-        Coordinates, within the bounds, and free amplitudes.
-    objective : float
+    z: (z,), coordinates of the free shapes to start from.
+    bounds: (low, high), how far each may go.
+    terms: Of the S shaped terms: kinds, columns, first coordinates; (S, 3): which shape parameters
+        are free, their lower and upper limits.
+    shapes: (S, 3), their shapes, of which the fixed ones count.
+    fixed: (J, terms), curves of the other terms.
+    levels: As `gmwm.process.shaped_curve` has them.
+    weighted: (root, linear, given, owners, target), as `profiled` has them; for each coordinate,
+        the place of its term's amplitude in x.
+    tolerances: (xtol, ftol, gtol, evaluations), as of MINPACK.
+    Returns: found, false where a curve is not known in compiled form; z, x, coordinates, within the
+        bounds, and free amplitudes; objective.
     """
     low, high = bounds
     root, linear, given, owners, target = weighted

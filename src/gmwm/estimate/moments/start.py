@@ -49,11 +49,7 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     all shapes are then refined together; at the end each term in turn is taken out and placed
     anew. A model that extends another one is never worse, if started from that one's shapes.
 
-    Parameters
-    ----------
-    profile : Profile
-    known : list of Shape or None, optional
-        Shapes to start with, ``None`` for the terms still to be placed.
+    known: Shapes to start with, ``None`` for the terms still to be placed.
     """
     design = profile.design
     shapes = list(known) if known is not None else design.fixed_shapes()
@@ -134,15 +130,10 @@ def _refine_present(profile: Profile, point: Point) -> Point:
 class Reference:
     """A rich mixture fitted to the wavelet variances.
 
-    Attributes
-    ----------
-    mixture : Model
-    covariance : (J, J) ndarray
-        Of the wavelet variances under it, u^4.
-    curve : (J,) ndarray
-        Its wavelet variances, u^2.
-    discrepancy : float
-        Relative error that even this mixture needs, see `gmwm.estimate.moments.discrepancy`.
+    covariance: (J, J), of the wavelet variances under it, u^4.
+    curve: (J,), its wavelet variances, u^2.
+    discrepancy: Relative error that even this mixture needs, see
+        `gmwm.estimate.moments.discrepancy`.
     """
 
     mixture: Model
@@ -199,13 +190,8 @@ def dictionary(
 ) -> tuple[Design, list[tuple[int, Shape]], FloatArray]:
     """Processes of which almost any wavelet variance is a sum.
 
-    Returns
-    -------
-    design : Design
-    atoms : list of (int, Shape)
-        Term of the design and its shape.
-    matrix : (J, A) ndarray
-        Wavelet variance of each at unit amplitude.
+    Returns: design; atoms, term of the design and its shape; matrix (J, A), wavelet variance of
+        each at unit amplitude.
     """
     return _dictionary(scales, _kinds(extra))
 

@@ -18,12 +18,8 @@ WEIGHTS = ("model", "data", "diagonal", "identity")
 class Weights:
     """A choice of Omega.
 
-    Attributes
-    ----------
-    name : str
-        One of `WEIGHTS`.
-    of_data : (J, J) ndarray or None
-        Covariance estimated from the coefficients, for "data".
+    name: One of `WEIGHTS`.
+    of_data: (J, J) or None, covariance estimated from the coefficients, for "data".
     """
 
     name: str
@@ -33,10 +29,8 @@ class Weights:
     def of(cls, name: str, wv: WaveletVariance) -> Weights:
         """Weights for these wavelet variances.
 
-        Raises
-        ------
-        InputError
-            If they are "data" and the variances come without a covariance of their own.
+        Raises InputError if they are "data" and the variances come without a covariance of their
+            own.
         """
         if name == "data" and wv.data_covariance is None:
             raise InputError(
@@ -48,10 +42,7 @@ class Weights:
     def root(self, covariance: FloatArray) -> FloatArray:
         """L with L'L the weight matrix, (J, J).
 
-        Parameters
-        ----------
-        covariance : (J, J) ndarray
-            Of the moments under the fitted model, u^4.
+        covariance: (J, J), of the moments under the fitted model, u^4.
         """
         if self.of_data is not None:
             return weight_root(self.of_data)

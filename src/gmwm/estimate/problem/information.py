@@ -116,17 +116,10 @@ def slope_dof(
     freedom (Satterthwaite 1946, *Biometrics Bulletin* 2, 110-114). By the spectrum it is the
     inverse of ``int |T|^2 / S df`` with T the Fourier transform of the ramp.
 
-    Parameters
-    ----------
-    model : Model
-        With the estimates.
-    keys : sequence of str
-        The estimated parameters of its noise.
-    covariance : (d, d) ndarray
-        Of these.
-    n : int
-    dt : float
-        Sampling interval, s.
+    model: With the estimates.
+    keys: The estimated parameters of its noise.
+    covariance: (d, d), of these.
+    dt: Sampling interval, s.
     """
     coordinates, processes, names = _opened(model, keys)
     if not names or not _have_spectra(processes):
@@ -151,20 +144,10 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
     Between the points half a standard error below and above the estimate, along which the other
     parameters follow as they are correlated; by the expected information.
 
-    Parameters
-    ----------
-    model : Model
-        With the estimates.
-    keys : sequence of str
-        The estimated parameters of its noise.
-    n : int
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    dict
-        Key -> exponent k of the power law: relative standard error proportional to value^k.
+    model: With the estimates.
+    keys: The estimated parameters of its noise.
+    dt: Sampling interval, s.
+    Returns: key -> exponent k of the power law: relative standard error proportional to value^k.
     """
     coordinates, processes, names = _opened(model, keys)
     if not _have_spectra(processes):

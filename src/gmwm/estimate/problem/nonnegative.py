@@ -16,15 +16,9 @@ _TOLERANCE = 1e-14  # of |y|: a correlation with the residuals that is rounding
 def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Non-negative least squares with columns brought to unit length; amplitudes and residuals.
 
-    Parameters
-    ----------
-    columns : (J, k) ndarray
-    y : (J,) ndarray
-
-    Returns
-    -------
-    amplitudes : (k,) ndarray
-    residuals : (J,) ndarray
+    columns: (J, k).
+    y: (J,).
+    Returns: amplitudes (k,); residuals (J,).
     """
     if columns.shape[1] == 0:
         return np.zeros(0), y
@@ -35,15 +29,10 @@ def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, F
 def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
     """Sums of squares that are left with each candidate in turn beside the columns.
 
-    Parameters
-    ----------
-    columns : (J, k) ndarray
-    candidates : (J, G) ndarray
-    y : (J,) ndarray
-
-    Returns
-    -------
-    (G,) ndarray
+    columns: (J, k).
+    candidates: (J, G).
+    y: (J,).
+    Returns: (G,).
     """
     arrays = (np.ascontiguousarray(each) for each in (columns, candidates, y))
     return np.asarray(_each(*arrays))

@@ -24,16 +24,10 @@ _STEP = 1e-6  # of central differences of a process's own map
 class Term:
     """A noise term of a model and what of it is free.
 
-    Attributes
-    ----------
-    process : Process
-        As in the model, with open parameters.
-    place : int
-        Where it stands in the model.
-    free_scale : bool
-        Whether the linear parameter is open.
-    free_shape : (s,) ndarray of bool
-        Which shape parameters are open.
+    process: As in the model, with open parameters.
+    place: Where it stands in the model.
+    free_scale: Whether the linear parameter is open.
+    free_shape: (s,) of bool, which shape parameters are open.
     """
 
     process: Process
@@ -100,24 +94,11 @@ def shape_of(process: Process) -> Shape:
 class Coordinates:
     """Free parameters of the noise terms of a model, in the order of the terms.
 
-    Parameters
-    ----------
-    model : Model
-        With open parameters.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        The noise terms, without rate ramps.
-    owners : list of (int, bool)
-        For each coordinate, its noise term and whether it is the amplitude.
-    names : list of (int, str)
-        For each coordinate, its noise term and the name of the parameter.
-
-    Raises
-    ------
-    InputError
-        If the model has no noise.
+    model: With open parameters.
+    terms: The noise terms, without rate ramps.
+    owners: For each coordinate, its noise term and whether it is the amplitude.
+    names: For each coordinate, its noise term and the name of the parameter.
+    Raises InputError if the model has no noise.
     """
 
     def __init__(self, model: Model) -> None:
@@ -154,10 +135,7 @@ class Coordinates:
     def processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
         """The terms at ``z``; fixed parameters are taken from ``like``.
 
-        Raises
-        ------
-        InputError
-            Where a parameter is out of range.
+        Raises InputError where a parameter is out of range.
         """
         return tuple([self.process(i, z, process) for i, process in enumerate(like)])
 
@@ -202,12 +180,8 @@ class Coordinates:
     ) -> tuple[Model, list[str]]:
         """The whole model with values, its terms in order, and the key of each coordinate.
 
-        Parameters
-        ----------
-        processes : sequence of Process
-            The noise terms with values.
-        slope : float, optional
-            Of the rate ramp, where it is estimated, u/s.
+        processes: The noise terms with values.
+        slope: Of the rate ramp, where it is estimated, u/s.
         """
         values = {term.place: process for term, process in zip(self.terms, processes, strict=True)}
         terms = [values.get(place, term) for place, term in enumerate(self.model.terms)]

@@ -31,12 +31,8 @@ _WALKS = 40
 class Slope:
     """An estimated slope.
 
-    Attributes
-    ----------
-    value : float
-        u/s.
-    variance : float
-        Of the estimate, (u/s)^2.
+    value: u/s.
+    variance: Of the estimate, (u/s)^2.
     """
 
     value: float
@@ -67,12 +63,11 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     first = _beside(index)
     difference = wv.blocks[first + 1] - wv.blocks[first]
     column = difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
-    one = np.ones(first.size)
-    solved = _solve(column, first, np.column_stack([one, difference]))
-    information = float(one @ solved[:, 0])
+    weights = _solve(column, first, np.ones(first.size))
+    information = float(np.sum(weights))
     step = wv.block * wv.dt
     variance = _growth(wv) / information / step**2
-    return Slope(float(one @ solved[:, 1]) / information / step, variance)
+    return Slope(float(weights @ difference) / information / step, variance)
 
 
 def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
@@ -84,16 +79,8 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     means, in which the slope has no part (Harville 1974, *Biometrika* 61, 383-385), as weight. Its
     prior is even in the logarithm over all sizes that matter beside the noise.
 
-    Parameters
-    ----------
-    wv : WaveletVariance
-    psd : callable
-        Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
-
-    Returns
-    -------
-    float
-        1 where too few blocks exist.
+    psd: Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
+    Returns: 1 where too few blocks exist.
     """
     blocks, block = _coarser(wv)
     first = _beside(np.flatnonzero(~np.isnan(blocks)))
@@ -198,15 +185,9 @@ def detrended_covariance(
     The coefficients lose the covariance c = r_j r_k var(slope) at every lag, which turns the mean
     of 2 g^2 into that of 2 (g - c)^2.
 
-    Parameters
-    ----------
-    covariance : (J, J) ndarray
-        Of the wavelet variances, u^4.
-    means : (J, J) ndarray
-        Covariance of the means of the coefficients, u^2.
-    response : (J,) ndarray
-        Mean r of the coefficients per unit of drift, s.
-    slope : Slope
+    covariance: (J, J), of the wavelet variances, u^4.
+    means: (J, J), covariance of the means of the coefficients, u^2.
+    response: (J,), mean r of the coefficients per unit of drift, s.
     """
     common = np.outer(response, response) * slope.variance
     taken = 4.0 * common * means - 2.0 * common**2

@@ -23,22 +23,13 @@ _USUAL = Simulation(10, 0)
 class Scales:
     """The levels of a wavelet variance, without its values.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    dt : float
-        Sampling interval, s.
-    n : int
-        Length of the record, samples.
-    wavelet : str
-    simulation : Simulation
-        How curves that have no closed form are found.
-    simulate_all : bool
-        Whether all are found so.
-    shared : dict
-        What fits of several models to these levels ask for again: starting shapes and their curves,
-        by what they belong to.
+    tau: (J,), averaging times, s.
+    dt: Sampling interval, s.
+    n: Length of the record, samples.
+    simulation: How curves that have no closed form are found.
+    simulate_all: Whether all are found so.
+    shared: What fits of several models to these levels ask for again: starting shapes and their
+        curves, by what they belong to.
     """
 
     tau: FloatArray

@@ -22,11 +22,7 @@ from gmwm.variance import wavelet_variance
 class Simulation:
     """How moments are simulated.
 
-    Attributes
-    ----------
-    replications : int
-        Number of series.
-    seed : int
+    replications: Number of series.
     """
 
     replications: int

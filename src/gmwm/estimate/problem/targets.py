@@ -26,14 +26,8 @@ from gmwm.variance import WaveletVariance
 class Moments:
     """What is known of a series before and while its noise is fitted.
 
-    Attributes
-    ----------
-    wv : WaveletVariance
-    slope : Slope or None
-        Drift removed from the wavelet variances, ``None`` where the model has no ramp.
-    slope_is_free : bool
-        Whether it is estimated (rather than given).
-    scales : Scales
+    slope: Drift removed from the wavelet variances, ``None`` where the model has no ramp.
+    slope_is_free: Whether it is estimated (rather than given).
     """
 
     wv: WaveletVariance
@@ -91,17 +85,10 @@ class Moments:
 class FittedMoments:
     """The moments at a fitted model: those of the data, those of the model, their covariance.
 
-    Attributes
-    ----------
-    scales : Scales
-    target : (J,) ndarray
-        Wavelet variances of the data without the drift of the model, u^2.
-    implied : (J,) ndarray
-        Those of the model's noise, u^2.
-    statistical : (J, J) ndarray
-        Covariance of ``target`` if the model is right, u^4.
-    discrepancy : float
-        Relative error allowed for at each level.
+    target: (J,), wavelet variances of the data without the drift of the model, u^2.
+    implied: (J,), those of the model's noise, u^2.
+    statistical: (J, J), covariance of ``target`` if the model is right, u^4.
+    discrepancy: Relative error allowed for at each level.
     """
 
     scales: Scales
@@ -121,15 +108,8 @@ class FittedMoments:
     ) -> FittedMoments:
         """From a model with values and the data.
 
-        Parameters
-        ----------
-        model : Model
-        wv : WaveletVariance
-        keys : collection of str
-            The parameters that were estimated.
-        slope_error : float
-            Standard error of the slope of a rate ramp, u/s; 0 if it was not estimated.
-        discrepancy : float
+        keys: The parameters that were estimated.
+        slope_error: Standard error of the slope of a rate ramp, u/s; 0 if it was not estimated.
         """
         drift = drift_key(model)
         noise = tuple(term for term in model.terms if not term.is_drift)

@@ -39,25 +39,14 @@ def upper_amplitude(
     one found in 5 % of records: with the standard error of a vanishing amplitude, and beside it the
     spread of a chi-square with the degrees of freedom by which the amplitude raises that error.
 
-    Parameters
-    ----------
-    coordinates : Coordinates
-        Of the terms that have an amplitude, and this one.
-    processes : sequence of Process
-        These terms with values.
-    term : int
-        Which of them.
-    centre, deviation : float
-        The estimate without the restriction to positive values, and its standard error.
-    at : float
-        The amplitude under which that is its standard error.
-    wv : WaveletVariance
-        The data.
-
-    Returns
-    -------
-    float
-        No more than all of the variance at any level, and its error, leave room for.
+    coordinates: Of the terms that have an amplitude, and this one.
+    processes: These terms with values.
+    term: Which of them.
+    centre, deviation: The estimate without the restriction to positive values, and its standard
+        error.
+    at: The amplitude under which that is its standard error.
+    wv: The data.
+    Returns: a bound no larger than all of the variance at any level, and its error, leave room for.
     """
     most = _whole(processes[term], wv)
     plain = min(quantile_above_zero(centre, deviation), most)

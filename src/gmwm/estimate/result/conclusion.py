@@ -39,18 +39,11 @@ from gmwm.variance import WaveletVariance
 class Estimates:
     """Estimates of the noise terms of a model.
 
-    Attributes
-    ----------
-    coordinates : Coordinates
-        Of the whole model.
-    processes : sequence of Process
-        Its noise terms with their values, those of zero amplitude included.
-    covariance : (d, d) ndarray
-        Of the coordinates of the terms that have an amplitude.
-    absent : mapping of int to float
-        Noise term of zero amplitude -> 95 % upper bound of its scale.
-    slope : Slope or None
-        Of the rate ramp, where it is estimated.
+    coordinates: Of the whole model.
+    processes: Its noise terms with their values, those of zero amplitude included.
+    covariance: (d, d), of the coordinates of the terms that have an amplitude.
+    absent: Noise term of zero amplitude -> 95 % upper bound of its scale.
+    slope: Of the rate ramp, where it is estimated.
     """
 
     coordinates: Coordinates
@@ -126,16 +119,9 @@ def conclude(
 ) -> Fit:
     """Make the `Fit`; see there for the arguments.
 
-    Parameters
-    ----------
-    found : Estimates
-    comparison : Comparison
-    wv : WaveletVariance
-        The data.
-    misfits : bool
-        Whether the fit fails the chi-square test.
-    notices : sequence of Notice
-        Those of the method; what the estimates themselves show is added.
+    wv: The data.
+    misfits: Whether the fit fails the chi-square test.
+    notices: Those of the method; what the estimates themselves show is added.
     """
     slope = found.slope
     model, all_keys = found.coordinates.fitted(

@@ -23,19 +23,10 @@ def dense_curves(
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Allan deviation of each term of a model at whole numbers of samples.
 
-    Parameters
-    ----------
-    fitted : Fit
-    model : Model, optional
-        That of the fit by default.
-
-    Returns
-    -------
-    tau : (k,) ndarray
-        Averaging times from the first to the last of the data, s; those of the data alone where a
-        term is known by simulation only, or the wavelet is not Haar's.
-    deviations : dict of str to (k,) ndarray
-        By the term's label, u; the root of the sum of their squares is that of the model.
+    model: That of the fit by default.
+    Returns: tau (k,), averaging times from the first to the last of the data, s; those of the data
+        alone where a term is known by simulation only, or the wavelet is not Haar's; deviations, by
+        the term's label, u; the root of the sum of their squares is that of the model.
     """
     wv, shown = fitted.wv, fitted.model if model is None else model
     scales = Scales.of(wv)

@@ -18,11 +18,7 @@ HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval'
 class InUnit:
     """An estimate in a unit of the field.
 
-    Attributes
-    ----------
-    value, lower, upper : float
-        In ``unit``.
-    unit : str
+    value, lower, upper: In ``unit``.
     """
 
     value: float
@@ -105,14 +101,9 @@ def estimates_of(
 ) -> Iterator[Estimate]:
     """Every parameter of a fitted model, in order.
 
-    Parameters
-    ----------
-    model : Model
-        With values.
-    quantity : str
-        "gyro", "accel" or empty, for the units.
-    stderr, intervals, upper_bounds : mapping
-        By key, SI.
+    model: With values.
+    quantity: "gyro", "accel" or empty, for the units.
+    stderr, intervals, upper_bounds: By key, SI.
     """
     for item in model.parameters:
         key, value = item.key, float(item.value or 0.0)

@@ -27,26 +27,16 @@ if TYPE_CHECKING:
 class Goodness:
     """Agreement of model and data at each level, from ``gmwm.Fit.goodness``.
 
-    Attributes
-    ----------
-    tau : (J,) ndarray
-        Averaging times, s.
-    data, model : (J,) ndarray
-        Allan deviations, u; both without the drift where the model has a ramp.
-    misfit : (J,) ndarray
-        ``data / model - 1``.
-    residual : (J,) ndarray
-        Difference of the cube roots of the variances in statistical standard errors, close to
-        standard normal at every level if the model is right (Wilson & Hilferty 1931, *PNAS* 17,
-        684-688). Neighbouring levels are correlated.
-    allowed : (J,) ndarray
-        The same in standard errors that hold the discrepancy too.
-    dof : (J,) ndarray
-        Equivalent degrees of freedom ``2 nu^4 / var(nu_hat^2)`` under the model.
-    name, unit : str
-        Of the channel.
-    is_tested : bool
-        Whether the variances are those of the data: not where gaps had to be bridged.
+    tau: (J,), averaging times, s.
+    data, model: (J,), allan deviations, u; both without the drift where the model has a ramp.
+    misfit: (J,), ``data / model - 1``.
+    residual: (J,), difference of the cube roots of the variances in statistical standard errors,
+        close to standard normal at every level if the model is right (Wilson & Hilferty 1931,
+        *PNAS* 17, 684-688). Neighbouring levels are correlated.
+    allowed: (J,), the same in standard errors that hold the discrepancy too.
+    dof: (J,), equivalent degrees of freedom ``2 nu^4 / var(nu_hat^2)`` under the model.
+    name, unit: Of the channel.
+    is_tested: Whether the variances are those of the data: not where gaps had to be bridged.
     """
 
     tau: FloatArray

@@ -30,21 +30,11 @@ def confidence_interval(
     Student's t for the degrees of freedom that the relative error stands for: a variance known to
     a relative error of r has 2/r^2 of them.
 
-    Parameters
-    ----------
-    parameter : Parameter
-    value, error : float
-        Estimate and standard error.
-    level : float
-        Probability, between 0 and 1.
-    growth : float, optional
-        The exponent k, of positive parameters.
-    slope_dof : float, optional
-        Degrees of freedom of the standard error of a ramp's slope.
-
-    Returns
-    -------
-    lower, upper : float
+    value, error: Estimate and standard error.
+    level: Probability, between 0 and 1.
+    growth: The exponent k, of positive parameters.
+    slope_dof: Degrees of freedom of the standard error of a ramp's slope.
+    Returns: lower, upper.
     """
     if parameter.lower == 0.0 and value > 0.0:
         relative = error / value

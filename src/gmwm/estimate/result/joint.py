@@ -126,20 +126,10 @@ def fit_joint(
 ) -> JointFit:
     """Fit one model to several recordings, and to each.
 
-    Parameters
-    ----------
-    model : Model
-        With open parameters.
-    parts : sequence of WaveletVariance
-    estimate : callable
-        ``estimate(model, wv) -> Fit`` of a method.
-    whole : Fit, optional
-        The model fitted to all recordings, where that was done before.
-
-    Raises
-    ------
-    InputError
-        If the model has a rate ramp.
+    model: With open parameters.
+    estimate: ``estimate(model, wv) -> Fit`` of a method.
+    whole: The model fitted to all recordings, where that was done before.
+    Raises InputError if the model has a rate ramp.
     """
     if any(term.is_drift for term in model.terms) and len(parts) > 1:
         raise InputError(

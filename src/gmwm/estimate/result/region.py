@@ -10,16 +10,10 @@ from fractions import Fraction
 class Region:
     """A straight part of the log-log Allan plot from which a parameter was read.
 
-    Attributes
-    ----------
-    key : str
-        The parameter.
-    slope : float
-        Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
-    tau_min, tau_max : float
-        First and last averaging time of the region, s.
-    coefficient : float
-        Of the line ``coefficient * tau^slope``, u/s^slope.
+    key: The parameter.
+    slope: Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
+    tau_min, tau_max: First and last averaging time of the region, s.
+    coefficient: Of the line ``coefficient * tau^slope``, u/s^slope.
     """
 
     key: str

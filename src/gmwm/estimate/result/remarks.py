@@ -201,14 +201,9 @@ def undetermined_notices(model: Model, keys: Sequence[str], matrix: FloatArray) 
 def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> list[Notice]:
     """What it means for prediction that a model misses an averaging time.
 
-    Parameters
-    ----------
-    goodness : Goodness
-    discrepancy : float
-        Relative error of the variances that was allowed for.
-    failed : bool
-        Whether the chi-square test failed. If not, a misfit is bad that fewer than one in twenty
-        right models have at any level: of six axes with right models nearly one would have a
+    discrepancy: Relative error of the variances that was allowed for.
+    failed: Whether the chi-square test failed. If not, a misfit is bad that fewer than one in
+        twenty right models have at any level: of six axes with right models nearly one would have a
         smaller one, which is chance.
     """
     beyond = goodness.beyond_chance

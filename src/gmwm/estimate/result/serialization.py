@@ -47,10 +47,7 @@ def plain(value: float) -> float | None:
 def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a fit, from what `fit_content` made and `FitForm` checked.
 
-    Raises
-    ------
-    InputError
-        If parts of it do not belong together.
+    Raises InputError if parts of it do not belong together.
     """
     model = model_from_list(content["model"])
     params = {key: value or 0.0 for key, value in model.params.items()}

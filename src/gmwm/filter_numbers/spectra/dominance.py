@@ -33,17 +33,11 @@ TIGHTEST = "N+K+GM"
 class Problem:
     """Spectra to dominate by one set of numbers, and how it is judged.
 
-    Attributes
-    ----------
-    targets : tuple of Target
-        Of one axis, or of several that share the numbers: the objective.
-    horizon : float
-        s.
-    region : tuple of Target
-        What has to be dominated, where that is not the targets alone, but all that lies between
+    targets: Of one axis, or of several that share the numbers: the objective.
+    horizon: s.
+    region: What has to be dominated, where that is not the targets alone, but all that lies between
         these.
-    lowest : float
-        Frequency from which on they are dominated, Hz; by default all are.
+    lowest: Frequency from which on they are dominated, Hz; by default all are.
     """
 
     targets: tuple[Target, ...]
@@ -95,17 +89,10 @@ class Problem:
 def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """The smallest model of a form whose spectrum lies above those of a problem.
 
-    Parameters
-    ----------
-    problem : Problem
-    form : {"N+K", "N+GM", "N+K+GM"}
-    tau : float, optional
-        Correlation time of the Gauss-Markov process, s; that of the smallest model by default.
-
-    Raises
-    ------
-    InputError
-        If the form cannot dominate: "N+GM" where a spectrum has no limit at zero frequency.
+    form: {"N+K", "N+GM", "N+K+GM"}.
+    tau: Correlation time of the Gauss-Markov process, s; that of the smallest model by default.
+    Raises InputError if the form cannot dominate: "N+GM" where a spectrum has no limit at zero
+        frequency.
     """
     kinds = KINDS[form]
     if "K" not in kinds and not all(target.is_stationary for target in problem.dominated):

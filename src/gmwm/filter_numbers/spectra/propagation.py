@@ -27,12 +27,7 @@ _STEP = 1e-3  # standard errors
 class Estimated:
     """A model, and the errors of some of its parameters.
 
-    Attributes
-    ----------
-    model : Model
-    keys : tuple of str
-    covariance : (p, p) ndarray
-        Of these parameters, in products of their units.
+    covariance: (p, p), of these parameters, in products of their units.
     """
 
     model: Model
@@ -54,13 +49,8 @@ def standard_errors(
 ) -> dict[str, float]:
     """Standard errors of the amplitudes of a bound, by their keys.
 
-    Parameters
-    ----------
-    problem : Problem
-    model : Model
-        That dominates it.
-    estimates : sequence of Estimated
-        One a target, independent of each other.
+    model: That dominates it.
+    estimates: One a target, independent of each other.
     """
     terms = [term.with_amplitude(1.0) for term in model.terms]
     columns = columns_of(problem, terms)

@@ -26,15 +26,9 @@ class ParameterRegion:
     Amplitudes that are not significantly above zero are at their upper bounds, and rate ramps at
     their estimates.
 
-    Attributes
-    ----------
-    model : Model
-        The estimate, with such amplitudes at their bounds.
-    keys : tuple of str
-    lower, upper : (p,) ndarray
-        Ends of the parameters.
-    root : (p, p) ndarray
-        Of the correlation: rows have length 1.
+    model: The estimate, with such amplitudes at their bounds.
+    lower, upper: (p,), ends of the parameters.
+    root: (p, p), of the correlation: rows have length 1.
     """
 
     model: Model
@@ -47,10 +41,7 @@ class ParameterRegion:
     def of(cls, fit: Fit, level: float) -> ParameterRegion:
         """That of a fit at a level.
 
-        Raises
-        ------
-        InputError
-            If the data bound a parameter in no way.
+        Raises InputError if the data bound a parameter in no way.
         """
         drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
         place = [
@@ -103,17 +94,8 @@ def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]
 
     They are drawn, or found by search at frequencies on a grid.
 
-    Parameters
-    ----------
-    target : Target
-        That of the estimate.
-    fit : Fit
-    level : float
-
-    Raises
-    ------
-    InputError
-        If the data bound a parameter in no way.
+    target: That of the estimate.
+    Raises InputError if the data bound a parameter in no way.
     """
     region = ParameterRegion.of(fit, level)
     dt = target.dt

@@ -19,24 +19,14 @@ from gmwm.process import Model, Process, evaluated
 class Target:
     """The part of an error model that is dominated.
 
-    Attributes
-    ----------
-    terms : tuple of Process
-        Those that count with their whole spectrum.
-    foot : float
-        Low-frequency density of terms that are peaks at high frequencies, u^2/Hz.
-    constant_sd : float
-        Of ramps over the horizon, u.
-    dt, horizon : float
-        Sampling interval and horizon, s.
-    lowest : float
-        Frequency below which nothing changes, Hz.
-    floor : float
-        Frequency above which a spectrum without a limit is bounded in time: that of the horizon.
-    slope : float
-        Of the spectrum against 1/f at the lowest frequency, on logarithmic axes: 0 if it is flat,
-        2 of a random walk.
-    notices : tuple of Notice
+    terms: Those that count with their whole spectrum.
+    foot: Low-frequency density of terms that are peaks at high frequencies, u^2/Hz.
+    constant_sd: Of ramps over the horizon, u.
+    dt, horizon: Sampling interval and horizon, s.
+    lowest: Frequency below which nothing changes, Hz.
+    floor: Frequency above which a spectrum without a limit is bounded in time: that of the horizon.
+    slope: Of the spectrum against 1/f at the lowest frequency, on logarithmic axes: 0 if it is
+        flat, 2 of a random walk.
     """
 
     terms: tuple[Process, ...]
@@ -53,10 +43,7 @@ class Target:
     def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> Target:
         """Sort the terms of a model with given parameters; the unit is for what notices say.
 
-        Raises
-        ------
-        InputError
-            If a term is known by simulation only, or nothing is left.
+        Raises InputError if a term is known by simulation only, or nothing is left.
         """
         nyquist = 0.5 / dt
         fast = min(tuning.FAST / horizon, 0.25 * nyquist)

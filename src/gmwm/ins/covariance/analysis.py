@@ -95,13 +95,9 @@ class Analysis:
 class Course:
     """A scenario cut into steps of the covariance: what does not depend on the models.
 
-    Attributes
-    ----------
-    scenario : Scenario
-    outputs : Outputs
-    epoch, samples : (S + 1,) ndarray of int
-    mid_matrix, mid_v, mid_lla, end_matrix, end_v, end_rate : ndarray
-        See `gmwm.ins.covariance.analysis_kernels.run_both`.
+    epoch, samples: (S + 1,) of int.
+    mid_matrix, mid_v, mid_lla, end_matrix, end_v, end_rate: See
+        `gmwm.ins.covariance.analysis_kernels.run_both`.
     """
 
     scenario: Scenario

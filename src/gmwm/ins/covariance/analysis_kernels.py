@@ -35,21 +35,14 @@ def update_jointly(
 ) -> None:  # fmt: skip
     """Update the joint second moments by a scalar measurement with a given gain, in place.
 
-    Parameters
-    ----------
-    J : (N, N) ndarray
-    h : (9,) ndarray
-        Row of the navigation errors.
-    estimate, truth : int
-        Places of the estimated and the true coloured noise of the measurement; -1 for none.
-    variance : float
-        Of the measurement's white noise.
-    gain : (9 + m,) ndarray
-        The filter's.
-    m : int
-        Number of the filter's sensor states.
-    a, k : (N,) ndarray
-        Work space.
+    J: (N, N).
+    h: (9,), row of the navigation errors.
+    estimate, truth: Places of the estimated and the true coloured noise of the measurement; -1 for
+        none.
+    variance: Of the measurement's white noise.
+    gain: (9 + m,), the filter's.
+    m: Number of the filter's sensor states.
+    a, k: (N,), work space.
     """
     n = J.shape[0]
     for j in range(n):
@@ -92,23 +85,16 @@ def run_both(
 ) -> None:  # fmt: skip
     """Propagate a filter's covariance and the joint second moments through a scenario.
 
-    Parameters
-    ----------
-    epoch, samples : (S + 1,) ndarray of int
-        Epochs at which something is asked for or a step ends, and samples of the step that leads
-        there (none to the first).
-    mid_matrix, mid_v, mid_lla : ndarray
-        True attitude, velocity and position in the middle of each step.
-    end_matrix, end_v, end_rate : ndarray
-        Attitude, velocity and angular rate (body axes, rad/s) at each epoch.
-    P, axis, ..., coloured : ndarray
-        Of the filter, as in `gmwm.ins.filter.filter_kernels.run`.
-    J, j_axis, ..., j_coloured : ndarray
-        Of the joint vector; ``j_coloured`` are the places of the true coloured noise.
-    event_epoch, ..., out_before
-        As in `gmwm.ins.filter.filter_kernels.run`.
-    out_P : (K, 9 + m, 9 + m), out_J : (K, N, N) ndarray
-        Results.
+    epoch, samples: (S + 1,) of int, epochs at which something is asked for or a step ends, and
+        samples of the step that leads there (none to the first).
+    mid_matrix, mid_v, mid_lla: True attitude, velocity and position in the middle of each step.
+    end_matrix, end_v, end_rate: Attitude, velocity and angular rate (body axes, rad/s) at each
+        epoch.
+    P, axis, ..., coloured: Of the filter, as in `gmwm.ins.filter.filter_kernels.run`.
+    J, j_axis, ..., j_coloured: Of the joint vector; ``j_coloured`` are the places of the true
+        coloured noise.
+    event_epoch, ..., out_before: As in `gmwm.ins.filter.filter_kernels.run`.
+    out_P: (K, 9 + m, 9 + m), out_J : (K, N, N), results.
     """
     n, size, m = P.shape[0], J.shape[0], axis.size
     F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))

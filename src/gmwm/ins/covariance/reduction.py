@@ -41,18 +41,12 @@ _LOITER = Notice(
 class ReducedError:
     """Horizontal position error at the end of an outage, 1 sigma, m.
 
-    Attributes
-    ----------
-    duration : float
-        Of the outage, s.
-    full : float
-        True error of the filter with the full model.
-    read_off, read_off_predicted : float
-        True and predicted error with the reduced model as it is read off an Allan plot.
-    reduced, reduced_predicted : float
-        The same with the reduced model that was found.
-    nees : float
-        Expected normalised error squared of the position, per degree of freedom, with the reduced
+    duration: Of the outage, s.
+    full: True error of the filter with the full model.
+    read_off, read_off_predicted: True and predicted error with the reduced model as it is read off
+        an Allan plot.
+    reduced, reduced_predicted: The same with the reduced model that was found.
+    nees: Expected normalised error squared of the position, per degree of freedom, with the reduced
         model.
     """
 
@@ -190,13 +184,9 @@ def reduce(
 def read_off(models: SensorModels, form: str, longest: float, dt: float) -> SensorModels:
     """Reduced models as they are read off the Allan deviation of full ones; see `Reduction`.
 
-    Parameters
-    ----------
-    form : {"N+K", "N+GM"}
-    longest : float
-        Longest outage, s.
-    dt : float
-        Sampling interval, s.
+    form: {"N+K", "N+GM"}.
+    longest: Longest outage, s.
+    dt: Sampling interval, s.
     """
     reduced, bias_sd = {}, {}
     tau = dt * 2.0 ** np.arange(np.ceil(np.log2(10.0 * longest / dt)) + 1)
@@ -238,19 +228,11 @@ def with_outages(
 ) -> Scenario:
     """A motion with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
-    Parameters
-    ----------
-    lengths : sequence of float
-        Of the outages, s, with two minutes before each.
-    trajectory : Trajectory, optional
-        By default a loiter of a fixed-wing aircraft.
-    dt : float, optional
-        Sampling interval of the IMU of the loiter, s.
-
-    Raises
-    ------
-    InputError
-        If a length is not positive, or not a multiple of ``dt``, or the trajectory is too short.
+    lengths: Of the outages, s, with two minutes before each.
+    trajectory: By default a loiter of a fixed-wing aircraft.
+    dt: Sampling interval of the IMU of the loiter, s.
+    Raises InputError if a length is not positive, or not a multiple of ``dt``, or the trajectory is
+        too short.
     """
     outages = []
     start = tuning.SETTLING

@@ -33,15 +33,8 @@ def in_seconds(path: Path) -> Iterator[tuple[Path, str]]:
     it is, with no name. Written dates are counted on the calendar that they are in: GPS time is
     ahead of UTC by the leap seconds.
 
-    Parameters
-    ----------
-    path : Path
-        ISO 8601 dates, or a solution of RTKLIB (``.pos``, dates or GPS weeks).
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or a date is none.
+    path: ISO 8601 dates, or a solution of RTKLIB (``.pos``, dates or GPS weeks).
+    Raises InputError if there is no such file, or a date is none.
     """
     existing_file(path)
     if path.suffix.lower() == ".gz":

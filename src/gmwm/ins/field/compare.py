@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -165,6 +166,11 @@ class Comparison:
             "verdict": self.verdict.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
         }  # fmt: skip
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page; see `gmwm.report.write_comparison_report`."""
+        written: Path = made_by("write_comparison_report", self, path)
+        return written
 
     def plot(self) -> Figure:
         """Errors at the end of each outage, and their ratios with intervals."""

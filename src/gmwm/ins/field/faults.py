@@ -29,18 +29,11 @@ _CONSTANT = frozenset({"time-offset", "lever-arm", "heading"})
 class Faults:
     """What explains the innovations of a log better than that all is right.
 
-    Attributes
-    ----------
-    found : tuple of Explanation
-        Each given those before it; empty if there is none.
-    alternatives : tuple of str
-        Codes that explain the log nearly as well as the first.
-    explained : bool
-        Whether the innovations agree with the filter, with these allowed for.
-    replay : Replay
-        The log with these allowed for.
-    resolution : dict
-        Constant error -> its standard error from this motion, s, m, rad.
+    found: Each given those before it; empty if there is none.
+    alternatives: Codes that explain the log nearly as well as the first.
+    explained: Whether the innovations agree with the filter, with these allowed for.
+    replay: The log with these allowed for.
+    resolution: Constant error -> its standard error from this motion, s, m, rad.
     """
 
     found: tuple[Explanation, ...]
@@ -55,10 +48,6 @@ class Faults:
 
         One after the other, the explanation is taken that makes the fixes most probable, as long as
         it is more than chance would give.
-
-        Parameters
-        ----------
-        whole : Replay
         """
         base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
         here, found = base, list[Explanation]()
@@ -91,12 +80,12 @@ class Faults:
         return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
 
 
-def contradicted(replay: Replay) -> bool:
+def contradicted(replay: Replay, level: float = LEVEL) -> bool:
     """Whether the innovations have another size than expected, or depend on those before."""
     if not np.isfinite(replay.log_likelihood):
         return True
     tests = [replay.test(kind) for kind in replay.kinds()]
-    return any(each.nis.p_value <= LEVEL or each.whiteness <= LEVEL for each in tests)
+    return any(each.nis.p_value <= level or each.whiteness <= level for each in tests)
 
 
 def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str]) -> list[Candidate]:
@@ -105,7 +94,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
     cleaned = outliers(here)
     if cleaned is not None:
         found.append(cleaned)
-    if contradicted(here) or any(each.gain > cost(1) for each in found):
+    if contradicted(here, tuning.SUSPECTED) or any(each.gain > cost(1) for each in found):
         sizes = [here.test(kind).nis.value for kind in here.kinds()]
         if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
             found += [far_heading(here), *wrong_signs(here)]

@@ -14,8 +14,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.calendar import in_seconds
-from gmwm.ins.field.fix_axes import check_axes
 from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs import (
     POSITION_WORDS,
     angle_factor,
@@ -48,17 +48,11 @@ _PASSED_OVER = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"}
 class FixLog:
     """GNSS fixes as a file says them.
 
-    Attributes
-    ----------
-    time : (E,) ndarray
-        On the receiver's clock, s.
-    position, velocity : (E, 3) ndarray or None
-        Latitude, longitude (rad), height (m); to the north, east and down (m/s); NaN where there
-        is none.
-    position_sd, velocity_sd : (E, 3) ndarray or None
-        To the north, east and down; ``None`` where the file has none.
-    source : str
-    notices : tuple of Notice
+    time: (E,), on the receiver's clock, s.
+    position, velocity: (E, 3) or None, latitude, longitude (rad), height (m); to the north, east
+        and down (m/s); NaN where there is none.
+    position_sd, velocity_sd: (E, 3) or None, to the north, east and down; ``None`` where the file
+        has none.
     """
 
     time: FloatArray
@@ -78,14 +72,9 @@ class FixLog:
     ) -> Aiding:
         """The fixes on the clock of an IMU.
 
-        Parameters
-        ----------
-        start : float, optional
-            Time of the IMU's first epoch, s.
-        position_sd, velocity_sd : three floats, optional
-            Where the file says none, m and m/s.
-        lever_arm : three floats, optional
-            From the IMU to the antenna, body axes, m.
+        start: Time of the IMU's first epoch, s.
+        position_sd, velocity_sd: Where the file says none, m and m/s.
+        lever_arm: From the IMU to the antenna, body axes, m.
         """
         fixes = []
         for kind, value, own, usual in (
@@ -169,7 +158,7 @@ def _read(table: CsvTable, scale: str) -> FixLog:
         notices.append(Notice("positions-at-zero", "warning", "", text, {"count": count}))
     time = found[TIME] * (stated_seconds(table.source, table.names[columns[TIME]]) or 1.0)
     if velocity is not None:
-        check_axes(table.source, time, position, velocity)
+        _check_axes(table.source, time, position, velocity)
     return FixLog(
         time=time,
         position=position,
@@ -186,21 +175,9 @@ def _read(table: CsvTable, scale: str) -> FixLog:
 def read_heights(path: str | os.PathLike[str]) -> tuple[str, FloatArray, FloatArray]:
     """Read heights of a barometer.
 
-    Parameters
-    ----------
-    path : str or path
-        Delimited text with columns time and height.
-
-    Returns
-    -------
-    source : str
-    time, height : (E,) ndarray
-        s and m; NaN where there is none.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used.
+    path: Delimited text with columns time and height.
+    Returns: source; time, height (E,), s and m; NaN where there is none.
+    Raises InputError if the file cannot be used.
     """
     with in_seconds(Path(path)) as (numbers, _):
         table = open_log(numbers)
@@ -317,3 +294,50 @@ def _deviations(
                 f"{found[name][bad[0]]:g}: give a number above zero for each fix"
             )
     return np.stack([found[name] for name in names], axis=1)
+
+
+def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: FloatArray) -> None:
+    """Refuse positions and velocities that go together with two columns exchanged only.
+
+    A filter would blame the sensors. How far the vehicle went by the positions is compared with the
+    integral of the velocities.
+
+    time: (E,), s.
+    position, velocity: (E, 3), latitude, longitude (rad), height (m); north, east, down (m/s); NaN
+        where there is none.
+    Raises InputError if the way by the velocities fits far better with an exchange.
+    """
+    there = np.all(np.isfinite(position) & np.isfinite(velocity), axis=1)
+    time, position, velocity = time[there], position[there], velocity[there]
+    if time.size < 2:
+        return
+    step = np.diff(time)[:, None]
+    gone = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step, axis=0)
+    gone = np.concatenate([np.zeros((1, 3)), gone])
+    holes = np.concatenate([[0], np.cumsum(step[:, 0] > tuning.CHORD)])
+    marks = np.searchsorted(time, np.arange(time[0], time[-1], tuning.WAY))
+    first, last = marks[:-1], marks[1:]
+    whole = holes[first] == holes[last]
+    first, last = first[whole], last[whole]
+    if first.size < tuning.FEWEST_WAYS:
+        return
+    by_velocity = gone[last] - gone[first]
+
+    def apart(here: FloatArray, way: FloatArray, part: slice) -> float:
+        off = (ned_difference(here[last], here[first]) - way)[:, part]
+        return float(np.median(np.sum(off**2, axis=1)))
+
+    level, vertical = slice(0, 2), slice(2, 3)
+    other = position[:, [1, 0, 2]]
+    tried = [
+        ("velocity north and east", level, position, by_velocity[:, [1, 0, 2]]),
+        ("velocity down and up", vertical, position, -by_velocity),
+    ]
+    if np.all(np.abs(other[:, 0]) < 0.5 * np.pi):
+        tried.append(("latitude and longitude", level, other, by_velocity))
+    for what, part, here, way in tried:
+        if apart(position, by_velocity, part) > tuning.MIXED_UP**2 * apart(here, way, part):
+            raise InputError(
+                f"{source}: positions go with velocities only if {what} are exchanged: check which "
+                "column is which"
+            )

@@ -37,13 +37,7 @@ _CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 class ImuLog:
     """An IMU record with the clock that it was stamped by.
 
-    Attributes
-    ----------
-    imu : Imu
-    start : float
-        Time of the first epoch on that clock, s; 0 without time stamps.
-    source : str
-    notices : tuple of Notice
+    start: Time of the first epoch on that clock, s; 0 without time stamps.
     """
 
     imu: Imu
@@ -151,7 +145,7 @@ class _Record:
         sign = np.array([-1.0 if axis in turned else 1.0 for axis in AXES])
         first = _checked(next(parts))
         samples = _samples(first, sign)
-        missing = {name: first[name].missing for name in AXES}
+        missing, noticed = {name: first[name].missing for name in AXES}, [*first.notices]
         spools: tuple[Spool, Spool] | None = None
         for part in parts:
             if spools is None:
@@ -159,12 +153,13 @@ class _Record:
                 _append(spools, samples)
             _append(spools, _samples(_checked(part), sign))
             missing = {name: count + part[name].missing for name, count in missing.items()}
+            noticed += part.notices
         if spools is None:
             return cls(
                 np.ascontiguousarray(samples[:, :3]), np.ascontiguousarray(samples[:, 3:]),
                 first.dt, first.source, first.notices,
             )  # fmt: skip
-        notices = notices_of_blocks(first, missing, spools[0].n)
+        notices = notices_of_blocks(noticed, missing, spools[0].n)
         return cls(spools[0].array(), spools[1].array(), first.dt, first.source, notices)
 
     def column(self, name: str) -> FloatArray:
@@ -229,10 +224,7 @@ def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
 def _fill(record: _Record) -> tuple[Notice, ...]:
     """Fill short holes along straight lines, in place.
 
-    Raises
-    ------
-    InputError
-        If one is too long, or at an end.
+    Raises InputError if one is too long, or at an end.
     """
     most = max(round(tuning.LONGEST_FILLED / record.dt), 1)
     longest = 0

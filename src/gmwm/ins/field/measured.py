@@ -237,10 +237,7 @@ def _with_barometer(
 ) -> tuple[Aiding, Notice]:
     """The fixes, and heights that are set to the first position fix.
 
-    Raises
-    ------
-    InputError
-        If no height is near that.
+    Raises InputError if no height is near that.
     """
     source, time, height = read_heights(folder / spec.file)
     time = time - log.start

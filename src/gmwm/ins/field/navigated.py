@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -42,15 +43,11 @@ _COLUMNS = (
 class Hole:
     """The longest time without a position fix.
 
-    Attributes
-    ----------
-    start, end : float
-        s since the filter's start.
-    sd : tuple of three floats
-        Predicted standard deviations of the position to the north, east and down before the fix
-        at its end, m; NaN if the filter diverged before.
-    distance : float or None
-        Horizontal distance of that fix from where it was expected, m; ``None`` if none follows.
+    start, end: s since the filter's start.
+    sd: Predicted standard deviations of the position to the north, east and down before the fix at
+        its end, m; NaN if the filter diverged before.
+    distance: Horizontal distance of that fix from where it was expected, m; ``None`` if none
+        follows.
     """
 
     start: float
@@ -186,7 +183,7 @@ class Navigated:
         return (
             self.solution.diverged_at is None
             and not self._misfits
-            and self._is_white
+            and not self.test().whiteness <= LEVEL  # NaN of too few
             and not self.faults.found
         )
 
@@ -197,11 +194,6 @@ class Navigated:
         tests["all"] = self.test().nis
         found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
         return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
-
-    @property
-    def _is_white(self) -> bool:
-        whiteness = self.test().whiteness
-        return bool(np.isnan(whiteness) or whiteness > LEVEL)
 
     @property
     def verdict(self) -> Notice:
@@ -290,41 +282,47 @@ class Navigated:
     # -- words and files --------------------------------------------------------------------------
 
     def __str__(self) -> str:
-        solution, imu = self.solution, self.measured.imu
+        imu = self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        for notice in (*self.measured.notices, *self.alignment.notices, *self.rejections):
+        for notice in self.notices:
             lines += wrapped(str(notice), "- ", 2)
-        if solution.diverged_at is not None:
-            at = float(self.clock(np.array([solution.diverged_at]))[0])
-            lines += wrapped(f"the filter diverged at {at:.10g} s and was stopped", "- ", 2)
         lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
-        for kind in self.kinds:
-            test = self.test(kind)
-            mark = " " if test.nis.within else "*"
-            lines.append(
-                f"{kind:10} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
-                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
-            )
+        lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest
-        lines += [f"largest: {far:.3g} sigma at {at:.10g} s", "", *self._accuracy(), ""]
-        lines += wrapped(self.verdict.text)
-        lines += ["", *wrapped(resolution_notice(self.faults).sentence)]
+        lines.append(f"largest: {far:.3g} sigma at {at:.10g} s")
+        for sentence in (*self.accuracy, self.verdict.text):
+            lines += ["", *wrapped(sentence)]
+        lines += ["", *wrapped(self.resolution.sentence)]
         return "\n".join(lines)
 
-    def _accuracy(self) -> list[str]:
-        lines = []
-        if self.solution.time.size and self.solution.diverged_at is None:
+    @property
+    def resolution(self) -> Notice:
+        """How small a constant error of the log this motion would show."""
+        return resolution_notice(self.faults)
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Of the files, of the start, and of fixes that were rejected."""
+        return (*self.measured.notices, *self.alignment.notices, *self.rejections)
+
+    @property
+    def accuracy(self) -> list[str]:
+        """What the filter predicts of its errors: at the end, and where fixes were missing."""
+        sentences = []
+        if self.solution.diverged_at is not None:
+            at = float(self.clock(np.array([self.solution.diverged_at]))[0])
+            sentences.append(f"The filter diverged at {at:.10g} s and was stopped")
+        elif self.solution.time.size:
             sd = self.solution.sd[-1]
             caveat = "" if self.fits else " (if its model were right, which it is not)"
-            lines += [
-                f"Predicted accuracy at the end, 1 sigma{caveat}",
-                f"horizontal {np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
-                f"{np.linalg.norm(sd[3:6]):.3g} m/s,",
-                f"tilt {np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "
-                f"{np.degrees(sd[8]):.3g} deg",
-                "",
-            ]
+            sentences.append(
+                f"Predicted accuracy at the end, 1 sigma{caveat}: horizontal "
+                f"{np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
+                f"{np.linalg.norm(sd[3:6]):.3g} m/s, tilt "
+                f"{np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "
+                f"{np.degrees(sd[8]):.3g} deg"
+            )
         hole = self.hole
         begin, end = self.clock(np.array([hole.start, hole.end]))
         text = (
@@ -338,7 +336,7 @@ class Navigated:
             )
         if hole.distance is not None:
             text += f"; the next fix was {hole.distance:.3g} m away (horizontal)"
-        return lines + wrapped(text)
+        return [*sentences, text]
 
     def to_dict(self) -> dict[str, Any]:
         """What was found, in JSON types: the verdict, faults, tests of the innovations."""
@@ -346,9 +344,9 @@ class Navigated:
             "title": self.measured.title,
             "verdict": self.verdict.to_dict(),
             "faults": [each.to_dict() for each in self.fault_notices],
-            "resolution": resolution_notice(self.faults).to_dict(),
+            "resolution": self.resolution.to_dict(),
             "notices": [
-                each.to_dict() for each in (*self.measured.notices, *self.alignment.notices)
+                each.to_dict() for each in self.notices
             ],
             "innovations": {
                 kind: {"nis": test.nis.value, "nis_p_value": test.nis.p_value,
@@ -381,6 +379,11 @@ class Navigated:
         return path
 
     # -- figures ----------------------------------------------------------------------------------
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page; see `gmwm.report.write_navigated_report`."""
+        page: Path = made_by("write_navigated_report", self, path)
+        return page
 
     def plot_track(self) -> Figure:
         """The solution's track and the fixes."""

@@ -34,16 +34,10 @@ from gmwm.ins.geometry import offset
 class Smoothed:
     """Positions and their covariance at K times.
 
-    Attributes
-    ----------
-    time : (K,) ndarray
-        s.
-    lla : (K, 3) ndarray
-        Latitude, longitude, rad, and height, m.
-    covariance : (K, 3, 3) ndarray
-        North, east, down, m^2.
-    solution : Solution
-        Of the filter, forwards.
+    time: (K,), s.
+    lla: (K, 3), latitude, longitude, rad, and height, m.
+    covariance: (K, 3, 3), north, east, down, m^2.
+    solution: Of the filter, forwards.
     """
 
     time: FloatArray
@@ -65,16 +59,8 @@ class _Update:
 def smooth(replay: Replay, at: FloatArray) -> Smoothed:
     """Smooth a log.
 
-    Parameters
-    ----------
-    replay : Replay
-    at : (K,) ndarray
-        Times that are wanted, s, rising; each is taken at the nearest sample.
-
-    Returns
-    -------
-    Smoothed
-        Where the forward filter diverged, NaN.
+    at: (K,), times that are wanted, s, rising; each is taken at the nearest sample.
+    Returns: NaN where the forward filter diverged.
     """
     imu, step = replay.imu, tuning.SMOOTHER_STEP
     ready = Filter.of(replay.models, replay.aiding, imu.dt, step)

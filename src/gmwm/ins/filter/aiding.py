@@ -127,15 +127,10 @@ class Fixes:
 class Events:
     """Fixes of all kinds in order of time, as the kernels take them.
 
-    Attributes
-    ----------
-    epoch, kind : (E,) ndarray of int
-        Of the nearest epoch of the IMU.
-    offset : (E,) ndarray
-        Time of the fix less that of its epoch, s; 0 where they are the same.
-    value, sd : (E, 3) ndarray
-    gate : (E,) ndarray
-        Normalised innovation squared beyond which a fix is rejected; infinite for none.
+    epoch, kind: (E,) of int, of the nearest epoch of the IMU.
+    offset: (E,), time of the fix less that of its epoch, s; 0 where they are the same.
+    value, sd: (E, 3).
+    gate: (E,), normalised innovation squared beyond which a fix is rejected; infinite for none.
     """
 
     epoch: IntArray

@@ -28,14 +28,9 @@ _FAST = {"contract", "reassoc", "nsz"}
 def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
     """Fill F (9, 9) of the navigation errors' equation ``dx/dt = F x + ...``.
 
-    Parameters
-    ----------
-    v : (3,) ndarray
-        Velocity to the north, east and down, m/s.
-    lla : (3,) ndarray
-        Latitude, longitude, rad, and height, m.
-    F : (9, 9) ndarray
-        Overwritten.
+    v: (3,), velocity to the north, east and down, m/s.
+    lla: (3,), latitude, longitude, rad, and height, m.
+    F: (9, 9), overwritten.
     """
     vn, ve, vd = v[0], v[1], v[2]
     sine, cosine = math.sin(lla[0]), math.cos(lla[0])
@@ -85,19 +80,12 @@ def transition(
 ) -> None:  # fmt: skip
     """Fill the transition of the navigation errors over a step, and the effect of the sensors.
 
-    Parameters
-    ----------
-    v, lla, C : ndarray
-        Velocity, position and attitude in the middle of the step.
-    step : float
-        s.
-    F : (9, 9) ndarray
-        Work space; the equation's matrix.
-    A : (9, 9) ndarray
-        Overwritten by ``I + F step + F^2 step^2 / 2``.
-    B : (9, 6) ndarray
-        Overwritten by the navigation error per unit of integrated sensor error (rad, m/s), which
-        is as good as made in the middle of the step.
+    v, lla, C: Velocity, position and attitude in the middle of the step.
+    step: s.
+    F: (9, 9), work space; the equation's matrix.
+    A: (9, 9), overwritten by ``I + F step + F^2 step^2 / 2``.
+    B: (9, 6), overwritten by the navigation error per unit of integrated sensor error (rad, m/s),
+        which is as good as made in the middle of the step.
     """
     error_rates(v, lla, F)
     half = 0.5 * step
@@ -139,18 +127,12 @@ def propagate(
 ) -> None:  # fmt: skip
     """Propagate a covariance over a step, in place.
 
-    Parameters
-    ----------
-    P : (9 + m, 9 + m) ndarray
-        Symmetric.
-    A, B : ndarray
-        From `transition`.
-    axis, partner : (m,) ndarray of int
-    phi, phi_off, gain, noise, noise_off, cross : (m,) ndarray
-    integral : (6,) ndarray
-        Rows of `gmwm.ins.filter.states.SensorStates` for the samples of the step.
-    S : (6, 9 + m), T : (9, 9 + m), U : (9, 6), row : (9 + m,) ndarray
-        Work space.
+    P: (9 + m, 9 + m), symmetric.
+    A, B: From `transition`.
+    axis, partner: (m,) of int.
+    phi, phi_off, gain, noise, noise_off, cross: (m,).
+    integral: (6,), rows of `gmwm.ins.filter.states.SensorStates` for the samples of the step.
+    S: (6, 9 + m), T : (9, 9 + m), U : (9, 6), row : (9 + m,), work space.
     """
     n = P.shape[0]
     m = n - 9
@@ -248,21 +230,11 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float
     tilt hardly changes from step to step, so root mean squares add up, not squares, until a fix
     corrects it; heights and standstills do not show it.
 
-    Parameters
-    ----------
-    P : (n, n) ndarray
-        Changed in place: variance of the vertical velocity error.
-    g : float
-        m/s^2.
-    step : float
-        s.
-    gathered : float
-        Root mean square of the velocity error of this kind since the last GNSS fix, m/s.
-
-    Returns
-    -------
-    gathered : float
-        After the step.
+    P: (n, n), changed in place: variance of the vertical velocity error.
+    g: m/s^2.
+    step: s.
+    gathered: Root mean square of the velocity error of this kind since the last GNSS fix, m/s.
+    Returns: ``gathered`` after the step.
     """
     north, east, both = P[6, 6], P[7, 7], P[6, 7]
     fourth = (north + east) ** 2 + 2.0 * (north * north + east * east) + 4.0 * both * both
@@ -281,14 +253,10 @@ def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
     of a precise fix, which must not be believed to the last centimetre then; after a few fixes,
     little is left of it.
 
-    Parameters
-    ----------
-    P : (n, n) ndarray
-    h : (9,) ndarray
-        As in `measurement_update`.
-    attitude : float
-        Variance of the attitude, its three axes together, before the measurements of the epoch,
-        rad^2.
+    P: (n, n).
+    h: (9,), as in `measurement_update`.
+    attitude: Variance of the attitude, its three axes together, before the measurements of the
+        epoch, rad^2.
     """
     total = 0.0
     for i in range(9):
@@ -305,25 +273,14 @@ def measurement_update(
 ) -> tuple[float, float]:  # fmt: skip
     """Update by one scalar measurement ``z = h x[:9] - x[state] + noise``, in place.
 
-    Parameters
-    ----------
-    P : (n, n) ndarray
-    h : (9,) ndarray
-        Of the navigation errors.
-    state : int
-        Index in ``x`` of a state of coloured measurement noise; -1 for none.
-    variance : float
-        Of the white noise of the measurement.
-    z : float
-        Estimate less measurement.
-    x : (n,) ndarray
-        Errors estimated so far at this epoch.
-    K : (n,) ndarray
-        Work space; holds the gain after the call.
-
-    Returns
-    -------
-    innovation, variance : float
+    P: (n, n).
+    h: (9,), of the navigation errors.
+    state: Index in ``x`` of a state of coloured measurement noise; -1 for none.
+    variance: Of the white noise of the measurement.
+    z: Estimate less measurement.
+    x: (n,), errors estimated so far at this epoch.
+    K: (n,), work space; holds the gain after the call.
+    Returns: innovation, variance.
     """
     n = P.shape[0]
     for j in range(n):

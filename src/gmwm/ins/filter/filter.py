@@ -66,22 +66,15 @@ class Filter:
     sensor errors sample by sample. The covariance is propagated in steps of ``stride`` samples, and
     at every epoch that has a measurement or a result.
 
-    Attributes
-    ----------
-    states : SensorStates
-    dt : float
-        Sampling interval of the IMU, s.
-    stride : int
-        Samples per step of the covariance.
-    coloured : (4,) ndarray of int
-        States of the coloured noise of GNSS positions to the north, east and down, and of
-        barometric heights; -1 for none.
-    lever_arm : (3,) ndarray
-        m.
-    second_order : bool
-        Whether products of errors are allowed for; without it the filter is linear: too sure of its
-        vertical channel where gyros are poor and accelerometers good, and of what precise fixes say
-        after a long outage; see `gmwm.ins.filter.covariance_kernels.tilt_squared` and ``excess``.
+    dt: Sampling interval of the IMU, s.
+    stride: Samples per step of the covariance.
+    coloured: (4,) of int, states of the coloured noise of GNSS positions to the north, east and
+        down, and of barometric heights; -1 for none.
+    lever_arm: (3,), m.
+    second_order: Whether products of errors are allowed for; without it the filter is linear: too
+        sure of its vertical channel where gyros are poor and accelerometers good, and of what
+        precise fixes say after a long outage; see `gmwm.ins.filter.covariance_kernels.tilt_squared`
+        and ``excess``.
     """
 
     states: SensorStates
@@ -141,22 +134,11 @@ class Filter:
     ) -> Solution:
         """Filter a record.
 
-        Parameters
-        ----------
-        imu : Imu
-            Of the filter's sampling interval.
-        initial : NavState
-            Estimate at the first epoch.
-        initial_sd : InitialSd
-        events : Events
-            Measurements.
-        outputs : Outputs
-            Epochs to be kept.
-
-        Raises
-        ------
-        InputError
-            If it starts closer than 1 deg to a pole.
+        imu: Of the filter's sampling interval.
+        initial: Estimate at the first epoch.
+        events: Measurements.
+        outputs: Epochs to be kept.
+        Raises InputError if it starts closer than 1 deg to a pole.
         """
         check_latitudes(initial.lla[None, :], "initial")
         table, m, kept = self.states, self.states.m, outputs.epoch.size
@@ -215,12 +197,9 @@ class Filter:
 class Outputs:
     """Epochs whose solution is kept.
 
-    Attributes
-    ----------
-    epoch : (K,) ndarray of int
-        In order.
-    before : (K,) ndarray of int
-        1 for the solution before the measurements of the epoch, 0 for that after them.
+    epoch: (K,) of int, in order.
+    before: (K,) of int, 1 for the solution before the measurements of the epoch, 0 for that after
+        them.
     """
 
     epoch: IntArray

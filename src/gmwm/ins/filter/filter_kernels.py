@@ -69,18 +69,11 @@ def propagated(
     Noise and sensor errors that gather over a part of a sampling interval are left out: they are
     far below the noise of any fix.
 
-    Parameters
-    ----------
-    C, v, lla : ndarray
-        Attitude, velocity and position at the epoch.
-    rate, force : (3,) ndarray
-        Angular rate and specific force about it, rad/s and m/s^2.
-    offset : float
-        s; negative for back in time.
-    C_at, v_at, lla_at : ndarray
-        Overwritten by the solution there.
-    F, A, B : ndarray
-        As in `transition`; A is overwritten by the transition.
+    C, v, lla: Attitude, velocity and position at the epoch.
+    rate, force: (3,), angular rate and specific force about it, rad/s and m/s^2.
+    offset: s; negative for back in time.
+    C_at, v_at, lla_at: Overwritten by the solution there.
+    F, A, B: As in `transition`; A is overwritten by the transition.
     """
     for i in range(3):
         v_at[i], lla_at[i] = v[i], lla[i]
@@ -152,51 +145,32 @@ def run(
 ) -> int:  # fmt: skip
     """Filter a record; returns the epoch at which it diverged, -1 at its end, or `PAUSED`.
 
-    Parameters
-    ----------
-    rotation, increment : (N, 3) ndarray
-        IMU increments, rad and m/s.
-    dt : float
-        s.
-    stride : int
-        Samples per step of the covariance.
-    C, v, lla, P, x : ndarray
-        Attitude, velocity, position, covariance (9 + m, 9 + m) and sensor states (m,) at the first
-        epoch; those at the last one after the call.
-    first : (7,) ndarray of int
-        Range of the states of each sensor.
-    axis, ..., integral : ndarray
-        As in `gmwm.ins.filter.states.SensorStates`.
-    coloured : (4,) ndarray of int
-        State of the coloured noise of the north, east and down position and of the barometric
-        height; -1 for none.
-    event_epoch, event_kind : (E,) ndarray of int
-        Measurements in order of time.
-    event_offset : (E,) ndarray
-        Times of the measurements less those of their epochs, s.
-    event_value, event_sd : (E, 3) ndarray
-    event_gate : (E,) ndarray
-        Normalised innovation squared beyond which a measurement is rejected.
-    lever : (3,) ndarray
-    second_order : bool
-        Whether products of errors are allowed for; see
+    rotation, increment: (N, 3), IMU increments, rad and m/s.
+    dt: s.
+    stride: Samples per step of the covariance.
+    C, v, lla, P, x: Attitude, velocity, position, covariance (9 + m, 9 + m) and sensor states (m,)
+        at the first epoch; those at the last one after the call.
+    first: (7,) of int, range of the states of each sensor.
+    axis, ..., integral: As in `gmwm.ins.filter.states.SensorStates`.
+    coloured: (4,) of int, state of the coloured noise of the north, east and down position and of
+        the barometric height; -1 for none.
+    event_epoch, event_kind: (E,) of int, measurements in order of time.
+    event_offset: (E,), times of the measurements less those of their epochs, s.
+    event_value, event_sd: (E, 3).
+    event_gate: (E,), normalised innovation squared beyond which a measurement is rejected.
+    lever: (3,).
+    second_order: Whether products of errors are allowed for; see
         `gmwm.ins.filter.covariance_kernels.tilt_squared` and ``excess``.
-    out_epoch : (K,) ndarray of int
-        Epochs to be kept, in order of time.
-    out_before : (K,) ndarray of int
-        1 for the state before the measurements of the epoch, 0 for that after them; at one epoch
-        those before come first.
-    out_nav : (K, 6), out_C : (K, 3, 3), out_P : (K, 9, 9), out_sensor : (K, 6), \
-out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray
-        Results; position and velocity, attitude, covariance, sums of sensor states and their
-        covariance; innovations of the components, each given those before it, with their standard
-        deviation.
-    used : (E,) ndarray of bool
-        Set to False where a measurement was rejected.
-    last : int
-        Epoch from which on the filter pauses, to go on with the next call.
-    place : (4 + kinds,) ndarray of int, carry : (7,) ndarray
-        Where it is and what it needs of the samples before: zeros at first.
+    out_epoch: (K,) of int, epochs to be kept, in order of time.
+    out_before: (K,) of int, 1 for the state before the measurements of the epoch, 0 for that after
+        them; at one epoch those before come first.
+    out_nav: out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray Results; position
+        and velocity, attitude, covariance, sums of sensor states and their covariance; innovations
+        of the components, each given those before it, with their standard deviation.
+    used: (E,) of bool, set to False where a measurement was rejected.
+    last: Epoch from which on the filter pauses, to go on with the next call.
+    place: (4 + kinds,) of int, carry : (7,) ndarray, where it is and what it needs of the samples
+        before: zeros at first.
     """
     n, m = P.shape[0], x.size
     n_samples, n_events, n_out = rotation.shape[0], event_epoch.size, out_epoch.size

@@ -21,14 +21,9 @@ def measurement_row(
 ) -> None:  # fmt: skip
     """Fill the row h (9,) of one component of a measurement.
 
-    Parameters
-    ----------
-    C, v : ndarray
-        Attitude and velocity.
-    rate : (3,) ndarray
-        Angular rate, body axes, rad/s.
-    lever : (3,) ndarray
-        From the IMU to the antenna, body axes, m.
+    C, v: Attitude and velocity.
+    rate: (3,), angular rate, body axes, rad/s.
+    lever: (3,), from the IMU to the antenna, body axes, m.
     """
     for i in range(9):
         h[i] = 0.0

@@ -31,29 +31,20 @@ NO_AXIS = -1
 class SensorStates:
     """m states of the six sensors, and what k samples do to them, for k = 0..k_max.
 
-    Attributes
-    ----------
-    names : tuple of str
-        E.g. ``"gyro_x: Gauss-Markov"``.
-    axis : (m,) ndarray of int
-        Sensor of `AXES` that each state adds to; `NO_AXIS` for none.
-    output : (m,) ndarray
-        Fraction of the state in the error of its sensor.
-    partner : (m,) ndarray of int
-        The other state of its block; itself if there is none.
-    mean : (m,) ndarray
-        Before the first sample; zero but for drifts that are known.
-    covariance : (m, m) ndarray
-    phi, phi_off : (k_max + 1, m) ndarray
-        ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
-    gain : (k_max + 1, m) ndarray
-        Integral of the sensor's error over k samples per unit of the state, s.
-    noise, noise_off : (k_max + 1, m) ndarray
-        Variance of the noise gathered over k samples, and its covariance with the partner.
-    cross : (k_max + 1, m) ndarray
-        Covariance of that noise with the noise in the integral of the sensor's error.
-    integral : (k_max + 1, 6) ndarray
-        Variance of the noise in the integral of each sensor's error, white noise included.
+    names: E.g. ``"gyro_x: Gauss-Markov"``.
+    axis: (m,) of int, sensor of `AXES` that each state adds to; `NO_AXIS` for none.
+    output: (m,), fraction of the state in the error of its sensor.
+    partner: (m,) of int, the other state of its block; itself if there is none.
+    mean: (m,), before the first sample; zero but for drifts that are known.
+    covariance: (m, m).
+    phi, phi_off: (k_max + 1, m), ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
+    gain: (k_max + 1, m), integral of the sensor's error over k samples per unit of the state, s.
+    noise, noise_off: (k_max + 1, m), variance of the noise gathered over k samples, and its
+        covariance with the partner.
+    cross: (k_max + 1, m), covariance of that noise with the noise in the integral of the sensor's
+        error.
+    integral: (k_max + 1, 6), variance of the noise in the integral of each sensor's error, white
+        noise included.
     """
 
     names: tuple[str, ...]
@@ -84,18 +75,9 @@ class SensorStates:
         A drift is a constant slope with a standard deviation of its size: how a sensor drifts
         depends on when it was switched on, and a calibration knows how fast, but not which way.
 
-        Parameters
-        ----------
-        sensors : SensorModels
-        dt : float
-        k_max : int
-        drift_known : bool, optional
-            Whether drifts start at zero and have their slopes exactly, as simulated ones do.
-
-        Raises
-        ------
-        InputError
-            If a term has no state-space form, or one of more than two states.
+        drift_known: Whether drifts start at zero and have their slopes exactly, as simulated ones
+            do.
+        Raises InputError if a term has no state-space form, or one of more than two states.
         """
         blocks: list[_Block] = []
         white = np.zeros(6)
@@ -108,15 +90,9 @@ class SensorStates:
     ) -> SensorStates:
         """These states, and some first-order Gauss-Markov ones that add to no inertial sensor.
 
-        Parameters
-        ----------
-        names : sequence of str
-        sigma : ndarray
-            Standard deviation of each.
-        tau : ndarray or float
-            Correlation times, s.
-        dt : float
-            Sampling interval, s.
+        sigma: Standard deviation of each.
+        tau: Correlation times, s.
+        dt: Sampling interval, s.
         """
         k = np.arange(len(self.phi))[:, None]
         extra, zeros = len(names), np.zeros((len(self.phi), len(names)))

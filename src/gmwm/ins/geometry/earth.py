@@ -40,10 +40,7 @@ _CENTRIFUGAL_RATIO = (
 def radii_at(sin_lat: float) -> tuple[float, float]:
     """Radii of curvature of the meridian and of the prime vertical, from the latitude's sine.
 
-    Returns
-    -------
-    meridian, transverse : float
-        m, on the ellipsoid. Groves (2013), eqs. 2.105 and 2.106.
+    Returns: meridian, transverse, m, on the ellipsoid. Groves (2013), eqs. 2.105 and 2.106.
     """
     shrink = 1.0 - ECCENTRICITY_SQUARED * (sin_lat * sin_lat)
     transverse = SEMI_MAJOR_AXIS / np.sqrt(shrink)
@@ -60,15 +57,8 @@ def radii(lat: float) -> tuple[float, float]:
 def gravity_at(sin_lat: float, h: float) -> float:
     """Normal gravity, from the latitude's sine.
 
-    Parameters
-    ----------
-    h : float
-        Height above the ellipsoid, m.
-
-    Returns
-    -------
-    float
-        Magnitude, m/s^2, taken to point down: Somigliana's formula (Groves 2013, eq. 2.134),
+    h: Height above the ellipsoid, m.
+    Returns: magnitude, m/s^2, taken to point down: Somigliana's formula (Groves 2013, eq. 2.134),
         continued to the height by the second-order free-air formula (eq. 2.139).
     """
     square = sin_lat * sin_lat
@@ -97,18 +87,11 @@ def radii_along(lat: FloatArray) -> tuple[FloatArray, FloatArray]:
 def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
     """Points minus reference points in metres to the north, east and down.
 
-    Parameters
-    ----------
-    lla : (n, 3) or (3,) ndarray
-        Latitude, longitude, rad, and height, m.
-    reference : (n, 3) or (3,) ndarray
-        The points to be subtracted.
-
-    Returns
-    -------
-    (n, 3) or (3,) ndarray
-        m, the shorter way across the date line. Radii of curvature are those half-way, so that the
-        error is of third order in the distance: about 1 mm over 10 km at middle latitudes.
+    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
+    reference: (n, 3) or (3,), the points to be subtracted.
+    Returns: (n, 3) or (3,), m, the shorter way across the date line. Radii of curvature are those
+        half-way, so that the error is of third order in the distance: about 1 mm over 10 km at
+        middle latitudes.
     """
     lla, reference = np.asarray(lla, dtype=float), np.asarray(reference, dtype=float)
     half_way = 0.5 * (lla + reference)
@@ -129,17 +112,9 @@ def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
 def offset(lla: FloatArray, ned: FloatArray) -> FloatArray:
     """Points moved by some metres to the north, east and down: `ned_difference` turned round.
 
-    Parameters
-    ----------
-    lla : (n, 3) or (3,) ndarray
-        Latitude, longitude, rad, and height, m.
-    ned : (n, 3) or (3,) ndarray
-        m.
-
-    Returns
-    -------
-    (n, 3) or (3,) ndarray
-        Latitude, longitude and height; the longitude may pass 180 deg.
+    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
+    ned: (n, 3) or (3,), m.
+    Returns: (n, 3) or (3,), latitude, longitude and height; the longitude may pass 180 deg.
     """
     lla, ned = np.asarray(lla, dtype=float), np.asarray(ned, dtype=float)
     h = lla[..., 2] - 0.5 * ned[..., 2]

@@ -54,19 +54,8 @@ def angles(C: FloatArray) -> tuple[float, float, float]:
 def rotation_coefficients(square: float) -> tuple[float, float, float]:
     """Factors of a rotation by an angle of which the square is given.
 
-    Parameters
-    ----------
-    square : float
-        Square of the angle a, rad^2.
-
-    Returns
-    -------
-    float
-        sin(a) / a
-    float
-        (1 - cos(a)) / a^2
-    float
-        (a - sin(a)) / a^3
+    square: Square of the angle a, rad^2.
+    Returns: sin(a) / a; (1 - cos(a)) / a^2; (a - sin(a)) / a^3.
     """
     if square < _SERIES_BELOW:
         # Products with constants: divisions would take most of the time.
@@ -162,14 +151,8 @@ def _exponentials(vectors: FloatArray, result: FloatArray) -> None:
 def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
     """Matrices C_bn (v_n = C_bn v_b) of roll, pitch and yaw.
 
-    Parameters
-    ----------
-    rpy : (..., 3) ndarray
-        rad.
-
-    Returns
-    -------
-    (..., 3, 3) ndarray
+    rpy: (..., 3), rad.
+    Returns: (..., 3, 3).
     """
     flat = np.ascontiguousarray(rpy, dtype=float).reshape(-1, 3)
     result = np.empty((len(flat), 3, 3))
@@ -180,14 +163,8 @@ def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
 def rpy_from_matrix(matrices: FloatArray) -> FloatArray:
     """Roll, pitch and yaw of matrices C_bn.
 
-    Parameters
-    ----------
-    matrices : (..., 3, 3) ndarray
-
-    Returns
-    -------
-    (..., 3) ndarray
-        rad; roll and yaw in [-pi, pi], roll 0 where the pitch is +-90 deg.
+    matrices: (..., 3, 3).
+    Returns: (..., 3), rad; roll and yaw in [-pi, pi], roll 0 where the pitch is +-90 deg.
     """
     flat = np.ascontiguousarray(matrices, dtype=float).reshape(-1, 3, 3)
     result = np.empty((len(flat), 3))
@@ -198,14 +175,8 @@ def rpy_from_matrix(matrices: FloatArray) -> FloatArray:
 def matrix_from_rotation_vector(vectors: FloatArray) -> FloatArray:
     """Rotation matrices exp([v cross]) of rotation vectors.
 
-    Parameters
-    ----------
-    vectors : (..., 3) ndarray
-        Axis times angle, rad.
-
-    Returns
-    -------
-    (..., 3, 3) ndarray
+    vectors: (..., 3), axis times angle, rad.
+    Returns: (..., 3, 3).
     """
     flat = np.ascontiguousarray(vectors, dtype=float).reshape(-1, 3)
     result = np.empty((len(flat), 3, 3))

@@ -44,10 +44,7 @@ _QUARTER = 0.5 * np.pi * (1.0 + 1e-9)
 def open_log(path: Path) -> CsvTable:
     """Look at the beginning of a delimited text.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is a directory, or no table.
+    Raises InputError if there is no such file, it is a directory, or no table.
     """
     return CsvTable.open(existing_file(path))
 
@@ -60,19 +57,10 @@ def find_columns(
 ) -> tuple[dict[str, int], list[str]]:
     """The column of each quantity, and the names of columns that are none.
 
-    Parameters
-    ----------
-    quantities : callable
-        What a column of a name holds; empty if it is something else.
-    needed : sequence of str
-        Quantities that there must be.
-    header : str
-        An example that has them.
-
-    Raises
-    ------
-    InputError
-        If two columns look like one quantity, or one that is needed has none.
+    quantities: What a column of a name holds; empty if it is something else.
+    needed: Quantities that there must be.
+    header: An example that has them.
+    Raises InputError if two columns look like one quantity, or one that is needed has none.
     """
     columns: dict[str, int] = {}
     unused = []
@@ -123,17 +111,9 @@ def place(table: CsvTable, column: int, row: int) -> str:
 def angle_factor(table: CsvTable, column: int, quantity: str, common: str | None) -> float:
     """What a column of angles is to be multiplied by to come to rad.
 
-    Parameters
-    ----------
-    quantity : str
-        For the message.
-    common : {"rad", "deg", None}
-        The unit if the name has none.
-
-    Raises
-    ------
-    InputError
-        If the unit is not known, or none of an angle.
+    quantity: For the message.
+    common: {"rad", "deg", None}, the unit if the name has none.
+    Raises InputError if the unit is not known, or none of an angle.
     """
     unit = unit_of(table.names[column]) or common
     where = f"{table.source}, column {label(table.names, column)}"
@@ -170,10 +150,7 @@ def check_angles(
 ) -> None:
     """Refuse what no such angle can be (rad): most often a wrong unit in the header.
 
-    Raises
-    ------
-    InputError
-        With the line of the first.
+    Raises InputError with the line of the first.
     """
     bad = np.flatnonzero(np.abs(angle) > limit)
     if bad.size:
@@ -186,10 +163,7 @@ def check_angles(
 def check_rising(table: CsvTable, column: int, stamps: FloatArray) -> None:
     """Refuse time stamps that do not rise.
 
-    Raises
-    ------
-    InputError
-        With the line of the first.
+    Raises InputError with the line of the first.
     """
     steps = np.diff(stamps)
     bad = np.flatnonzero(steps <= 0.0)

@@ -47,14 +47,9 @@ _LARGEST_ANGLE = 1e4  # rad; a log that counts turns stays far below
 class Log:
     """What a file says.
 
-    Attributes
-    ----------
-    dt : float
-        Sampling interval, s.
-    lla : (n + 1, 3) ndarray
-        Latitude, longitude, rad, and height, m.
-    rpy : (n + 1, 3) ndarray
-        Roll, pitch and yaw, rad.
+    dt: Sampling interval, s.
+    lla: (n + 1, 3), latitude, longitude, rad, and height, m.
+    rpy: (n + 1, 3), roll, pitch and yaw, rad.
     """
 
     dt: float
@@ -65,10 +60,8 @@ class Log:
 def read_log(path: Path) -> Log:
     """Read a log of a trajectory.
 
-    Raises
-    ------
-    InputError
-        If a column is missing, a value is missing or impossible, or the clock is not even.
+    Raises InputError if a column is missing, a value is missing or impossible, or the clock is not
+        even.
     """
     table = open_log(path)
     columns, _ = find_columns(table, _quantities, (TIME, *_ANGLES, "height"), _HEADER)

@@ -7,7 +7,11 @@ from gmwm.ins.montecarlo.consistency import (
     chi_square_ratio as chi_square_ratio,
     mean_ratio as mean_ratio,
 )
-from gmwm.ins.montecarlo.filter_errors import GROUPS as GROUPS, FilterErrors as FilterErrors
+from gmwm.ins.montecarlo.filter_errors import (
+    GROUPS as GROUPS,
+    FilterErrors as FilterErrors,
+    lag_one as lag_one,
+)
 from gmwm.ins.montecarlo.outage_errors import QUANTITIES as QUANTITIES
 from gmwm.ins.montecarlo.scenario import (
     ErrorSource as ErrorSource,

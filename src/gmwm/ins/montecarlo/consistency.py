@@ -6,6 +6,7 @@ Navigation*, sec. 5.4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,13 +26,8 @@ LEVELS = (0.5, 0.68, 0.95, 0.997)
 class Ratio:
     """A statistic that is 1 for a consistent filter.
 
-    Attributes
-    ----------
-    value : float
-    lower, upper : float
-        Band of 95 % in which it lies if the filter is consistent.
-    p_value : float
-        Two-sided probability of a value as far from 1, if it is.
+    lower, upper: Band of 95 % in which it lies if the filter is consistent.
+    p_value: Two-sided probability of a value as far from 1, if it is.
     """
 
     value: float
@@ -49,12 +45,7 @@ class Ratio:
 class Coverage:
     """How many errors lay within the predicted interval of a level.
 
-    Attributes
-    ----------
-    level : float
-    fraction : float
-    lower, upper : float
-        Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
+    lower, upper: Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
         *Biometrika* 26, 404-413), and over a time with as many draws as the scatter between the
         runs is worth (Korn & Graubard 1998, *Survey Methodology* 24, 193-201).
     """
@@ -111,21 +102,9 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
         Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
-    nees, coverage, rms, score = {}, {}, {}, {}
-    for i, (name, part) in enumerate(GROUPS.items()):
-        size = part.stop - part.start
-        squares = runs.nees[alive, index, i]
-        nees[name] = chi_square_ratio(squares, size)
-        standard = runs.error[alive, index, part] / runs.sd[alive, index, part]
-        coverage[name] = covered(standard)
-        rms[name] = _rms(standard)
-        score[name] = _score(squares, runs.log_det[alive, index, i], size)
-    if np.any(np.isfinite(runs.sensor_nees[alive, index])):
-        size = int(np.sum(np.all(runs.sensor_sd[alive, index] > 0.0, axis=0)))
-        nees["sensors"] = chi_square_ratio(runs.sensor_nees[alive, index], size)
-        standard = _standard_sensors(runs, alive, slice(index, index + 1))[:, 0]
-        coverage["sensors"], rms["sensors"] = covered(standard), _rms(standard)
-    return Consistency(nees, coverage, rms, score)
+    return _judged(
+        runs, alive, np.array([index]), chi_square_ratio, lambda standard: covered(standard[:, 0])
+    )
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
@@ -151,21 +130,34 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
             f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
         )
     alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
+    return _judged(
+        runs, alive, epochs, lambda squares, size: mean_ratio(np.mean(squares, axis=1) / size),
+        _covered_by_run,
+    )  # fmt: skip
+
+
+def _judged(
+    runs: FilterErrors, alive: np.typing.NDArray[np.bool_], epochs: np.typing.NDArray[np.intp],
+    sized: Callable[[FloatArray, int], Ratio],
+    counted: Callable[[FloatArray], tuple[Coverage, ...]],
+) -> Consistency:  # fmt: skip
+    """Of runs and epochs: ``sized`` makes the NEES of squares (R, K), ``counted`` the coverage."""
     nees, coverage, rms, score = {}, {}, {}, {}
     for i, (name, part) in enumerate(GROUPS.items()):
         size = part.stop - part.start
         squares = runs.nees[alive][:, epochs, i]
-        nees[name] = mean_ratio(np.mean(squares, axis=1) / size)
+        nees[name] = sized(squares, size)
         standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
-        coverage[name] = _covered_by_run(standard)
-        rms[name] = _rms(standard)
+        coverage[name], rms[name] = counted(standard), _rms(standard)
         score[name] = _score(squares, runs.log_det[alive][:, epochs, i], size)
     settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
     if np.any(alive) and settled.size:
-        size = int(np.sum(np.all(runs.sensor_sd[alive][:, settled] > 0.0, axis=(0, 1))))
-        nees["sensors"] = mean_ratio(np.mean(runs.sensor_nees[alive][:, settled], axis=1) / size)
-        standard = _standard_sensors(runs, alive, settled)
-        coverage["sensors"], rms["sensors"] = _covered_by_run(standard), _rms(standard)
+        # Of the sensors that have states.
+        error, sd = runs.sensor_error[alive][:, settled], runs.sensor_sd[alive][:, settled]
+        known = np.all(sd > 0.0, axis=(0, 1))
+        standard = np.asarray(error[..., known] / sd[..., known])
+        nees["sensors"] = sized(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
+        coverage["sensors"], rms["sensors"] = counted(standard), _rms(standard)
     return Consistency(nees, coverage, rms, score)
 
 
@@ -173,16 +165,17 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
 class InnovationTest:
     """What a filter can be asked where no truth is known.
 
-    Attributes
-    ----------
-    nis : Ratio
-        Normalised innovation squared per degree of freedom.
-    whiteness : float
-        p-value of no correlation from one fix to the next.
+    nis: Normalised innovation squared per degree of freedom.
+    whiteness: p-value of no correlation from one fix to the next.
     """
 
     nis: Ratio
     whiteness: float
+
+    def __str__(self) -> str:
+        mark = " " if self.nis.within else "*"
+        band = f"(band {self.nis.lower:.4f} .. {self.nis.upper:.4f})"
+        return f"{self.nis.value:>8.5g}{mark} {band}, p = {self.whiteness:.2g}"
 
 
 def innovation_test(runs: FilterErrors) -> InnovationTest:
@@ -271,17 +264,6 @@ def _ratio(total: float, dof: float) -> Ratio:
     )
     p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
     return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
-
-
-def _standard_sensors(
-    runs: FilterErrors,
-    alive: np.typing.NDArray[np.bool_],
-    epochs: slice | np.typing.NDArray[np.intp],
-) -> FloatArray:
-    """Standardised errors of the sensors that have states, (R, K, d)."""
-    error, sd = runs.sensor_error[alive][:, epochs], runs.sensor_sd[alive][:, epochs]
-    known = np.all(sd > 0.0, axis=(0, 1))
-    return np.asarray(error[..., known] / sd[..., known])
 
 
 def _rms(standard: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,10 +101,7 @@ def judged(
 ) -> dict[str, FloatArray]:
     """What is kept of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
 
-    Parameters
-    ----------
-    outputs : Outputs
-        The K epochs that were asked for.
+    outputs: The K epochs that were asked for.
     """
     done, total = solution.time.size, outputs.epoch.size
     error = solution.errors(truth)
@@ -134,7 +132,8 @@ def judged(
         full[:done] = values
         result[key] = full
     result["nis"] = np.array([np.sum(seen**2), float(seen.size)])
-    result["whiteness"] = np.array(_lag_one(solution))
+    kinds = solution.innovations.kind
+    result["whiteness"] = np.array(lag_one([standard[kinds == each] for each in np.unique(kinds)]))
     return result
 
 
@@ -156,14 +155,13 @@ def _normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, 
     return squares, log_det
 
 
-def _lag_one(solution: Solution) -> float:
-    """Autocorrelation of innovations from fix to fix, in its standard error if they are white."""
-    products = []
-    innovations = solution.innovations
-    for kind in np.unique(innovations.kind):
-        of_kind = innovations.standard[innovations.kind == kind]
-        products.append((of_kind[1:] * of_kind[:-1]).ravel())
-    together = np.concatenate(products) if products else np.zeros(0)
+def lag_one(parts: Sequence[FloatArray]) -> float:
+    """Autocorrelation of innovations from fix to fix, in its standard error if they are white.
+
+    parts: (E, 3), standardised innovations of each kind in order of time.
+    """
+    products = [np.zeros(0), *((part[1:] * part[:-1]).ravel() for part in parts)]
+    together = np.concatenate(products)
     together = together[np.isfinite(together)]
     scale = np.sqrt(np.sum(together**2))
     return float(np.sum(together) / scale) if scale > 0.0 else float("nan")

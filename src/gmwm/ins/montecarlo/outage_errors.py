@@ -22,11 +22,7 @@ QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude":
 class Spread:
     """Sizes of an error over the runs.
 
-    Attributes
-    ----------
-    mean, rms, median, p95 : float
-    predicted : float
-        Root mean square that the filter predicted.
+    predicted: Root mean square that the filter predicted.
     """
 
     mean: float
@@ -40,13 +36,8 @@ class Spread:
 class Difference:
     """A filter's mean error less that of another, in the same runs.
 
-    Attributes
-    ----------
-    value : float
-    lower, upper : float
-        Bootstrap interval of 95 % over the runs.
-    ratio, ratio_lower, ratio_upper : float
-        The same as a ratio of the root mean squares.
+    lower, upper: Bootstrap interval of 95 % over the runs.
+    ratio, ratio_lower, ratio_upper: The same as a ratio of the root mean squares.
     """
 
     value: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier
-from gmwm._core.text import wrapped
+from gmwm._core.text import made_by, wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -225,15 +226,7 @@ class Validation:
         return rows
 
     def _innovation_rows(self, width: int) -> list[str]:
-        rows = []
-        for name in self.names:
-            test = self.innovations(name)
-            mark = " " if test.nis.within else "*"
-            rows.append(
-                f"{name:{width}} {test.nis.value:>8.5g}{mark} (band {test.nis.lower:.4f} .. "
-                f"{test.nis.upper:.4f}), p = {test.whiteness:.2g}"
-            )
-        return rows
+        return [f"{name:{width}} {self.innovations(name)}" for name in self.names]
 
     def _difference_rows(self, width: int) -> list[str]:
         rows = [f"{'':{width}} {'ratio of RMS':<26}  difference of means [m], = if none"]
@@ -251,6 +244,11 @@ class Validation:
         return rows
 
     # -- figures ----------------------------------------------------------------------------------
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page; see `gmwm.report.write_validation_report`."""
+        written: Path = made_by("write_validation_report", self, path)
+        return written
 
     def plot_track(self) -> Figure:
         """The track with its outages and each filter's first run (Figure 7 of the paper)."""

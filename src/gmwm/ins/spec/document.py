@@ -17,10 +17,7 @@ _LARGEST = 1 << 20
 def read_document(path: Path) -> dict[str, Any]:
     """Content of a YAML file; keys without a value are left out.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, is not YAML or not a mapping, or has a key twice.
+    Raises InputError if it cannot be read, is not YAML or not a mapping, or has a key twice.
     """
     try:
         with opened(path) as stream:

@@ -56,10 +56,7 @@ class Spec(BaseModel):
     def parse(cls, given: Any, where: str = "") -> Self:
         """Check what was written.
 
-        Raises
-        ------
-        InputError
-            With the place of the first thing that cannot be used.
+        Raises InputError with the place of the first thing that cannot be used.
         """
         try:
             return cls.model_validate(given)
@@ -98,10 +95,7 @@ def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]
 def value(given: Any, si_unit: str) -> float:
     """A number in SI units, from a number or from text such as ``"140 deg/h"``.
 
-    Raises
-    ------
-    InputError
-        If it is not a finite number, or its unit is of another dimension.
+    Raises InputError if it is not a finite number, or its unit is of another dimension.
     """
     if checks.is_number(given):
         return _plausible(float(given), given)

@@ -145,18 +145,10 @@ Models = Annotated[
 def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
     """Models of six sensors from a mapping by axis or kind.
 
-    Parameters
-    ----------
-    given : mapping
-        ``gyro``, ``accel`` or an axis such as ``gyro_x`` -> mapping of N, K, Q, B, R to a value,
+    given: ``gyro``, ``accel`` or an axis such as ``gyro_x`` -> mapping of N, K, Q, B, R to a value,
         GM to a list of [sigma, tau], ``bias`` to the standard deviation of a constant.
-    where : str
-        For messages.
-
-    Raises
-    ------
-    InputError
-        If something is missing, unknown or not a number.
+    where: For messages.
+    Raises InputError if something is missing, unknown or not a number.
     """
     return ModelsSpec.parse(given, where).models()
 
@@ -164,10 +156,7 @@ def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
 def read_models(where: str, given: str | ModelsSpec, folder: Path) -> SensorModels:
     """Sensor models from what was written, or from a calibration.json relative to a folder.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be used, or lacks an axis.
+    Raises InputError if the file cannot be used, or lacks an axis.
     """
     if isinstance(given, ModelsSpec):
         return given.models()

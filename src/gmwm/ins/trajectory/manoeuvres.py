@@ -31,12 +31,8 @@ _LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
 class Plan:
     """What a manoeuvre does, its duration included; ``None`` where nothing changes.
 
-    Attributes
-    ----------
-    duration : float
-        s.
-    speed, heading, height : Pulse or None
-        Changes that begin with the manoeuvre: m/s, rad, m.
+    duration: s.
+    speed, heading, height: Changes that begin with the manoeuvre: m/s, rad, m.
     """
 
     duration: float
@@ -342,14 +338,9 @@ def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[
 class Pulse:
     """A change of a quantity.
 
-    Attributes
-    ----------
-    change : float
-        By how much, signed.
-    limit : float
-        Largest rate, unit of the quantity per second; a change too small for it has a lower one.
-    ramp : float
-        Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
+    change: By how much, signed.
+    limit: Largest rate, unit of the quantity per second; a change too small for it has a lower one.
+    ramp: Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
         which two derivatives vanish at both ends.
     """
 

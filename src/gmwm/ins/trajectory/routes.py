@@ -117,14 +117,9 @@ def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
 def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, float]:
     """How far a turn leads to the north and east, m.
 
-    Parameters
-    ----------
-    turn : Pulse
-        Change of the heading, rad.
-    heading : float
-        Before the turn, rad.
-    speed : float
-        m/s.
+    turn: Change of the heading, rad.
+    heading: Before the turn, rad.
+    speed: m/s.
     """
     time = np.linspace(0.0, turn.duration, _TURN_POINTS)
     along = heading + turn.value(time)

@@ -23,16 +23,9 @@ def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
 def unwrapped_angles(rpy: FloatArray) -> FloatArray:
     """Roll, pitch and yaw that do not jump at +-180 deg.
 
-    Parameters
-    ----------
-    rpy : (n + 1, 3) ndarray
-        rad.
-
-    Raises
-    ------
-    InputError
-        If roll or yaw turn by more than 90 deg between epochs all the same, as where the body
-        points straight up or down.
+    rpy: (n + 1, 3), rad.
+    Raises InputError if roll or yaw turn by more than 90 deg between epochs all the same, as where
+        the body points straight up or down.
     """
     result = np.unwrap(np.asarray(rpy, dtype=float), axis=0)
     result[:, 1] = rpy[:, 1]
@@ -50,17 +43,10 @@ def unwrapped_angles(rpy: FloatArray) -> FloatArray:
 def coefficients(values: FloatArray, dt: float) -> FloatArray:
     """Polynomials of the spline through evenly spaced values.
 
-    Parameters
-    ----------
-    values : (n + 1, 3) ndarray
-    dt : float
-        s.
-
-    Returns
-    -------
-    (n, 3, 4) ndarray
-        For each interval and column the coefficients of 1, t, t^2, t^3, with t in s from the
-        beginning of the interval.
+    values: (n + 1, 3).
+    dt: s.
+    Returns: (n, 3, 4), for each interval and column the coefficients of 1, t, t^2, t^3, with t in s
+        from the beginning of the interval.
     """
     spline = CubicSpline(np.arange(len(values)) * dt, values, axis=0)
     return np.ascontiguousarray(np.transpose(spline.c[::-1], (1, 2, 0)))
@@ -69,17 +55,9 @@ def coefficients(values: FloatArray, dt: float) -> FloatArray:
 def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
     """Velocity along a track.
 
-    Parameters
-    ----------
-    lla : (n + 1, 3) ndarray
-        Latitude, longitude without jumps, rad, and height, m.
-    dt : float
-        s.
-
-    Returns
-    -------
-    (n + 1, 3) ndarray
-        To the north, east and down, m/s.
+    lla: (n + 1, 3), latitude, longitude without jumps, rad, and height, m.
+    dt: s.
+    Returns: (n + 1, 3), to the north, east and down, m/s.
     """
     # Relative to the first epoch fewer digits are lost in the differences.
     spline = CubicSpline(np.arange(len(lla)) * dt, lla - lla[0], axis=0)
@@ -95,20 +73,12 @@ def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
 def smoothed(values: FloatArray, dt: float, cutoff: float) -> FloatArray:
     """Least-squares cubic spline with evenly spaced knots: what moves faster is left out.
 
-    Parameters
-    ----------
-    values : (n + 1, 3) ndarray
-        Without jumps.
-    dt : float
-        s.
-    cutoff : float
-        Hz. Knots are half its period apart; with less than two samples from knot to knot, nothing
-        is left out.
-
-    Returns
-    -------
-    (n + 1, 3) ndarray
-        Values of the spline. de Boor (1978), *A Practical Guide to Splines*, ch. XIV.
+    values: (n + 1, 3), without jumps.
+    dt: s.
+    cutoff: Hz. Knots are half its period apart; with less than two samples from knot to knot,
+        nothing is left out.
+    Returns: (n + 1, 3), values of the spline. de Boor (1978), *A Practical Guide to Splines*, ch.
+        XIV.
     """
     n = len(values) - 1
     spans = max(round(2.0 * cutoff * n * dt), 1)

@@ -191,9 +191,7 @@ class Trajectory:
 def check_latitudes(lla: FloatArray, name: str) -> None:
     """Refuse positions near the poles, where north and east turn too fast.
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     bad = np.flatnonzero(~(np.abs(lla[:, 0]) <= HIGHEST_LATITUDE))
     if bad.size:
@@ -213,10 +211,7 @@ def _rows_of_three(values: object, name: str) -> FloatArray:
 def finite_numbers(values: object, name: str) -> FloatArray:
     """An array of finite numbers.
 
-    Raises
-    ------
-    InputError
-        With the row of the first that is not finite.
+    Raises InputError with the row of the first that is not finite.
     """
     array = np.ascontiguousarray(real_numbers(values, name))
     for part in windows(len(array)):

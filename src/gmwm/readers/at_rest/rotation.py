@@ -19,14 +19,9 @@ _ROWS = 1 << 16  # at a time
 class TurningGravity:
     """Changes of the specific force against those that the angular rate explains.
 
-    Attributes
-    ----------
-    factor : float
-        Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
-    explained : float
-        Share of the squared changes that the prediction explains: zero for noise.
-    change : float
-        Root mean square of the predicted changes, m/s^2.
+    factor: Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
+    explained: Share of the squared changes that the prediction explains: zero for noise.
+    change: Root mean square of the predicted changes, m/s^2.
     """
 
     factor: float
@@ -45,14 +40,7 @@ def triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
 def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
     """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
 
-    Parameters
-    ----------
-    axes : sequence of (n,) ndarray
-    size : int
-
-    Returns
-    -------
-    (n // size, axes) ndarray
+    Returns: (n // size, axes).
     """
     return np.stack([_means(values, size) for values in axes], axis=1)
 
@@ -72,18 +60,9 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
     accelerometers are independent, so that they explain nothing of each other; a factor other than
     one is that of a wrong unit. The mean of the rate, which is mostly bias, is left out.
 
-    Parameters
-    ----------
-    recording : Recording
-    size : int
-        Samples of the blocks, between the means of which changes are compared.
-    parts : int, optional
-        Of the record, of which each is compared for itself; the medians are returned.
-
-    Returns
-    -------
-    TurningGravity or None
-        None if an axis is missing or nothing changes.
+    size: Samples of the blocks, between the means of which changes are compared.
+    parts: Of the record, of which each is compared for itself; the medians are returned.
+    Returns: None if an axis is missing or nothing changes.
     """
     rate, force = triad(recording, "gyro"), triad(recording, "accel")
     if rate is None or force is None or recording.n < 4 * size:
@@ -111,15 +90,15 @@ def _integral_means(
     """Means over blocks of the sum of w x a, some blocks at a time: memory is that of the means."""
     middle = [np.nanmedian(column) for column in rate]
     rows = size * max(_ROWS // size, 1)
-    total, means = np.zeros((1, 3)), []
+    total, means = np.zeros(3), []
     for start in range(0, rate[0].size // size * size, rows):
         part = slice(start, min(start + rows, rate[0].size // size * size))
-        w = np.stack([column[part] - m for column, m in zip(rate, middle, strict=True)], axis=1)
-        a = np.stack([column[part] for column in force], axis=1)
-        change = np.cross(np.nan_to_num(w), np.nan_to_num(a))
-        integral = np.cumsum(np.concatenate([total, change]), axis=0)
-        means.append(integral[1:].reshape(-1, size, 3).mean(axis=1))
-        total = integral[-1:]
+        w = [column[part] - m for column, m in zip(rate, middle, strict=True)]
+        a = [column[part] for column in force]
+        change = np.nan_to_num([w[i - 2] * a[i - 1] - w[i - 1] * a[i - 2] for i in range(3)])
+        integral = np.cumsum(change, axis=1, out=change) + total[:, None]
+        means.append(integral.reshape(3, -1, size).mean(axis=2).T)
+        total = integral[:, -1]
     return np.concatenate(means)
 
 
@@ -129,16 +108,8 @@ def steady_turn(recording: Recording, size: int) -> float:
     The constant rate w of da/dt = -w x a by least squares, from changes over several times. Noise
     and drifts have none that explains most of the changes and turns by a radian in all.
 
-    Parameters
-    ----------
-    recording : Recording
-    size : int
-        Samples of the blocks whose means are compared.
-
-    Returns
-    -------
-    float
-        rad/s; 0 if there is none, or an axis is missing.
+    size: Samples of the blocks whose means are compared.
+    Returns: rad/s; 0 if there is none, or an axis is missing.
     """
     force = triad(recording, "accel")
     if force is None:

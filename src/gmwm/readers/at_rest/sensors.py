@@ -36,19 +36,10 @@ def rest_notices(
     Only what contradicts what was assumed and agrees with something else counts: an accelerometer
     may have no gravity (of data without it), and a gyro may turn.
 
-    Parameters
-    ----------
-    unit_of : mapping of str to str
-        Unit of each channel in the file.
-    given : mapping of str to str
-        Units that the user gave, by channel or sensor.
-    are_columns_given : bool
-        Whether the user said which column is which channel.
-
-    Raises
-    ------
-    InputError
-        If the unit of the accelerometer or the columns are wrong, and were not given.
+    unit_of: Unit of each channel in the file.
+    given: Units that the user gave, by channel or sensor.
+    are_columns_given: Whether the user said which column is which channel.
+    Raises InputError if the unit of the accelerometer or the columns are wrong, and were not given.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
     swapped = _swapped(recording, rate, force, are_columns_given)
@@ -60,19 +51,12 @@ def rest_notices(
 class _Sensor:
     """Three axes in one unit: their mean and their noise.
 
-    Attributes
-    ----------
-    unit : str
-        In the file.
-    size : float
-        Length of the mean vector, SI.
-    scatter : float
-        Standard deviation of the fast noise of an axis, SI.
-    density : float
-        White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a second
-        leave, so that neither a filter's band nor a drift counts.
-    size_error : float
-        Standard deviation of the length from the fast noise, SI.
+    unit: In the file.
+    size: Length of the mean vector, SI.
+    scatter: Standard deviation of the fast noise of an axis, SI.
+    density: White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a
+        second leave, so that neither a filter's band nor a drift counts.
+    size_error: Standard deviation of the length from the fast noise, SI.
     """
 
     def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:

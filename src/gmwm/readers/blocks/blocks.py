@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
@@ -13,7 +14,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.clock import agree, is_time_of_day, seconds_of_day
+from gmwm.readers.clock import agree
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
@@ -63,25 +64,13 @@ def read_blocks(
 ) -> Iterator[Recording]:
     """Read a static recording a block at a time, as `gmwm.read` does as a whole.
 
-    Parameters
-    ----------
-    path, rate, units, channels, time, layout, topic, clock, format
-        As in `gmwm.read`, of delimited text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of
-        ArduPilot, a binary layout or a table in memory; of one topic. Temperatures with stamps of
-        their own are left out.
-    rows : int, optional
-        Of a block, about.
-
-    Yields
-    ------
-    Recording
-        Consecutive parts on one grid of the sampling interval of the first; rows that are missing
-        between two of them are NaN at the beginning of the second.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used, or not a block at a time.
+    path, rate, units, channels, time, layout, topic, clock, format: As in `gmwm.read`, of delimited
+        text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of ArduPilot, a binary layout or a
+        table in memory; of one topic. Temperatures with stamps of their own are left out.
+    rows: Of a block, about.
+    Yields: consecutive parts on one grid of the sampling interval of the first; rows that are
+        missing between two of them are NaN at the beginning of the second.
+    Raises InputError if the file cannot be used, or not a block at a time.
     """
     opened = tables_of(path, layout, topic, clock, format)
     tables = [table for table in opened if has_sensors(table)] or opened
@@ -99,44 +88,52 @@ def read_blocks(
         )
     table = cast(_Divisible, tables[0])
     first: Recording | None = None
-    since: FloatArray | None = None  # time stamps of a part and the last one before it
-    end: FloatArray | None = None
-    of_day = False
     done = 0
     given = Given(rate, units or {}, channels, time)
-    for arrays, stamps in _segments(table, given, rows):
-        # Later parts may hold no samples at all.
-        fewest = 0 if done else tuning.FEWEST_SAMPLES
-        found = part_of(_Segment(table, arrays, done), given, fewest).recording
-        if first is None:
-            first = found
-        if stamps is not None:
-            of_day = of_day or is_time_of_day(stamps)
-            since = None if end is None else np.append(end, stamps)
-            since = seconds_of_day(since) if of_day and since is not None else since
-            end = stamps[-1:]
-        found = _on_the_grid(found, first, since, done)
-        done += _size(arrays)
-        yield found
+    for arrays, own in _segments(table, given, rows):
+        part = part_of(_Segment(table, arrays, done - own.start), given, done)
+        found = part.recording
+        first = first or found
+        if not agree(found.rate, first.rate):
+            raise InputError(
+                f"{first.source}: the sampling rate changes, from {first.rate:.6g} to "
+                f"{found.rate:.6g} Hz about row {done:,}: cut the file there"
+            )
+        samples = part.samples(own)
+        cut = [replace(c, values=c.values[samples], dt=first.dt) for c in found.channels]
+        done += own.stop - own.start
+        yield replace(found, channels=tuple(cut))
 
 
 def _segments(
     table: _Divisible, given: Given, rows: int
-) -> Iterator[tuple[dict[int, FloatArray], FloatArray | None]]:
-    """Columns of some rows after others; a rest of less than half as many is joined to the last."""
+) -> Iterator[tuple[dict[int, FloatArray], slice]]:
+    """Columns of some rows after others, and which rows these are: those on either side of them are
+    there too, so that a clock is followed across the seams. A rest of less than half as many is
+    joined to the last.
+    """
     roles = roles_of(table, given)
+    beside = 0 if roles.time is None else tuning.ROWS_BESIDE
     wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
-    held: dict[int, FloatArray] | None = None
-    for arrays in table.segments(wanted, rows):
-        if held is not None and _is_rest(_size(arrays), _size(held), rows):
-            arrays = {i: np.concatenate([held[i], values]) for i, values in arrays.items()}
-            held = None
-        if held is not None:
-            yield held, None if roles.time is None else held[roles.time]
+    before: dict[int, FloatArray] = {}
+    held: dict[int, FloatArray] = {}
+    for arrays in chain(table.segments(wanted, rows), [{}]):
+        if held and arrays and _is_rest(_size(arrays), _size(held), rows):
+            arrays = _joined(held, arrays)
+        elif held:
+            after = {i: values[:beside] for i, values in arrays.items()}
+            start, stop = _size(before), _size(before) + _size(held)
+            found = _joined(before, held, after)
+            before = {i: values[max(stop - beside, 0) : stop] for i, values in found.items()}
+            yield found, slice(start, stop)
         held = arrays
-    if held is None:
+    if not before:
         raise InputError(f"{table.source} holds no samples: record longer")
-    yield held, None if roles.time is None else held[roles.time]
+
+
+def _joined(*parts: dict[int, FloatArray]) -> dict[int, FloatArray]:
+    some = [part for part in parts if part]
+    return {i: np.concatenate([part[i] for part in some]) for i in some[0]}
 
 
 def _is_rest(size: int, held: int, rows: int) -> bool:
@@ -145,45 +142,17 @@ def _is_rest(size: int, held: int, rows: int) -> bool:
 
 
 def _size(arrays: Mapping[int, FloatArray]) -> int:
-    return next(iter(arrays.values())).size
+    return len(next(iter(arrays.values()), ()))
 
 
-def _on_the_grid(
-    found: Recording, first: Recording, since: FloatArray | None, rows: int
-) -> Recording:
-    """A part with the rows that are missing between it and the one before."""
-    if not agree(found.rate, first.rate):
-        raise InputError(
-            f"{first.source}: the sampling rate changes, from {first.rate:.6g} to "
-            f"{found.rate:.6g} Hz about row {rows:,}: cut the file there"
-        )
-    missing = 0
-    if since is not None:
-        step = (since[-1] - since[1]) / (found.n - 1)
-        missing = round((since[1] - since[0]) / step) - 1
-        if missing < -tuning.ROWS_BACK_OF_BLOCK:
-            raise InputError(
-                f"{first.source}: time stamps go back about row {rows:,}: cut the file there"
-            )
-        if missing > tuning.LONGEST_GAP_OF_BLOCK:
-            raise InputError(
-                f"{first.source}: time stamps go forward by {since[1] - since[0]:.6g} about row "
-                f"{rows:,}, as if the clock was set: cut the file there"
-            )
-    gone = np.full(max(missing, 0), np.nan)
-    return replace(
-        found,
-        channels=tuple(
-            replace(c, values=np.concatenate([gone, c.values]) if gone.size else c.values,
-                    dt=first.dt)
-            for c in found.channels
-        ),
-    )  # fmt: skip
-
-
-def notices_of_blocks(first: Recording, missing: Mapping[str, int], n: int) -> tuple[Notice, ...]:
-    """Those of the first block that hold for all, and how much is missing in all of them."""
-    kept = [notice for notice in first.notices if notice.code != "missing-samples"]
+def notices_of_blocks(
+    noticed: Iterable[Notice], missing: Mapping[str, int], n: int
+) -> tuple[Notice, ...]:
+    """The first of each kind that blocks have, and how much is missing in all of them."""
+    kinds: dict[tuple[str, str], Notice] = {}
+    for notice in noticed:
+        kinds.setdefault((notice.code, notice.where), notice)
+    kept = [notice for notice in kinds.values() if notice.code != "missing-samples"]
     for name, count in missing.items():
         if count:
             text = f"{count:,} of {n:,} samples missing"

@@ -5,4 +5,5 @@ from gmwm.readers.clock.civil_time import (
     seconds_of_day as seconds_of_day,
     without_summer_time as without_summer_time,
 )
+from gmwm.readers.clock.jumps import Jumps as Jumps
 from gmwm.readers.clock.stamps import Clock as Clock, Timing as Timing, agree as agree

@@ -14,11 +14,8 @@ from gmwm.readers import tuning
 class Beat:
     """Stamps without their rhythm.
 
-    Attributes
-    ----------
-    stamps : (n,) ndarray
-    share : float
-        By how much of a sampling interval they were early and late.
+    stamps: (n,).
+    share: By how much of a sampling interval they were early and late.
     """
 
     stamps: FloatArray
@@ -31,9 +28,7 @@ def without_beat(stamps: FloatArray) -> Beat | None:
     Of two steps one is short and one long, and their sum is always the same. A long step of about
     twice the short one is left alone: it may be a sample of three that is lost.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
+    stamps: (n,).
     """
     if stamps.size < tuning.FEWEST_SAMPLES:
         return None

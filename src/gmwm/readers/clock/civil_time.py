@@ -46,19 +46,9 @@ def without_summer_time(
     That is a step of an hour more or less than usual, to two steps, or a quarter of a second if
     that is more. Losses have hardly ever that length.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
-        s, of dates without a zone.
-    where : callable
-        Row -> where that is in the file.
-
-    Returns
-    -------
-    ndarray
-        A copy if the clock was set, else ``stamps``.
-    list of Notice
-        Of code "summer-time".
+    stamps: (n,), s, of dates without a zone.
+    where: Row -> where that is in the file.
+    Returns: a copy if the clock was set, else ``stamps``; list of Notice, of code "summer-time".
     """
     steps = np.diff(stamps)
     known = steps[~np.isnan(steps)]

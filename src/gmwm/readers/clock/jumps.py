@@ -88,6 +88,12 @@ class Jumps:
         low, usual, high = np.quantile(np.diff(self.rows), [0.25, 0.5, 0.75])
         return bool(high - low <= 1.0 + 0.1 * usual)
 
+    def sample(self, rows: _Rows) -> _Rows:
+        """Index of rows on the regular grid; -1 of that before the first."""
+        ahead = np.append(0.0, np.cumsum(self.missing)).astype(np.int64)
+        again = np.searchsorted(self.repeated, rows, side="right")
+        return np.asarray(rows + ahead[np.searchsorted(self.rows, rows, side="right")] - again)
+
     def among(self, kept: _Rows, copies: _Rows) -> Jumps:
         """The same by the numbers of all rows, of which some were kept and others repeat one."""
         repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
@@ -212,12 +218,13 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     missing = np.maximum(np.rint(advance) - 1.0, 0.0)
     real = missing > 0.0
     rows, advance, missing = candidates[real], advance[real], missing[real]
+    del steps  # the line needs as much memory
     advances = np.ones(stamps.size, dtype=np.int64)
     advances[rows] += missing.astype(np.int64)
     # What a jump off the grid goes beyond it belongs to no interval.
     starts = np.zeros(stamps.size, dtype=bool)
     starts[rows[_off_grid(advance, missing)]] = True
-    line = interval_of(stamps, np.cumsum(advances), starts)
+    line = interval_of(stamps, np.cumsum(advances, out=advances), starts)
     return Jumps(rows, advance, missing, line)
 
 

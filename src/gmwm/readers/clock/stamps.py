@@ -74,6 +74,7 @@ class Clock:
         Row -> where that is in the file.
     same : callable
         Which rows, in an order, have the samples of the row before; asked where stamps repeat.
+    extent: int
     """
 
     source: str
@@ -83,6 +84,7 @@ class Clock:
     own_unit: str
     where: Callable[[int], str]
     same: Callable[[IntArray], BoolArray]
+    extent: int
 
     @property
     def place(self) -> str:
@@ -153,7 +155,7 @@ class Clock:
                 jumps = find_jumps(self.stamps)
                 jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
                 # What is longer than the recording is no gap.
-                is_even = change is not None or not np.any(jumps.missing > self.stamps.size)
+                is_even = change is not None or not np.any(jumps.missing > self.extent)
             if not is_even:
                 uneven = self._followed(steps)
                 jumps = jumps_of(uneven)
@@ -226,7 +228,7 @@ class Clock:
         found = None
         finest = float(np.spacing(np.max(np.abs(self.stamps))))
         if not np.all(repeats) and finest < 0.1 * np.median(np.abs(steps[~repeats])):
-            found = followed(self.stamps, same)
+            found = followed(self.stamps, same, self.extent)
         if found is None or not found.is_a_clock:
             raise self._no_clock(steps)
         return found
@@ -302,7 +304,7 @@ class Clock:
                 "clock",
                 _WAY_OUT,
             )
-        if jumps.total > n:
+        if jumps.total > self.extent:
             row = int(jumps.rows[jumps.longest])
             raise InputError(
                 f"{self.place}, {self.where(row)}: the clock jumps by "

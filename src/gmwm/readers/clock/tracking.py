@@ -34,36 +34,19 @@ def follow(
     followed by a straight line with a fading memory. The sequences of least cost are kept, the one
     with the fewest losses always among them: a host that stalls sends many late rows.
 
-    Parameters
-    ----------
-    x : (n,) ndarray
-        Stamps, in sampling intervals (roughly).
-    same : (n,) ndarray of bool
-        Whether a row may repeat the one before.
-    limit : float
-        Intervals beyond which a jump is no loss, the clock was set.
-    start_at : float
-        The clock at the first row.
-    sigma : float
-        Standard deviation of the stamps, intervals.
-    memory : int
-        Rows of the straight line.
-    age : int
-        Rows that the clock given is worth.
-    costs : (5,) ndarray
-        Negative logarithm of the chance of a loss, a repetition and a set clock; the most that
-        one stamp costs; and what it costs if a row that may repeat another does not.
-    advance : (n,) ndarray of int, written
-        Sample number less that of the row before; 0 for a repetition.
-    is_set : (n,) ndarray of bool, written
-        Whether the clock was set before a row.
-    chunk : int
-        Rows that are decided at a time.
-
-    Returns
-    -------
-    float
-        Cost of the sequence.
+    x: (n,), stamps, in sampling intervals (roughly).
+    same: (n,) of bool, whether a row may repeat the one before.
+    limit: Intervals beyond which a jump is no loss, the clock was set.
+    start_at: The clock at the first row.
+    sigma: Standard deviation of the stamps, intervals.
+    memory: Rows of the straight line.
+    age: Rows that the clock given is worth.
+    costs: (5,), negative logarithm of the chance of a loss, a repetition and a set clock; the most
+        that one stamp costs; and what it costs if a row that may repeat another does not.
+    advance: (n,) of int, written, sample number less that of the row before; 0 for a repetition.
+    is_set: (n,) of bool, written, whether the clock was set before a row.
+    chunk: Rows that are decided at a time.
+    Returns: cost of the sequence.
     """
     n = x.size
     rows = min(n, chunk + _AHEAD)

@@ -19,19 +19,12 @@ from gmwm.readers.clock.tracking import follow
 class Followed:
     """What following uneven stamps row by row gives.
 
-    Attributes
-    ----------
-    advance : (n,) ndarray of int
-        Sample number less that of the row before: 1 as a rule, more after lost samples, 0 for a
-        row that repeats the one before it.
-    is_set : (n,) ndarray of bool
-        Whether the clock was set between the row before and this one.
-    late : (n,) ndarray
-        How far each stamp is after the even clock, in sampling intervals.
-    interval : float
-        Sampling interval, in the unit of the stamps.
-    burst : int
-        Rows that have one stamp, usually.
+    advance: (n,) of int, sample number less that of the row before: 1 as a rule, more after lost
+        samples, 0 for a row that repeats the one before it.
+    is_set: (n,) of bool, whether the clock was set between the row before and this one.
+    late: (n,), how far each stamp is after the even clock, in sampling intervals.
+    interval: Sampling interval, in the unit of the stamps.
+    burst: Rows that have one stamp, usually.
     """
 
     advance: IntArray
@@ -52,19 +45,13 @@ class Followed:
         return not often and float(np.median(np.abs(self.late))) <= tuning.MOST_UNEVEN
 
 
-def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
+def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | None:
     """Number the rows of an uneven clock.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
-    same : (n,) ndarray of bool
-        Whether stamp and samples of a row are those of the row before.
-
-    Returns
-    -------
-    Followed or None
-        None if there is no interval that most rows agree on.
+    stamps: (n,).
+    same: (n,) of bool, whether stamp and samples of a row are those of the row before.
+    extent: Samples that may be lost in one gap, at most.
+    Returns: None if there is no interval that most rows agree on.
     """
     burst, of_row = _bursts(stamps)
     if np.max(of_row) > min(tuning.MOST_OF_ONE_STAMP, max(stamps.size // 8, 16)):
@@ -89,7 +76,7 @@ def followed(stamps: FloatArray, same: BoolArray) -> Followed | None:
     for memory in tuning.ROWS_OF_CLOCK:
         is_set_now = np.zeros(n, dtype=bool)
         follow(
-            (x - trend) / slope, same, float(n), start, sigma, memory, age,
+            (x - trend) / slope, same, float(extent), start, sigma, memory, age,
             costs, advance, is_set_now, tuning.ROWS_AT_ONCE,
         )  # fmt: skip
         is_set |= is_set_now

@@ -93,18 +93,10 @@ class DataflashTable(MessageTable):
 def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table, ...]:
     """Open a binary log of ArduPilot.
 
-    Parameters
-    ----------
-    topics : sequence of str
-        Those to read, e.g. ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of
+    topics: Those to read, e.g. ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of
         `IMU`, else those of `GYR` and `ACC`, else the batches, if there is one IMU.
-    clock : str
-        Not used: messages have one stamp.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, holds no IMU, or topics have to be chosen.
+    clock: Not used: messages have one stamp.
+    Raises InputError if it is damaged, holds no IMU, or topics have to be chosen.
     """
     with damage_named(path.name, _damage):
         counts, batches = _contents(path)

@@ -48,12 +48,8 @@ _KINDS = {
 class Array:
     """An array, or a part of one, that is not read yet.
 
-    Attributes
-    ----------
-    like : ndarray
-        Of its shape and type, without its content: one element in memory.
-    read : callable
-        Gives the array itself.
+    like: Of its shape and type, without its content: one element in memory.
+    read: Gives the array itself.
     """
 
     like: AnyArray
@@ -88,10 +84,7 @@ class ArrayTable:
     ) -> ArrayTable:
         """Columns of the arrays of a file by their names.
 
-        Raises
-        ------
-        InputError
-            If there are none, or a sampling rate among them is not positive.
+        Raises InputError if there are none, or a sampling rate among them is not positive.
         """
         rate = _stated_rate(source, entries)
         return cls._of(source, _columns_of_entries(source, entries), rate, notices)
@@ -100,10 +93,7 @@ class ArrayTable:
     def of_array(cls, source: str, array: Array) -> ArrayTable:
         """Columns of a single array.
 
-        Raises
-        ------
-        InputError
-            If it has none.
+        Raises InputError if it has none.
         """
         return cls._of(source, _columns_of_array(source, array), None, ())
 
@@ -123,11 +113,8 @@ class ArrayTable:
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns; see `Table`.
 
-        Raises
-        ------
-        InputError
-            If a column is not made of real numbers, one is infinite, or lengths differ; if there
-            is not enough memory for them.
+        Raises InputError if a column is not made of real numbers, one is infinite, or lengths
+            differ; if there is not enough memory for them.
         """
         samples = sum(self.arrays[column].like.size for column in columns)
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
@@ -173,10 +160,7 @@ class ArrayTable:
 def check_usable(place: str, values: FloatArray, where: Callable[[int], str]) -> None:
     """Refuse infinite values and those too large for use.
 
-    Raises
-    ------
-    InputError
-        At the first of them.
+    Raises InputError at the first of them.
     """
     if not usable(values):
         rows = np.flatnonzero(np.abs(values) >= LARGEST)
@@ -195,12 +179,8 @@ def _damage(error: Exception) -> str:
 def damage_named(source: str, say: Callable[[Exception], str] = _damage) -> Iterator[None]:
     """Say what is wrong with a file in a sentence, whatever its library raises.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file.
-    say : callable, optional
-        What its library raised -> the end of the sentence.
+    source: Name of the file.
+    say: What its library raised -> the end of the sentence.
     """
     try:
         with warnings.catch_warnings():

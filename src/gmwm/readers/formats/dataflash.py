@@ -38,11 +38,7 @@ def _walk(
 ) -> tuple[int, int]:  # fmt: skip
     """Kinds and places of wanted messages, up to an FMT or the end of what is there.
 
-    Returns
-    -------
-    count : int
-    at : int
-        Where the walk goes on.
+    Returns: count; at, where the walk goes on.
     """
     count = 0
     while at + 3 <= data.size:
@@ -77,10 +73,7 @@ class _Forms:
     def add(self, body: npt.NDArray[np.uint8]) -> None:
         """One more kind.
 
-        Raises
-        ------
-        ValueError
-            If the fields of a kind that is wanted are not those of its length.
+        Raises ValueError if the fields of a kind that is wanted are not those of its length.
         """
         form = np.frombuffer(body.tobytes(), _FORM)[0]
         number, name = int(form["type"]), form["name"].decode("latin-1")
@@ -103,12 +96,8 @@ class _Forms:
 class Messages:
     """Messages of one kind that follow each other.
 
-    Attributes
-    ----------
-    kind : str
-    rows : structured ndarray
-    places : ndarray
-        Byte of the log at which each begins.
+    rows: structured.
+    places: Byte of the log at which each begins.
     """
 
     def __init__(self, kind: str, rows: Rows, places: Rows, factors: dict[str, float]):
@@ -127,15 +116,8 @@ class Messages:
 def messages(path: Path, wanted: Collection[str]) -> Iterator[Messages]:
     """Messages of some kinds, block by block.
 
-    Parameters
-    ----------
-    wanted : collection of str
-        Names of the kinds.
-
-    Raises
-    ------
-    KeyError, ValueError
-        If the statement of a wanted kind is damaged.
+    wanted: Names of the kinds.
+    Raises KeyError, ValueError if the statement of a wanted kind is damaged.
     """
     forms, before, rest = _Forms(wanted), 0, b""
     with path.open("rb") as stream:

@@ -11,19 +11,10 @@ from gmwm.errors import InputError
 def library(module: str, extra: str, source: str) -> ModuleType:
     """Import a library of an extra.
 
-    Parameters
-    ----------
-    module : str
-        What to import.
-    extra : str
-        The extra of this package that installs it.
-    source : str
-        The file that needs it.
-
-    Raises
-    ------
-    InputError
-        If it is not installed; with the command that installs it.
+    module: What to import.
+    extra: The extra of this package that installs it.
+    source: The file that needs it.
+    Raises InputError if it is not installed; with the command that installs it.
     """
     try:
         return import_module(module)

@@ -27,16 +27,8 @@ _INDEX = "__index_level_0__"
 class FrameTable:
     """Columns of an Arrow table.
 
-    Attributes
-    ----------
-    source : str
-    names : tuple of str
-    types : tuple of pyarrow.DataType
-    rows : int
-    read : callable
-        Index of a column -> its values, a `pyarrow.ChunkedArray`.
-    parts : callable
-        Indices of columns and a number of rows -> their values, so many rows at a time.
+    read: Index of a column -> its values, a `pyarrow.ChunkedArray`.
+    parts: Indices of columns and a number of rows -> their values, so many rows at a time.
     """
 
     source: str
@@ -52,10 +44,8 @@ class FrameTable:
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns; see `Table`.
 
-        Raises
-        ------
-        InputError
-            If a column holds no numbers, one is infinite, or there is not enough memory.
+        Raises InputError if a column holds no numbers, one is infinite, or there is not enough
+            memory.
         """
         memory.require(tuning.BYTES_PER_SAMPLE * self.rows * len(columns), self.source)
         return {column: self._column(column, self._read(column), {}) for column in columns}
@@ -122,10 +112,7 @@ def is_frame(data: object) -> bool:
 def open_frame(data: Any) -> FrameTable:
     """A DataFrame of pandas or polars, an Arrow table, or what gives itself as one.
 
-    Raises
-    ------
-    InputError
-        If it cannot be turned into an Arrow table.
+    Raises InputError if it cannot be turned into an Arrow table.
     """
     import pyarrow as pa
 
@@ -150,10 +137,7 @@ def open_frame(data: Any) -> FrameTable:
 def open_parquet(path: Path) -> FrameTable:
     """Open a Parquet file.
 
-    Raises
-    ------
-    InputError
-        If it is damaged.
+    Raises InputError if it is damaged.
     """
     from pyarrow import parquet
 
@@ -191,10 +175,7 @@ def _slices(table: Any, columns: Sequence[int], rows: int) -> Iterator[Sequence[
 def open_feather(path: Path) -> FrameTable:
     """Open a Feather file, which is one of Arrow's.
 
-    Raises
-    ------
-    InputError
-        If it is damaged.
+    Raises InputError if it is damaged.
     """
     from pyarrow import feather
 

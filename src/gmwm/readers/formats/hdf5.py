@@ -36,10 +36,7 @@ _UNITS = ("units", "unit", "Units", "Unit")
 def open_hdf5(path: Path) -> ArrayTable:
     """Open an HDF5 file, or a MAT file of version 7.3, whose arrays are stored transposed.
 
-    Raises
-    ------
-    InputError
-        If it is damaged or holds no columns, or h5py is not installed.
+    Raises InputError if it is damaged or holds no columns, or h5py is not installed.
     """
     h5py = library("h5py", "hdf5", path.name)
     found: dict[str, Array] = {}
@@ -78,10 +75,7 @@ def _with_unit(name: str, attributes: Mapping[str, Any]) -> str:
 def open_mat(path: Path) -> ArrayTable:
     """Open a MAT file of version 4 to 7.
 
-    Raises
-    ------
-    InputError
-        If it is damaged or holds no columns.
+    Raises InputError if it is damaged or holds no columns.
     """
     from scipy.io import loadmat, whosmat
 

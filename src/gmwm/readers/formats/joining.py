@@ -10,6 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.readers import tuning
+from gmwm.readers.clock import Jumps
 from gmwm.readers.names import CANONICAL, bare, meaning
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
 from gmwm.readers.table import Table
@@ -22,19 +23,24 @@ _SAMPLE = 0.5
 class Part:
     """The sensors of one topic.
 
-    Attributes
-    ----------
-    recording : Recording
-    start : float
-        Stamp of its first sample, s.
+    start: Stamp of its first sample, s.
+    jumps: Of its time stamps.
     """
 
     recording: Recording
     start: float = 0.0
+    jumps: Jumps | None = None
 
     @property
     def stop(self) -> float:
         return self.start + self.recording.duration
+
+    def samples(self, rows: slice) -> slice:
+        """The samples of some rows of the table, and those missing before these."""
+        if self.jumps is None:
+            return rows
+        before, last = self.jumps.sample(np.array([rows.start, rows.stop]) - 1).tolist()
+        return slice(before + 1, last + 1)
 
 
 def has_sensors(table: Table) -> bool:
@@ -48,10 +54,7 @@ def shares(
 ) -> list[tuple[Table, Collection[str] | None]]:
     """Which of the channels that the caller names are in which table; those without any go.
 
-    Raises
-    ------
-    InputError
-        If columns are assigned, which needs one table, or a channel is in none.
+    Raises InputError if columns are assigned, which needs one table, or a channel is in none.
     """
     source = tables[0].source
     if channels is None:
@@ -79,10 +82,7 @@ def shares(
 def joined(parts: Sequence[Part]) -> Recording:
     """Parts cut to the time that they have in common.
 
-    Raises
-    ------
-    InputError
-        If they have no such time, or hold the same channel.
+    Raises InputError if they have no such time, or hold the same channel.
     """
     first = parts[0].recording
     if len(parts) == 1:

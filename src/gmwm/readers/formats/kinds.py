@@ -29,18 +29,10 @@ _HEAD = 16  # bytes
 class Kind:
     """A kind of file.
 
-    Attributes
-    ----------
-    name : str
-    suffixes : tuple of str
-    magic : tuple of bytes
-        What its files begin with, if they begin alike.
-    open : callable
-        Path, topics, clock -> tables.
-    has_topics : bool
-        Whether there may be several series of messages to choose from.
-    has_clocks : bool
-        Whether messages have the stamp of their header and that of their recording.
+    magic: What its files begin with, if they begin alike.
+    open: Path, topics, clock -> tables.
+    has_topics: Whether there may be several series of messages to choose from.
+    has_clocks: Whether messages have the stamp of their header and that of their recording.
     """
 
     name: str
@@ -85,24 +77,11 @@ def open_tables(
 ) -> tuple[Table, ...]:
     """Open a file or a table in memory, whatever it is.
 
-    Parameters
-    ----------
-    topics : sequence of str, optional
-        Those to read, of a log that has several.
-    clock : {"header", "log"}, optional
-        Which stamps of messages count.
-    form : str, optional
-        One of `NAMES`, in place of what its first bytes and its name show.
-
-    Returns
-    -------
-    tuple of Table
-        Several if its sensors have rates of their own.
-
-    Raises
-    ------
-    InputError
-        If it cannot be used.
+    topics: Those to read, of a log that has several.
+    clock: {"header", "log"}, which stamps of messages count.
+    form: One of `NAMES`, in place of what its first bytes and its name show.
+    Returns: several if its sensors have rates of their own.
+    Raises InputError if it cannot be used.
     """
     if clock not in CLOCKS:
         raise InputError(f"clock = {clock!r}: give one of {', '.join(CLOCKS)}")

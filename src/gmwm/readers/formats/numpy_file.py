@@ -26,10 +26,7 @@ _OBJECTS = np.empty(0, dtype=object)
 def open_numpy(path: Path) -> ArrayTable:
     """Open an NPY or NPZ file.
 
-    Raises
-    ------
-    InputError
-        If it is damaged, or its arrays are not columns.
+    Raises InputError if it is damaged, or its arrays are not columns.
     """
     if path.suffix.lower() == ".npz":
         return ArrayTable.of_entries(path.name, _load_npz(path))

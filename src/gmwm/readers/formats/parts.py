@@ -23,11 +23,7 @@ from gmwm.readers.table import label
 class MessageTable(ABC):
     """A topic of a log; memory holds no more than the columns that are asked for.
 
-    Attributes
-    ----------
-    topic : Topic
-    names : tuple of str
-        Of the columns.
+    names: Of the columns.
     """
 
     topic: Topic
@@ -48,10 +44,8 @@ class MessageTable(ABC):
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns; see `Table`.
 
-        Raises
-        ------
-        InputError
-            If the log is damaged, a number is infinite, or there is not enough memory.
+        Raises InputError if the log is damaged, a number is infinite, or there is not enough
+            memory.
         """
         count, done = self.topic.count, 0
         memory.require(tuning.BYTES_PER_SAMPLE * count * len(columns), self.source)
@@ -89,10 +83,7 @@ class MessageTable(ABC):
     def checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
         """Columns that have no number that cannot be used; ``before`` is the row of their first.
 
-        Raises
-        ------
-        InputError
-            If one has.
+        Raises InputError if one has.
         """
         for column, values in found.items():
             place = f"{self.source}, column {label(self.names, column)}"

@@ -86,14 +86,8 @@ class _Bag:
 class BagTable(MessageTable):
     """A topic of a bag: one message a row, of its stamp and of numbers in it.
 
-    Attributes
-    ----------
-    bag : _Bag
-    message : Message
-    log : bool
-        Whether the stamps are the times at which the messages were recorded.
-    origin : int
-        Stamp that is written as zero, ns.
+    log: Whether the stamps are the times at which the messages were recorded.
+    origin: Stamp that is written as zero, ns.
     """
 
     bag: _Bag
@@ -142,24 +136,12 @@ class BagTable(MessageTable):
 def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, ...]:
     """Open a bag.
 
-    Parameters
-    ----------
-    path : path
-        A file, or the folder of a bag of ROS 2.
-    topics : sequence of str
-        Those to read; by default the only one of `sensor_msgs/Imu`, or two of which one has gyros
-        and the other accelerometers.
-    clock : {"header", "log"}
-
-    Returns
-    -------
-    tuple of BagTable
-        One for each topic, those of thermometers last.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, holds no IMU, or topics have to be chosen.
+    path: A file, or the folder of a bag of ROS 2.
+    topics: Those to read; by default the only one of `sensor_msgs/Imu`, or two of which one has
+        gyros and the other accelerometers.
+    clock: {"header", "log"}.
+    Returns: one for each topic, those of thermometers last.
+    Raises InputError if it is damaged, holds no IMU, or topics have to be chosen.
     """
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():

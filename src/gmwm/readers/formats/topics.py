@@ -14,13 +14,8 @@ from gmwm.errors import InputError
 class Topic:
     """A series of messages of one IMU, or of one sensor of it.
 
-    Attributes
-    ----------
-    name : str
-    count : int
-        Number of its messages.
-    sensors : frozenset of str
-        "gyro", "accel" or both.
+    count: Number of its messages.
+    sensors: "gyro", "accel" or both.
     """
 
     name: str
@@ -35,17 +30,9 @@ class Topic:
 def choose(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file, for messages.
-    topics : sequence of Topic
-        One at least.
-
-    Raises
-    ------
-    InputError
-        With the code "topic", if one is not there, or it cannot be decided.
+    source: Name of the file, for messages.
+    topics: One at least.
+    Raises InputError with the code "topic", if one is not there, or it cannot be decided.
     """
     if wanted:
         chosen = tuple(_named(source, topics, name) for name in dict.fromkeys(wanted))
@@ -86,10 +73,7 @@ def choose_first(
 ) -> tuple[Topic, ...]:
     """As `choose`, of the first rank that has any topic unless others are wanted.
 
-    Raises
-    ------
-    InputError
-        As `choose` does.
+    Raises InputError as `choose` does.
     """
     if wanted:
         return choose(source, [topic for rank in ranks for topic in rank], wanted)

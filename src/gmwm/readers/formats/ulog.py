@@ -42,18 +42,10 @@ _Columns = dict[str, AnyArray]
 def open_ulog(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable, ...]:
     """Open a ULog.
 
-    Parameters
-    ----------
-    topics : sequence of str
-        Those to read, e.g. ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO
-        topics.
-    clock : str
-        Not used: messages have one stamp.
-
-    Raises
-    ------
-    InputError
-        If it is damaged, holds no IMU at its own rate, or topics have to be chosen.
+    topics: Those to read, e.g. ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the
+        FIFO topics.
+    clock: Not used: messages have one stamp.
+    Raises InputError if it is damaged, holds no IMU at its own rate, or topics have to be chosen.
     """
     with damage_named(path.name, _damage):  # formats that are damaged lack fields
         return _tables(path, topics)

@@ -46,12 +46,8 @@ def multiple(
 ) -> str:
     """The curves of an axis with their intervals, and below them their ratios to the common one.
 
-    Parameters
-    ----------
-    labels : sequence of str
-        Of all recordings, whose places are their colours.
-    out : sequence of Fit
-        Of recordings that are not compared, drawn faintly.
+    labels: Of all recordings, whose places are their colours.
+    out: Of recordings that are not compared, drawn faintly.
     """
     fits = [*axis.fits.values(), *out]
     unit, factor = shown_unit(fits[0].wv.quantity, fits[0].wv.unit, "field")

@@ -32,17 +32,11 @@ from gmwm.variance.covariance.lags import LagGrid, block_of
 class _LagSums:
     """Everything about the coarse levels that does not depend on the spectrum.
 
-    Attributes
-    ----------
-    first : int
-        Index of the first of the C coarse levels.
-    frequency : (A, F) ndarray
-        Fourier frequencies of the lag sums and their aliases, cycles per sample, unsigned.
-    transfer : (C, A, F) ndarray
-        Transfer functions there.
-    counts : (C, C, size) ndarray
-        Pairs at each lag, relative to min(M_j, M_k).
-    grid : LagGrid
+    first: Index of the first of the C coarse levels.
+    frequency: (A, F), fourier frequencies of the lag sums and their aliases, cycles per sample,
+        unsigned.
+    transfer: (C, A, F), transfer functions there.
+    counts: (C, C, size), pairs at each lag, relative to min(M_j, M_k).
     """
 
     first: int
@@ -140,32 +134,16 @@ def wavelet_covariance(
 ) -> FloatArray:
     """Covariance of the wavelet variance estimates of a Gaussian series.
 
-    Parameters
-    ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, in u^2/Hz.
-    n : int
-        Number of samples.
-    dt : float
-        Sampling interval, s.
-    name : str
-        Wavelet, see `gmwm.process.wavelets.wavelet`.
-    levels : int
-        Number of levels J.
-    lines : sequence of (float, float), optional
-        Spectral lines: frequency (Hz), amplitude a (u). Their product with the noise around them
+    psd: ``psd(f, dt)``, two-sided, in u^2/Hz.
+    n: Number of samples.
+    dt: Sampling interval, s.
+    name: Wavelet, see `gmwm.process.wavelets.wavelet`.
+    levels: Number of levels J.
+    lines: Spectral lines: frequency (Hz), amplitude a (u). Their product with the noise around them
         adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
-
-    Returns
-    -------
-    (J, J) ndarray
-        In u^4.
-
-    Raises
-    ------
-    InputError
-        If the series has fewer levels with a coefficient free of end effects, for an unknown
-        wavelet, or a spectrum that is not finite and non-negative.
+    Returns: (J, J), in u^4.
+    Raises InputError if the series has fewer levels with a coefficient free of end effects, for an
+        unknown wavelet, or a spectrum that is not finite and non-negative.
     """
     filters = wavelet(name)
     if not 1 <= levels <= filters.levels(n):

@@ -25,24 +25,12 @@ _SLICE = 1 << 16
 def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") -> FloatArray:
     """Covariance of the mean squares of several levels' coefficients.
 
-    Parameters
-    ----------
-    coefficients : iterable of (M_j,) ndarray
-        One array a level, of falling length.
-    window : {"none", "octave"}, optional
-        "none" takes all lags, as eq. (5) does: unbiased, but as noisy as a periodogram. "octave"
-        averages the cross-spectra over an eighth of an octave first, which is a lag window whose
-        length grows with the period: for long records.
-
-    Returns
-    -------
-    (J, J) ndarray
-        u^4, positive semi-definite.
-
-    Raises
-    ------
-    InputError
-        If ``window`` is unknown.
+    coefficients: iterable of (M_j,), one array a level, of falling length.
+    window: {"none", "octave"}, "none" takes all lags, as eq. (5) does: unbiased, but as noisy as a
+        periodogram. "octave" averages the cross-spectra over an eighth of an octave first, which is
+        a lag window whose length grows with the period: for long records.
+    Returns: (J, J), u^4, positive semi-definite.
+    Raises InputError if ``window`` is unknown.
     """
     if window not in WINDOWS:
         raise InputError(f"window = {window!r}: known are {', '.join(WINDOWS)}")

@@ -17,25 +17,14 @@ def lag_sums(
     The gain of a Haar filter over its phase is (1 - cos(2 pi m f)) / (2 m sin(pi f)), so that a
     covariance is a second difference over the averaging time m of the coarser level.
 
-    Parameters
-    ----------
-    once : (L, size) ndarray
-        Covariances by lag of a level with that of which it is the second difference, one period.
-    averaging : (L,) ndarray of int
-        Averaging times, rising, in lags.
-    zero : (L, L) ndarray
-        What the bin at zero frequency adds, which no difference shows.
-    counts : (L, L, H) ndarray
-        Weights of the lags from zero on, of those that there are.
-    weights : (H,) ndarray
-        Of all of them.
-
-    Returns
-    -------
-    mean : (L, L) ndarray
-        Sum of covariances times counts; above the diagonal, as are the others.
-    square, whole : (L, L) ndarray
-        Sums of their squares, times counts and times weights.
+    once: (L, size), covariances by lag of a level with that of which it is the second difference,
+        one period.
+    averaging: (L,) of int, averaging times, rising, in lags.
+    zero: (L, L), what the bin at zero frequency adds, which no difference shows.
+    counts: (L, L, H), weights of the lags from zero on, of those that there are.
+    weights: (H,), of all of them.
+    Returns: mean (L, L), sum of covariances times counts; above the diagonal, as are the others;
+        square, whole (L, L), sums of their squares, times counts and times weights.
     """
     levels, size = once.shape
     lags, longest = weights.size, averaging[-1]

@@ -75,19 +75,13 @@ def excess_series(efficiency: float) -> FloatArray:
 class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 
-    Attributes
-    ----------
-    block : int
-        Samples between lags.
-    first, own, size : int
-        First level, number of levels whose pairs are summed here, number of levels in all.
-    frequency : (L,) ndarray
-        Cycles per block.
-    amplitude : (size, L) ndarray
-        Gain of each level over its phase, on means of blocks.
-    weight : (own, tuning.ROBUST_REACH + 1, L) ndarray
-        Share of the pairs of coefficients at each lag, both signs together, for each level and
-        the ones from itself on.
+    block: Samples between lags.
+    first, own, size: First level, number of levels whose pairs are summed here, number of levels in
+        all.
+    frequency: (L,), cycles per block.
+    amplitude: (size, L), gain of each level over its phase, on means of blocks.
+    weight: (own, tuning.ROBUST_REACH + 1, L), share of the pairs of coefficients at each lag, both
+        signs together, for each level and the ones from itself on.
     """
 
     block: int
@@ -141,20 +135,11 @@ def excess_correlation(
 ) -> FloatArray:
     """Weighted sums over lags of ``series`` in the even powers, from 4, of the correlation.
 
-    Parameters
-    ----------
-    amplitude : (K, L) ndarray
-        Zero-phase gains of the levels at L frequencies in the middle of their bins.
-    density : (L,) ndarray
-        Spectrum there.
-    weight : (O, D, L) ndarray
-        Of the lags 0 .. L-1 for level j < O and level j + d.
-    series : (P,) ndarray
-        See `excess_series`.
-
-    Returns
-    -------
-    (O, D) ndarray
+    amplitude: (K, L), zero-phase gains of the levels at L frequencies in the middle of their bins.
+    density: (L,), spectrum there.
+    weight: (O, D, L), of the lags 0 .. L-1 for level j < O and level j + d.
+    series: (P,), see `excess_series`.
+    Returns: (O, D).
     """
     deviation = np.sqrt(np.maximum(2.0 * amplitude**2 @ density, np.finfo(float).tiny))
     scaled = amplitude / deviation[:, None]

@@ -28,12 +28,8 @@ IntArray = NDArray[np.int64]
 class Runs:
     """Runs of samples without a missing one.
 
-    Attributes
-    ----------
-    starts, stops : tuple of int
-        First sample of each run, and the one after its last, ascending.
-    n : int
-        Length of the series, missing samples included.
+    starts, stops: First sample of each run, and the one after its last, ascending.
+    n: Length of the series, missing samples included.
     """
 
     starts: tuple[int, ...]
@@ -72,17 +68,11 @@ class Runs:
 class Gaps:
     """Gaps within a series, each with the samples around it that predict what it held.
 
-    Attributes
-    ----------
-    runs : Runs
-        The samples that exist.
-    edges : (G, 2) ndarray
-        First sample of each gap that has samples on both sides, and the one after its last.
-        Runs that are very short beside the gaps around them are parts of a gap.
-    octave : (G,) ndarray
-        Lengths rounded up to a power of two, as its exponent.
-    apart : (G,) ndarray of bool
-        Gaps with another level on either side, which are never filled.
+    runs: The samples that exist.
+    edges: (G, 2), first sample of each gap that has samples on both sides, and the one after its
+        last. Runs that are very short beside the gaps around them are parts of a gap.
+    octave: (G,), lengths rounded up to a power of two, as its exponent.
+    apart: (G,) of bool, gaps with another level on either side, which are never filled.
     """
 
     runs: Runs
@@ -198,17 +188,11 @@ def _without_islands(edges: IntArray) -> IntArray:
 class GapEffects:
     """What gaps do to the wavelet variances of the levels.
 
-    Attributes
-    ----------
-    missing : int
-        Number of missing samples.
-    counts : (J,) ndarray
-        Number of coefficients.
-    change : (J,) ndarray
-        By which the filling of short gaps changed the expected variance, relative to it; it has
-        been taken off. Zero where no gap was filled.
-    inflation : (J, J) ndarray
-        Growth of the covariance over that of a complete record.
+    missing: Number of missing samples.
+    counts: (J,), number of coefficients.
+    change: (J,), by which the filling of short gaps changed the expected variance, relative to it;
+        it has been taken off. Zero where no gap was filled.
+    inflation: (J, J), growth of the covariance over that of a complete record.
     """
 
     missing: int

@@ -121,16 +121,10 @@ def levels_apart(
     that the spectrum is known from, the noise is taken as if it drifted. A change must show in
     means over wider stretches as well.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        NaN where samples are missing.
-    slope : float
-        Of the series, per sample.
-    psd : callable
-        Of its noise between the gaps.
-    longest : float
-        Averaging time that the spectrum is known for, samples.
+    values: (n,), NaN where samples are missing.
+    slope: Of the series, per sample.
+    psd: Of its noise between the gaps.
+    longest: Averaging time that the spectrum is known for, samples.
     """
     first, last = gaps.edges.T
     there = np.concatenate([[0], np.cumsum(~np.isnan(values))])
@@ -183,13 +177,7 @@ def _deviation(psd: PSD, dt: float, block: int, length: int, width: int) -> floa
 class Filling:
     """How the gaps of a series are filled under a spectrum.
 
-    Attributes
-    ----------
-    gaps : Gaps
-    weights : (K, most boxes) ndarray
-        Of the means of the pairs of boxes, for each kind of gap.
-    psd : callable
-    dt : float
+    weights: (K, most boxes), of the means of the pairs of boxes, for each kind of gap.
     """
 
     gaps: Gaps
@@ -215,21 +203,12 @@ class Filling:
     ) -> Iterator[tuple[NDArray[np.intp], FloatArray, FloatArray]]:
         """The series as the levels need it, from the finest on.
 
-        Parameters
-        ----------
-        values : (n,) ndarray
-            NaN where samples are missing.
-        averaging : (J,) ndarray
-            Ascending, in samples.
-        slope : float
-            Of a drift that goes on through the gaps, per sample.
-
-        Yields
-        ------
-        ndarray, (n,) ndarray, (n + 1,) ndarray
-            Levels, the series with what is filled for them, and its cumulative sum; first those
-            for which nothing is filled, if only none. The series is changed when the next one is
-            asked for.
+        values: (n,), NaN where samples are missing.
+        averaging: (J,), ascending, in samples.
+        slope: Of a drift that goes on through the gaps, per sample.
+        Yields: ndarray, (n,), (n + 1,), levels, the series with what is filled for them, and its
+            cumulative sum; first those for which nothing is filled, if only none. The series is
+            changed when the next one is asked for.
         """
         values = values.copy()
         integral = cumulative(values, 0.0)

@@ -21,22 +21,13 @@ def fill(
 ) -> None:
     """Put into gaps a weighted mean of what lies on either side, and a line of no mean.
 
-    Parameters
-    ----------
-    values : (n,) ndarray
-        Changed in place.
-    integral : (n + 1,) ndarray
-        Their cumulative sum before, starting with 0.
-    edges : (G, 2) ndarray
-        First sample of each gap, and the one after its last.
-    block : (G,) ndarray
-        Samples of the nearest box on either side.
-    boxes : (G,) ndarray
-        Number of boxes: they end at 1, 2, 4, 8, ... blocks from the gap.
-    weights : (G, most boxes) ndarray
-        Of the mean of each pair of boxes.
-    slope : float
-        Per sample.
+    values: (n,), changed in place.
+    integral: (n + 1,), their cumulative sum before, starting with 0.
+    edges: (G, 2), first sample of each gap, and the one after its last.
+    block: (G,), samples of the nearest box on either side.
+    boxes: (G,), number of boxes: they end at 1, 2, 4, 8, ... blocks from the gap.
+    weights: (G, most boxes), of the mean of each pair of boxes.
+    slope: Per sample.
     """
     for g in range(edges.shape[0]):
         start, stop = edges[g, 0], edges[g, 1]
@@ -58,12 +49,8 @@ def fill(
 def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) -> int:
     """Number of places t within the first intervals such that t + lag is within the second.
 
-    Parameters
-    ----------
-    first, second : (P, 2), (Q, 2) ndarray
-        Ascending intervals, their ends excluded.
-    lag : int
-        Zero or more.
+    first, second: (P, 2), (Q, 2), ascending intervals, their ends excluded.
+    lag: Zero or more.
     """
     total = 0
     j = 0
@@ -84,14 +71,9 @@ def neighbours(
 ) -> NDArray[np.int64]:
     """How many pairs of gaps of two kinds are so far apart, (kinds, kinds, reach).
 
-    Parameters
-    ----------
-    centre : (G,) ndarray
-        Ascending, in half samples.
-    kind : (G,) ndarray
-        From 0; negative ones are left out.
-    reach : int
-        Half samples.
+    centre: (G,), ascending, in half samples.
+    kind: (G,), from 0; negative ones are left out.
+    reach: Half samples.
     """
     number = np.zeros((kinds, kinds, reach), dtype=np.int64)
     for g in range(centre.size):

@@ -29,16 +29,10 @@ def unmasked(
 ) -> tuple[FloatArray, FloatArray]:
     """Variances without what missing samples add, and that relative to them, (J,) each.
 
-    Parameters
-    ----------
-    square : (J,) ndarray
-        Mean squares of the coefficients.
-    scarcity : (J,) ndarray
-        Mean over windows of a quarter of 1/C - 1/m, for both halves together.
-    gaps : (G, 2) ndarray
-        Number of gaps of up to 2^i samples, and samples that they have.
-    missing : float
-        Part of the samples that are missing.
+    square: (J,), mean squares of the coefficients.
+    scarcity: (J,), mean over windows of a quarter of 1/C - 1/m, for both halves together.
+    gaps: (G, 2), number of gaps of up to 2^i samples, and samples that they have.
+    missing: Part of the samples that are missing.
     """
     there = gaps[:, 0] > 0
     samples = gaps[there, 1].astype(float)
@@ -81,15 +75,10 @@ def effects(
     A part p of the windows of a level is left. Left out singly they cost little, since their
     neighbours say the same; as many in a row as are correlated cost 1/p.
 
-    Parameters
-    ----------
-    n, missing : int
-        Samples.
-    gaps : (G, 2) ndarray
-        Number of gaps of up to 2^i samples, and samples that they have.
-    windows : (J,) ndarray
-        Number of windows that were used.
-    change : (J,) ndarray
+    n, missing: Samples.
+    gaps: (G, 2), number of gaps of up to 2^i samples, and samples that they have.
+    windows: (J,), number of windows that were used.
+    change: (J,).
     """
     m = 2.0 ** np.arange(windows.size)
     step = np.maximum(m / tuning.STREAMING_STARTS, 1.0)

@@ -64,14 +64,9 @@ def _range(values: FloatArray) -> tuple[float, float]:
 def coarsened(values: FloatArray, present: FloatArray, count: int, first: int) -> int:
     """Replace values by the means of aligned pairs of them, in place; returns their number.
 
-    Parameters
-    ----------
-    values, present : ndarray
-        Means, and numbers of samples that they are made of.
-    count : int
-        How many of them are in use.
-    first : int
-        Absolute index of the first.
+    values, present: Means, and numbers of samples that they are made of.
+    count: How many of them are in use.
+    first: Absolute index of the first.
     """
     made = 0
     for i in range(first % 2, count - 1, 2):

@@ -32,7 +32,7 @@ class StreamedRecording:
     n : int
         Samples per channel, missing ones included.
     notices : tuple of Notice
-        What the reader noticed in the first block, and what is missing in all of them.
+        The first of each kind that the reader noticed, and what is missing in all blocks.
     """
 
     variances: Mapping[str, WaveletVariance]
@@ -74,7 +74,9 @@ def stream(
     units = {c.name: c.unit if c.unit in SI_UNIT.values() else "" for c in first.inertial}
     variance = StreamingVariance(first.dt, units)
     missing = dict.fromkeys(names, 0)
+    noticed: list[Notice] = []
     for part in chain([first], parts):
+        noticed += part.notices
         for name in names:
             missing[name] += part[name].missing
         used = part if prepare is None else prepare(part)
@@ -90,5 +92,5 @@ def stream(
         source=first.source,
         dt=first.dt,
         n=variance.n,
-        notices=notices_of_blocks(first, missing, variance.n),
+        notices=notices_of_blocks(noticed, missing, variance.n),
     )

@@ -18,15 +18,8 @@ from gmwm.variance.wavelet import WaveletVariance
 def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletVariance:
     """The wavelet variance of the samples so far.
 
-    Parameters
-    ----------
-    channel : Channel
-        Of any samples: what it is called and measures.
-
-    Raises
-    ------
-    InputError
-        If it is too short, constant or of no sensor's size.
+    channel: Of any samples: what it is called and measures.
+    Raises InputError if it is too short, constant or of no sensor's size.
     """
     where = where_of(channel)
     there = series.n - series.missing

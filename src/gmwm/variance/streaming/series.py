@@ -55,30 +55,21 @@ class Series:
     Row k has the means of blocks of 2^k samples that begin at multiples of 2^k, counted from the
     beginning of the record.
 
-    Attributes
-    ----------
-    data, present : (rows, ROOM) ndarray
-        Latest values of each row about the reference, and how many samples each is made of; the
-        latter only where the state says that some are missing.
-    state : (rows, 5) ndarray of int
-        Values in the row, index of the first of them, whether samples of them are missing, values
-        of the head, and values that are worked off.
-    sums : (levels, 6) ndarray
-        Of the windows of a level: number, sum of the coefficients and of their squares, growth of
-        the variance of white noise by missing samples (over that of a sample), and what rounding
-        took from the former two sums.
-    head : (2, rows, HALO) ndarray
-        First values of each row, and of how many samples: what joins the part before.
-    blocks : (2, MOST_BLOCKS) ndarray
-        All values of one row, and of how many samples.
-    totals : (7,) ndarray
-        Reference, smallest, largest, sum and what was lost of it; sum of the fourth powers of the
-        finest coefficients, and what was lost.
-    tallies : (8,) ndarray of int
-        Samples, missing ones, of which at the end and at the beginning; blocks, their row, index of
-        the next; index of the first sample.
-    gaps : (63, 2) ndarray of int
-        Number of gaps of up to 2^i samples, and samples that they have.
+    data, present: (rows, ROOM), latest values of each row about the reference, and how many samples
+        each is made of; the latter only where the state says that some are missing.
+    state: (rows, 5) of int, values in the row, index of the first of them, whether samples of them
+        are missing, values of the head, and values that are worked off.
+    sums: (levels, 6), of the windows of a level: number, sum of the coefficients and of their
+        squares, growth of the variance of white noise by missing samples (over that of a sample),
+        and what rounding took from the former two sums.
+    head: (2, rows, HALO), first values of each row, and of how many samples: what joins the part
+        before.
+    blocks: (2, MOST_BLOCKS), all values of one row, and of how many samples.
+    totals: (7,), reference, smallest, largest, sum and what was lost of it; sum of the fourth
+        powers of the finest coefficients, and what was lost.
+    tallies: (8,) of int, samples, missing ones, of which at the end and at the beginning; blocks,
+        their row, index of the next; index of the first sample.
+    gaps: (63, 2) of int, number of gaps of up to 2^i samples, and samples that they have.
     """
 
     _ARRAYS = ("data", "present", "state", "sums", "head", "blocks", "totals", "tallies", "gaps")
@@ -322,10 +313,7 @@ class Series:
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         """Inverse of `arrays`.
 
-        Raises
-        ------
-        ValueError
-            If they do not have the shapes and types of a series.
+        Raises ValueError if they do not have the shapes and types of a series.
         """
         made = cls()
         for name in cls._ARRAYS:

@@ -23,9 +23,8 @@ from gmwm import (
 from gmwm.errors import InputError
 from gmwm.estimate import METHODS
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, defined
-from gmwm.estimate.likelihood.mle import _rescaled
+from gmwm.estimate.likelihood.mle import _rescaled, candidates
 from gmwm.estimate.likelihood.series import Series
-from gmwm.estimate.likelihood.starts import candidates
 from gmwm.estimate.result.fit import Fit
 from gmwm.process import as_model
 from gmwm.readers.recording import Channel

@@ -6,8 +6,8 @@ from scipy.optimize import minimize_scalar
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.likelihood.conclusion import redundant_term
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.vanishing import redundant_term
 from gmwm.estimate.problem.parameters import Coordinates
 
 

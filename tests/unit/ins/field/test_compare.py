@@ -14,7 +14,6 @@ from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.geometry import ned_difference
-from gmwm.report import write_comparison_report
 from gmwm.study.emulated_logs import emulated_log, sensors
 
 
@@ -70,7 +69,7 @@ def test_models_that_are_much_worse_are_named(drive, tmp_path):
     drawn = figure.axes[0].lines[0].get_ydata()
     assert drawn == pytest.approx(np.hypot(*found.outcomes["right"].error[:, :2].T))
     assert [each.get_text() for each in figure.axes[2].get_yticklabels()] == ["loose / right"]
-    assert "<svg" in write_comparison_report(found, tmp_path / "comparison.html").read_text()
+    assert "<svg" in found.report(tmp_path / "comparison.html").read_text()
 
 
 def test_an_overconfident_model_with_the_same_errors_is_less_honest(drive):

@@ -72,17 +72,63 @@ def test_variances_of_a_file_are_those_of_its_samples(file):
         assert (wv.name, wv.quantity) == (name, channel.quantity)
 
 
-def test_a_change_of_rate_and_stamps_that_go_back(tmp_path):
-    rng = np.random.default_rng(2)
+def test_a_change_of_rate(tmp_path):
     slow = np.arange(10_000) / 50.0
-    for name, time, message in (
-        ("changes", np.concatenate([slow, slow[-1] + np.arange(1, 9001) / 100.0]), "rate changes"),
-        ("back", np.concatenate([slow, slow]), "go back"),
-    ):
-        path = tmp_path / f"{name}.parquet"
-        parquet.write_table(pa.table({"time_s": time, "gyro_x": rng.normal(size=time.size)}), path)
-        with pytest.raises(InputError, match=message):
-            list(read_blocks(path, units=UNITS, rows=10_000))
+    time = np.concatenate([slow, slow[-1] + np.arange(1, 9001) / 100.0])
+    table = pa.table({"time_s": time, "gyro_x": np.random.default_rng(2).normal(size=time.size)})
+    with pytest.raises(InputError, match="the sampling rate goes from 50 to 100 Hz"):
+        list(read_blocks(table, units=UNITS, rows=10_000))
+
+
+SEAMS = (8000, 16_000)
+
+
+def moved(by, *, stays=False):
+    """Rows 0.01 s apart, but for those at the seams and all after the second, or at it only."""
+    time = 0.01 * np.arange(20_000)
+    if stays:
+        time[SEAMS[1] :] += by
+    else:
+        time[list(SEAMS)] += by
+    return time, np.arange(20_000)
+
+
+def kept(*, again=(), gone=()):
+    rows = np.sort(np.append(np.delete(np.arange(20_000), gone), again).astype(int))
+    return 0.01 * rows, rows
+
+
+def at_seams(before, after):
+    return np.concatenate([np.arange(seam - before, seam + after) for seam in SEAMS])
+
+
+CLOCKS = {
+    "bursts of 64": (0.01 * (np.arange(20_000) // 64 * 64 + 63), np.arange(20_000)),
+    "bursts of 300": (0.01 * (np.arange(20_000) // 300 * 300 + 299), np.arange(20_000)),
+    "astray": moved(0.37),
+    "early": moved(-1.7),
+    "set": moved(1.7e9, stays=True),
+    "set back": moved(-77.123, stays=True),
+    "back to the beginning": moved(-160.0, stays=True),
+    "lost": kept(gone=at_seams(9, 14)),
+    "lost after": kept(gone=at_seams(0, 23)),
+    "twice": kept(again=at_seams(0, 1)),
+    "a counter that runs over": (np.arange(20_000) * 2.0**16 / SEAMS[0] % 2**16, np.arange(20_000)),
+}
+
+
+@pytest.mark.parametrize("name", CLOCKS)
+def test_what_a_clock_does_at_a_seam_it_does_anywhere(name):
+    time, rows = CLOCKS[name]
+    x = np.random.default_rng(3).normal(size=20_000)[rows]
+    table = pa.table({"time_us" if "counter" in name else "time_s": time, "gyro_x": x})
+    whole = gmwm.read(table, units=UNITS)
+    for size in (8000, 7777):
+        parts = list(read_blocks(table, units=UNITS, rows=size))
+        found = np.concatenate([part["gyro_x"].values for part in parts])
+        np.testing.assert_array_equal(found, whole["gyro_x"].values)
+    codes = {n.code for n in gmwm.stream(table, units=UNITS, rows=8000).notices}
+    assert {n.code for n in whole.notices} - {"gravity"} <= codes
 
 
 def test_a_log_is_not_divided(tmp_path):

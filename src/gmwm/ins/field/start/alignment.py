@@ -35,22 +35,12 @@ from gmwm.ins.trajectory import NavState
 class Alignment:
     """An initial state.
 
-    Attributes
-    ----------
-    epoch : int
-        Of the IMU, where the filter starts.
-    state : NavState
-    sd : InitialSd
-    gyro_bias : (3,) ndarray
-        Subtracted from the gyros, rad/s; zero if the vehicle never stood still.
-    gyro_bias_sd : float or None
-        How well it is known, rad/s; ``None`` if the vehicle never stood still.
-    notices : tuple of Notice
-        How it came about.
-    stood : float
-        Time over which that was averaged, s.
-    turned : float
-        Time over which the gyros turned a course of GNSS back to the start, s.
+    epoch: Of the IMU, where the filter starts.
+    gyro_bias: (3,), subtracted from the gyros, rad/s; zero if the vehicle never stood still.
+    gyro_bias_sd: How well it is known, rad/s; ``None`` if the vehicle never stood still.
+    notices: How it came about.
+    stood: Time over which that was averaged, s.
+    turned: Time over which the gyros turned a course of GNSS back to the start, s.
     """
 
     epoch: int
@@ -74,33 +64,16 @@ def align(
 ) -> Alignment:
     """Find an initial state in the data.
 
-    Parameters
-    ----------
-    imu : Imu
-    aiding : Aiding
-        With position fixes.
-    models : SensorModels
-        Of the IMU, with the standard deviation of constant biases.
-    heading : float, optional
-        Of the forward axis at the first fix, rad from north to the east. By default that of the
-        GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros show it.
-    heading_sd : float, optional
-        How well a given heading is known, rad.
-    attitude : three floats, optional
-        Roll, pitch and yaw at the first fix, rad. By default the vehicle is levelled while it is
-        steady; if it never is, the attitude follows from how its velocity changes.
-    attitude_sd : float, optional
-        How well a given attitude is known, rad, each axis.
-
-    Returns
-    -------
-    Alignment
-
-    Raises
-    ------
-    InputError
-        If there is no fix, no steady stretch or acceleration to level by, or no way to know the
-        heading.
+    aiding: With position fixes.
+    models: Of the IMU, with the standard deviation of constant biases.
+    heading: Of the forward axis at the first fix, rad from north to the east. By default that of
+        the GNSS velocity once the vehicle moves, or of the Earth's rotation if the gyros show it.
+    heading_sd: How well a given heading is known, rad.
+    attitude: Roll, pitch and yaw at the first fix, rad. By default the vehicle is levelled while it
+        is steady; if it never is, the attitude follows from how its velocity changes.
+    attitude_sd: How well a given attitude is known, rad, each axis.
+    Raises InputError if there is no fix, no steady stretch or acceleration to level by, or no way
+        to know the heading.
     """
     positions = positions_of(aiding)
     if attitude is not None:
@@ -285,14 +258,7 @@ def _stationary(models: SensorModels, axis: str, dt: float) -> float:
 
 
 def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding]:
-    """Increments and fixes after the initial state, with the gyros' bias subtracted.
-
-    Parameters
-    ----------
-    imu : Imu
-    aiding : Aiding
-    alignment : Alignment
-    """
+    """Increments and fixes after the initial state, with the gyros' bias subtracted."""
     first = alignment.epoch
     rotation = _less(imu.rotation[first:], alignment.gyro_bias * imu.dt)
     fixes = []

@@ -39,23 +39,11 @@ def attitude_in_motion(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Attitude at an epoch, C_bn, and its standard deviations about north, east and down.
 
-    Parameters
-    ----------
-    imu : Imu
-    epoch : int
-    velocity : Fixes
-        Of the antenna.
-    place : (3,) ndarray
-        Latitude, longitude, height.
-    lever : (3,) ndarray
-        From the IMU to the antenna, m.
-    gyro_sd, accel_sd : float
-        Of constant errors of the sensors, rad/s and m/s^2.
-
-    Raises
-    ------
-    InputError
-        If no stretch of up to `gmwm.ins.tuning.MOTION_MOST` s shows the heading.
+    velocity: Of the antenna.
+    place: (3,), latitude, longitude, height.
+    lever: (3,), from the IMU to the antenna, m.
+    gyro_sd, accel_sd: Of constant errors of the sensors, rad/s and m/s^2.
+    Raises InputError if no stretch of up to `gmwm.ins.tuning.MOTION_MOST` s shows the heading.
     """
     start = epoch * imu.dt
     best: tuple[FloatArray, FloatArray] | None = None
