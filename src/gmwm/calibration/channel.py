@@ -84,10 +84,12 @@ def channel_model(
         How many times evident departures are taken off, and the rest fitted again.
     """
     removed: list[tuple[Departure, ...]] = [()] * len(sources)
+    before: Sequence[WaveletVariance] = ()
     try:
         for left in range(removals, -1, -1):
             with stage("variance"):
                 parts = variances(removed)
+                before = before or parts
             with stage("model"):
                 found = _fitted(parts[0] if len(parts) == 1 else parts, model, extra)
             with stage("departures"):
@@ -98,7 +100,8 @@ def channel_model(
             removed = [gone + more for gone, more in zip(removed, evident, strict=True)]
     except InputError as error:
         return Notice(error.code or "not-estimable", "bad", name, str(error))
-    fit = with_departures(found.fit, sources, there, removed, removing=removals > 0)
+    curves = list(zip(before, parts, strict=True))
+    fit = with_departures(found.fit, sources, there, removed, curves, removing=removals > 0)
     return replace(found, fit=fit)
 
 

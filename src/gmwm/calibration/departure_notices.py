@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import Departure
+from gmwm.calibration.departures import WIDE, Departure
 from gmwm.estimate import Fit
+from gmwm.variance import WaveletVariance
 
 
 def with_departures(
@@ -17,6 +21,7 @@ def with_departures(
     sources: Sequence[str],
     found: Sequence[Sequence[Departure]],
     removed: Sequence[Sequence[Departure]],
+    curves: Sequence[Sequence[WaveletVariance]],
     *,
     removing: bool = False,
 ) -> Fit:
@@ -29,32 +34,63 @@ def with_departures(
         Of its recordings; named where there are several.
     found, removed : sequence of sequence of Departure
         What each recording has, and what was taken off before the fit.
+    curves : sequence of sequence of WaveletVariance
+        Of each recording, before that was taken off and without it.
     removing : bool, optional
         Whether departures were to be taken off: those that are left are no more.
     """
     unit = fitted.wv.unit
     notices = [
         replace(notice, source=source if len(sources) > 1 else "")
-        for source, there, gone in zip(sources, found, removed, strict=True)
+        for source, there, gone, both in zip(sources, found, removed, curves, strict=True)
         for notice in (
             *(departure_notice(each, unit, stays=removing) for each in there),
             *(_removed_notice(each, unit) for each in gone),
-            *_many_notices(gone),
+            *(_taken_notices(gone, *both) if gone else ()),
         )
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
 
 
-def _many_notices(removed: Sequence[Departure]) -> list[Notice]:
-    """That too much was taken off to be accidents."""
-    if len(removed) <= tuning.MOST_REMOVED:
-        return []
-    text = (
-        f"{len(removed)} departures were taken off: a level that changes so often is noise of the "
-        "sensor, which the model lacks now"
-    )
-    action = "fit a slow term in place of it, such as a Gauss-Markov process"
-    return [Notice("departures-many", "bad", "", text, {"removed": len(removed)}, action)]
+def _taken_notices(
+    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance
+) -> list[Notice]:
+    """What a model lacks without what was taken off, and whether that was noise of the sensor."""
+    lost = np.sqrt(before.variance[: after.variance.size] / after.variance)
+    most = int(np.argmax(lost))
+    notices = []
+    if lost[most] ** -2 < 1.0 - tuning.HARMFUL_SHARE:
+        values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
+        text = (
+            f"with what was taken off, the record has {values['ratio']:.2g} times the deviation at "
+            f"tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
+        )
+        action = "find its cause, or let a slow term of the model describe it"
+        notices.append(Notice("departures-removed", "warning", "", text, values, action))
+    between = _is_between_two_levels(removed)
+    if between or len(removed) > tuning.MOST_REMOVED:
+        how = "steps between two levels" if between else "changes so often"
+        text = (
+            f"{len(removed)} departures were taken off: a level that {how} is noise of the sensor"
+        )
+        values = {"removed": len(removed), "two_levels": between}
+        action = "fit a slow term in place of it, such as a Gauss-Markov process"
+        notices.append(Notice("departures-many", "bad", "", text, values, action))
+    return notices
+
+
+def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
+    """Whether three steps in a row go up and down by the same, within their errors."""
+    steps = sorted((each.time[0], each.size) for each in removed if each.kind == "step")
+    sizes = np.array([size * (-1) ** i for i, (_, (size, _, _)) in enumerate(steps)])
+    errors = np.array([(high - low) / (2.0 * WIDE) for _, (_, low, high) in steps])
+    for i in range(sizes.size - 2):
+        three, weights = sizes[i : i + 3], errors[i : i + 3] ** -2.0
+        rest = three - np.average(three, weights=weights)
+        alike = chi2.sf(float(weights @ rest**2), 2) > tuning.OTHER_SIZE
+        if alike and abs(float(np.sum(np.sign(three)))) == three.size:
+            return True
+    return False
 
 
 def _removed_notice(found: Departure, unit: str) -> Notice:

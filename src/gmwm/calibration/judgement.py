@@ -19,6 +19,7 @@ _SPOILING_CHANNEL = frozenset(
     {
         "abrupt-end",
         "dead",
+        "filled",
         "held",
         "rounding",
         "saturation",

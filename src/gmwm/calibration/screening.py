@@ -19,7 +19,7 @@ model may have; the wavelet variances of channels with more outliers than can be
 robust."""
 
 # Codes of advice that only the user can follow.
-_ADVICE = ("stuck", "held", "saturation", "abrupt-end", "temperature", "variance")
+_ADVICE = ("stuck", "held", "filled", "saturation", "abrupt-end", "temperature", "variance")
 
 
 @dataclass(frozen=True)

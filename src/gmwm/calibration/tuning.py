@@ -50,10 +50,11 @@ REMOVALS = 3
 
 MOST_REMOVED = 4
 """Departures of one record that may be accidents: a telegraph bias has five or more in five of six
-records of six mean dwell times, real recordings of 2 h 46 min have four at most. Of other noises
-and seeds, 7,200 s (benchmarks/departures.py jumps), 1 of 144 records of one to four steps has five
-and more, and 10 of 36 of a telegraph bias of ten and of six mean dwell times: of those that jump
-less fewer are taken off, or a slow term holds them."""
+records of six mean dwell times, real recordings of 2 h 46 min have four at most."""
+
+OTHER_SIZE = 1e-3
+"""Chance of three steps up and down between two levels to differ by as much: of two levels, steps
+have one size (benchmarks/departures.py jumps)."""
 
 MOST_MEANS = 256
 """Block means; dense matrices of them are made."""

@@ -48,7 +48,7 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 
 _OF_RECORDING = (
     "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "value-repeated", "variance",
+    "held", "filled", "value-repeated", "variance",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 

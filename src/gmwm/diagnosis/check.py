@@ -181,7 +181,10 @@ def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
     found = repetition(channel)
     straight = interpolation_notice(channel) if found is None and channel.is_of_a_sensor else None
     if straight is not None:
-        return _Examined([straight], ChannelHealth(), None)
+        if straight.code == "interpolated":
+            return _Examined([straight], ChannelHealth(), None)
+        some = _examined(channel, motion)
+        return replace(some, notices=[straight, *some.notices])
     if found is None:
         return _examined(channel, motion)
     one = _examined(thinned(channel, found), motion)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.resolution import step_size
@@ -50,7 +50,7 @@ def repetition_notice(channel: Channel, found: Repetition) -> Notice:
 
 
 def interpolation_notice(channel: Channel) -> Notice | None:
-    """Say that samples lie on straight lines between those of a lower rate.
+    """Say that samples lie on straight lines between others, all over or now and then.
 
     Second differences vanish but where two lines meet, which two of them see: of an interpolation
     from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
@@ -71,13 +71,18 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     if not limit < tuning.STRAIGHT_AT_MOST * size:
         return None  # steps as large as the noise
     share = float(np.mean(bends <= limit))
-    if share < max(tuning.LEAST_STRAIGHT, 10.0 * limit / size):
+    near = float(np.mean(bends <= tuning.NEARLY_STRAIGHT * size)) - share
+    if share < max(tuning.FEWEST_STRAIGHT, tuning.BESIDE_STRAIGHT * near, 10.0 * limit / size):
         return None
+    text = f"{share:.2g} of the samples lie on straight lines between others"
+    if share < tuning.LEAST_STRAIGHT:
+        values_of = {"share": share}
+        text += ": put there for samples that were lost or sorted out"
+        action = "make such samples missing (NaN)"
+        severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
+        return Notice("filled", severity, channel.name, text, values_of, action)
     rate = 0.5 * (1.0 - share) / channel.dt
-    text = (
-        f"{share:.0%} of the samples lie on straight lines between others: it was interpolated "
-        f"from about {rate:.3g} Hz, and its noise is not that of the sensor"
-    )
+    text += f": it was interpolated from about {rate:.3g} Hz, and its noise is not the sensor's"
     action = (
         "record what the sensor gives, in a topic of its own or without the driver's interpolation "
         "(RealSense: unite_imu_method 0); the channel is skipped in the calibration"

@@ -93,7 +93,7 @@ class Health(Document, Printed):
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
         "infinite", "size", "stuck", "held", "saturation", "abrupt-end", "value-repeated",
-        "repeated-samples", "interpolated", "event",
+        "repeated-samples", "interpolated", "filled", "event",
         "outliers", "heavy-tails", "rounding", "line",
         "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict

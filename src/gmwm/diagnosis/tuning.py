@@ -221,6 +221,10 @@ NARROW = 0.01
 UNRESOLVED = 6
 """Bins that a pure line takes under the Hann window, its foot included."""
 
+LEAST_LINE = 1e-8
+"""Amplitude over the deviation of the samples, about: what filters of double precision leave beyond
+their band has peaks of 5e-9, and no level of a wavelet variance sees them."""
+
 BESIDE_LINE, BESIDE_LINE_FRACTION = 64, 0.015
 """Bins on both sides that give the local background, or this part of the frequency."""
 
@@ -354,3 +358,8 @@ nothing is seen."""
 LEAST_STRAIGHT = 0.15
 """Share of second differences that vanish: of noise there are ten times the threshold over its
 size, at most; of an interpolation to 2.4 times the rate and more there are as many."""
+
+FEWEST_STRAIGHT, NEARLY_STRAIGHT, BESIDE_STRAIGHT = 0.02, 0.05, 0.25
+"""Share from which some samples were put between others; second differences, in those of their
+size, that noise has as often as it has smaller ones; and of these the share that vanishes by
+rounding at most, in two steps of it."""

@@ -128,6 +128,13 @@ OUTAGES_SHOWN = 6
 
 # -- faults of a log -------------------------------------------------------------------------------
 
+SUSPECTED = 0.01
+"""p-value below which explanations are looked for that cost many runs of the filter; what is found
+has to earn its own level."""
+
+TRACK_STEP = 1.0
+"""s, of a track between whose points nothing but noise of the IMU is expected."""
+
 LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
 """s, of a constant error of the fixes' stamps that is looked for: leap seconds are more, and leave
 no fix near; and of the fixes left out at both ends beside it."""

@@ -30,6 +30,7 @@ from gmwm.process.spectral import (
     Panels as Panels,
     evaluated as evaluated,
     haar_gain as haar_gain,
+    in_hertz as in_hertz,
     legendre as legendre,
     quadrature as quadrature,
 )

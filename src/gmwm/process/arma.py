@@ -16,6 +16,7 @@ from gmwm.errors import InputError
 from gmwm.process import spectral, synthesis
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import Parameter, parameter
+from gmwm.process.spectral import squared_sine
 from gmwm.process.state_space import StateSpace
 
 Coefficients = int | float | Sequence[float | None] | None
@@ -143,7 +144,7 @@ class ARIMA(Process):
         numerator = np.polynomial.polynomial.polyval(delay, [1.0, *self.ma])
         denominator = np.polynomial.polynomial.polyval(delay, [1.0, *(-c for c in self.ar)])
         density = self.sigma2 * dt * np.abs(numerator) ** 2 / np.abs(denominator) ** 2
-        return np.asarray(density / (4.0 * np.sin(np.pi * f * dt) ** 2) ** self.d)
+        return np.asarray(density / (4.0 * squared_sine(f, dt)) ** self.d)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         if self.d:

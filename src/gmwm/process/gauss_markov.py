@@ -27,6 +27,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.process import synthesis
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
+from gmwm.process.spectral import squared_sine
 from gmwm.process.state_space import StateSpace
 
 _SERIES_BELOW = 0.5
@@ -217,7 +218,7 @@ def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
     if np.real(half) > 300.0:
         return np.full(np.shape(f), dt, dtype=np.result_type(half, float))
     s = np.sinh(half)
-    return dt * np.cosh(half) * s / (s * s + np.sin(np.pi * f * dt) ** 2)
+    return dt * np.cosh(half) * s / (s * s + squared_sine(f, dt))
 
 
 @compiled()

@@ -26,6 +26,7 @@ from gmwm.process.spectral import (
     PANEL_POLE,
     TOGETHER,
     WIDER,
+    log_tangent,
     node_weights,
     panel_weights,
     rounded,
@@ -98,10 +99,9 @@ class LowPassNoise(_Filtered):
         super().__init__(N, bandwidth, order, damping)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        with np.errstate(divide="ignore"):
-            log_tangent = np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5)))
-        found = _gain(self.bandwidth, self.order, self.damping, log_tangent.ravel(), dt)
-        return self.N**2 * found.reshape(log_tangent.shape)
+        x = log_tangent(f, dt)
+        found = _gain(self.bandwidth, self.order, self.damping, x.ravel(), dt)
+        return self.N**2 * found.reshape(x.shape)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)

@@ -16,6 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.process import synthesis
 from gmwm.process.base import Process
 from gmwm.process.parameter import parameter
+from gmwm.process.spectral import squared_sine
 from gmwm.process.state_space import StateSpace
 from gmwm.process.wavelets import wavelet as filters
 
@@ -76,7 +77,7 @@ class QuantizationNoise(Process):
         super().__init__(Q)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        return 4.0 * self.Q**2 / dt * np.sin(np.pi * f * dt) ** 2
+        return 4.0 * self.Q**2 / dt * squared_sine(f, dt)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         return 1.5 * self.Q**2 / np.asarray(tau, dtype=float) ** 2
@@ -122,7 +123,7 @@ class RandomWalk(Process):
         super().__init__(K)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        return 0.25 * (self.K * dt) ** 2 / np.sin(np.pi * f * dt) ** 2
+        return 0.25 * (self.K * dt) ** 2 / squared_sine(f, dt)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         tau = np.asarray(tau, dtype=float)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 
 import numpy as np
 import numpy.typing as npt
@@ -94,6 +94,59 @@ def haar_gain(m: float, frequency: FloatArray) -> FloatArray:
     """Squared gain of the Haar filter of averaging time ``m`` samples (cycles per sample)."""
     sine = np.sin(np.pi * m * frequency) ** 2  # a fourth power takes ten times as long
     return sine**2 / (m * np.sin(np.pi * frequency)) ** 2
+
+
+_OfFrequencies = Callable[[FloatArray, float], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fixed:
+    """An array, the same as another one only if it is that, and a sampling interval."""
+
+    f: FloatArray
+    dt: float
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Fixed) and self.f is other.f and self.dt == other.dt
+
+    def __hash__(self) -> int:
+        return hash((id(self.f), self.dt))
+
+
+def _kept(function: _OfFrequencies) -> _OfFrequencies:
+    """Keep what it gives for arrays that nobody can write to: spectra of a search share them."""
+
+    @lru_cache(maxsize=16)
+    def of_fixed(given: _Fixed) -> FloatArray:
+        found = function(given.f, given.dt)
+        found.flags.writeable = False
+        return found
+
+    @wraps(function)
+    def found(f: FloatArray, dt: float) -> FloatArray:
+        is_fixed = isinstance(f, np.ndarray) and f.base is None and not f.flags.writeable
+        return of_fixed(_Fixed(f, dt)) if is_fixed else function(f, dt)
+
+    return found
+
+
+@_kept
+def in_hertz(f: FloatArray, dt: float) -> FloatArray:
+    """Frequencies in Hz from those in cycles per sample."""
+    return f / dt
+
+
+@_kept
+def squared_sine(f: FloatArray, dt: float) -> FloatArray:
+    """sin^2(pi f dt) at frequencies f in Hz."""
+    return np.asarray(np.sin(np.pi * f * dt) ** 2)
+
+
+@_kept
+def log_tangent(f: FloatArray, dt: float) -> FloatArray:
+    """Log tan(pi |f| dt) at frequencies f in Hz, up to half the sampling rate."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.tan(np.pi * np.minimum(np.abs(f) * dt, 0.5))))
 
 
 @lru_cache(maxsize=8)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
-from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
@@ -259,11 +259,12 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
         )
 
 
-def _repeated(columns: Sequence[FloatArray]) -> BoolArray:
-    """Which rows have the values of the row before in every column."""
-    same = np.ones(columns[0].size, dtype=bool)
+def _repeated(columns: Sequence[FloatArray], order: IntArray) -> BoolArray:
+    """Which rows, in an order, have the values of the row before in every column."""
+    same = np.ones(order.size, dtype=bool)
     same[0] = False
-    for values in columns:
+    for column in columns:
+        values = column[order]
         both = np.isnan(values[1:]) & np.isnan(values[:-1])
         same[1:] &= (values[1:] == values[:-1]) | both
     return same
@@ -287,7 +288,7 @@ def _timing(
         seconds=meaning(name).seconds,
         own_unit=meaning(name).stated,
         where=table.where,
-        same=lambda: _repeated([arrays[i] for i in arrays if i != time]),
+        same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
         extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
     )
     timing = clock.timing(stated)

@@ -40,12 +40,14 @@ _WHY = {
     "abrupt-end": "samples that end abruptly",
     "stuck": "values that stick",
     "held": "samples that repeat the one before",
+    "filled": "samples put between others",
     "value-repeated": "one value stands for many",
     "variance": "the noise comes and goes",
     "step": "the bias stepped",
     "transient": "a transient at the start",
     "drift-at-start": "drift after switching on",
     "slow-period": "a slow period stands out",
+    "departures-many": "the bias steps to and fro",
 }
 """Code of a notice that makes a fit invalid -> why, in about five words."""
 

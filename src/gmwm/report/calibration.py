@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from functools import partial
 from html import escape
+from operator import call
 from pathlib import Path
 from typing import Any
 
 from gmwm._core.files import written
 from gmwm._core.notices import worst_first
+from gmwm._core.runs import shared
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
-from gmwm.readers import Recording
+from gmwm.readers import Channel, Recording
 from gmwm.report.answer import answer, bias_instability, quantity_text, slow_terms, trust, verdict
 from gmwm.report.budget import navigation
 from gmwm.report.datasheet import Datasheet, read_datasheet
@@ -27,6 +30,7 @@ from gmwm.report.figure import (
 from gmwm.report.health import ambiguity, health
 from gmwm.report.numbers import SHOWN, Certified, certified
 from gmwm.report.page import origin, rendered, resource
+from gmwm.report.samples import Spans
 from gmwm.report.text import duration_text, needed, number, short
 
 _AIM = 0.1  # relative standard error
@@ -77,7 +81,7 @@ def page(
 
     quantities = {name: fit.wv.quantity or "" for name, fit in calibration.items()}
     sheet = None if datasheet is None else read_datasheet(datasheet, quantities)
-    numbers = certified(calibration)
+    numbers, of_samples = _side_by_side(calibration, recording)
     source = {"recording": calibration.source or "not named"}
     return rendered(
         "template.html",
@@ -91,7 +95,8 @@ def page(
         ],
         health=health(calibration),
         channels=[
-            _channel(name, calibration, numbers[SHOWN], recording, sheet) for name in calibration
+            _channel(name, calibration, numbers[SHOWN], sheet) | of_samples[name]
+            for name in calibration
         ],
         navigation=navigation(calibration),
         provenance=origin(source | dict(provenance or {}), "report of", sheet),
@@ -122,19 +127,40 @@ def fragment(calibration: Calibration) -> str:
     return f"<p>{escape(title)}</p><table>{head}{''.join(rows)}</table>"
 
 
+def _side_by_side(
+    calibration: Calibration, recording: Recording | None
+) -> tuple[dict[float, Certified], dict[str, dict[str, Any]]]:
+    """What a filter should believe, and the figures of the samples: what takes longest."""
+    believed = partial(certified, calibration)
+    samples = {} if recording is None else recording
+    drawn = {
+        name: partial(_of_samples, fit, samples.get(name), calibration.left_out.get(name, ()))
+        for name, fit in calibration.items()
+    }
+    # The first is sent to another process, and the next done in this one, whose exports ask for
+    # some of the numbers again.
+    work: list[partial[Any]] = list(drawn.values())
+    work.insert(1, believed)
+    found = dict(shared(call, work))
+    return found[believed], {name: found[each] for name, each in drawn.items()}
+
+
+def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, Any]:
+    if channel is None:
+        return {"density": None, "series": None}
+    return {
+        "density": density_figure(fit, channel, spans),
+        "series": series_figure(fit, channel, spans),
+    }
+
+
 def _channel(
-    name: str,
-    calibration: Calibration,
-    numbers: Certified,
-    recording: Recording | None,
-    sheet: Datasheet | None,
+    name: str, calibration: Calibration, numbers: Certified, sheet: Datasheet | None
 ) -> dict[str, Any]:
     fit = calibration[name]
     lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
     own = numbers.axes.get(name)
     believed = (own.N, own.K) if own is not None else None
-    spans = calibration.left_out.get(name, ())
-    channel = recording[name] if recording is not None and name in recording else None
     is_valid, why = trust(name, fit, calibration)
     return {
         "name": name,
@@ -157,9 +183,7 @@ def _channel(
         ),
         "sliders": _sliders(fit, believed),
         "residuals": residual_figure(fit),
-        "density": None if channel is None else density_figure(fit, channel, spans),
-        "series": None if channel is None else series_figure(fit, channel, spans),
-        "left_out": sum(stop - start for start, stop in spans),
+        "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),
         "fitness": _fitness(fit),
     }
 

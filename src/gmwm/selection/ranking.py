@@ -156,7 +156,10 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
     plain.sort(key=lambda item: item[0].criterion)
     if isinstance(wv, PooledVariance):
         return [candidate for candidate, _ in plain], None
-    slope = _slope_under(plain[0], wv)
+    try:
+        slope = _slope_under(plain[0], wv)
+    except InputError:  # samples missing all over leave none to be seen
+        return [candidate for candidate, _ in plain], None
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
     ambiguous = None

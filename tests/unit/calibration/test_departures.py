@@ -289,6 +289,41 @@ def test_a_pulse_is_two_steps_of_one_size_and_both_are_removed():
     assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)
 
 
+def test_what_was_taken_off_is_what_the_model_lacks():
+    # One step of a telegraph bias looks like an accident, and is no less of its error.
+    rec = recording(noise(10, WHITE) + 0.4 * SAMPLE * STEP)
+    fit = gmwm.calibrate(rec, WhiteNoise(), remove_departures=True)["gyro_x"]
+    (notice,) = [one for one in fit.notices if one.code == "departures-removed"]
+    assert notice.severity == "warning"
+    tau, ratio = notice.values["tau"], notice.values["ratio"]
+    raw = gmwm.wavelet_variance(rec["gyro_x"])
+    model = fit.model.haar_variance(raw.tau, DT)
+    assert ratio == pytest.approx(np.max(np.sqrt(raw.variance / model)), rel=0.3)
+    assert tau > 1000.0 and ratio > 5.0
+    assert fit.valid
+
+
+@pytest.mark.parametrize(
+    ("sizes", "seed", "between"),
+    [
+        ((1.0, -1.0, 1.0), 20, True),
+        ((-1.0, 1.0, -1.0), 21, True),
+        ((1.0, 1.0, -1.0), 22, False),
+        ((1.0, -0.6, 1.0), 23, False),
+        ((1.0, -1.0), 24, False),
+        ((1.0,), 25, False),
+    ],
+)
+def test_three_steps_between_two_levels_are_noise_of_the_sensor(sizes, seed, between):
+    curve = sum(size * (1000.0 + 2000.0 * i < TIME) for i, size in enumerate(sizes))
+    rec = recording(noise(seed, WHITE) + 0.4 * SAMPLE * curve)
+    fit = gmwm.calibrate(rec, WhiteNoise(), remove_departures=True)["gyro_x"]
+    assert sum(one.values.get("removed") is True for one in fit.notices) == len(sizes)
+    many = [one.values["two_levels"] for one in fit.notices if one.code == "departures-many"]
+    assert many == [True] * between
+    assert fit.valid is not between
+
+
 def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
     n, dt = 54_000, 0.1
     level = np.cumsum(np.random.default_rng(2).random(n) < 1.0 / 9000.0) % 2

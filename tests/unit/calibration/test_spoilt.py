@@ -29,6 +29,14 @@ def held(share, step=0.0, n=N):
     return values[np.maximum.accumulate(last)]
 
 
+def between(values, some):
+    return np.where(some, 0.5 * (np.roll(values, 1) + np.roll(values, -1)), values)
+
+
+def filled(share):
+    return between(clean(1), np.random.default_rng(2).random(N) < share)
+
+
 def rounded(noise, step):
     return step * np.round(noise / step)
 
@@ -57,6 +65,10 @@ SPOILT = {
     ),
     "uniform": ("abrupt-end", "within_range", SD * np.random.default_rng(1).random(N)),
     "10 % held, steps of 0.4 sd": ("held", "samples_measured", held(0.1, 0.4)),
+    "10 % between their neighbours": ("filled", "samples_measured", filled(0.1)),
+    "beyond 1.7 sd between its neighbours": (
+        "filled", "samples_measured", between(clean(1), np.abs(clean(1)) > 1.7 * SD)
+    ),
     "swells to 2 sd and dies": (
         "variance", "noise_steady", shaken(lambda t: 1.0 + np.sin(np.pi * t / 60.0) ** 2)
     ),

@@ -99,6 +99,35 @@ def test_noise_is_not_interpolated(step):
     for values in (noise, np.cumsum(noise), noise + np.sin(np.arange(noise.size) / 9.0)):
         rec = gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "deg/s"})
         assert not gmwm.health(rec).of(code="interpolated")
+        assert not gmwm.health(rec).of(code="filled")
+
+
+@pytest.mark.parametrize(("share", "severity"), [(0.03, "warning"), (0.1, "bad")])
+@pytest.mark.parametrize("kind", ["white", "walk", "low-pass"])
+def test_samples_put_between_their_neighbours_are_named(share, severity, kind):
+    rng = np.random.default_rng(5)
+    noise = rng.normal(size=40_000)
+    slow = {"white": noise, "walk": noise + 0.1 * np.cumsum(rng.normal(size=noise.size))}
+    sound = slow.get(kind, lfilter(np.ones(4), [1.0], noise)).round(4)
+    lost = np.flatnonzero(rng.random(sound.size - 2) < 1.3 * share) + 1
+    lost = lost[np.diff(lost, prepend=0) > 1][: round(share * sound.size)]
+    filled = sound.copy()
+    filled[lost] = 0.5 * (sound[lost - 1] + sound[lost + 1])
+    channels = {"gyro_x": 1e-3 * sound, "gyro_y": 1e-3 * filled}
+    found = gmwm.health(gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "rad/s"}))
+    (notice,) = found.of(code="filled")
+    assert (notice.where, notice.severity) == ("gyro_y", severity)
+    assert notice.values["share"] == pytest.approx(lost.size / sound.size, rel=0.1)
+
+
+@pytest.mark.parametrize("smooth", [1.0, 30.0, 1000.0])
+def test_samples_of_single_precision_are_not_filled(smooth):
+    noise = np.random.default_rng(6).normal(size=40_000)
+    values = lfilter([1.0], [1.0, 1.0 / smooth - 1.0], noise) + 9.81
+    rec = gmwm.Recording.from_arrays(
+        {"gyro_x": values.astype(np.float32)}, 100.0, {"gyro": "deg/s"}
+    )
+    assert not gmwm.health(rec).of(code="filled")
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0])

@@ -182,3 +182,40 @@ def test_what_moves_is_no_error_code(kind):
 
     table = pd.DataFrame({"time [s]": 0.01 * np.arange(n), "gyro_x [mdeg/s]": values})
     assert "sentinel" not in codes(gmwm.read(table))
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        np.s_[2000:6000],  # beside a clock of 100 Hz they look like one of 200 Hz
+        np.s_[14_000:],
+        np.s_[5000:5003],
+    ],
+)
+@pytest.mark.parametrize("how", ["each row twice", "in a piece"])
+def test_rows_written_again_change_neither_rate_nor_samples(again, how):
+    n, rng = 20_000, np.random.default_rng(4)
+    time = 0.01 * (np.arange(n) + 0.05 * rng.standard_normal(n))
+    values = rng.standard_normal(n)
+    rows = np.arange(n)
+    stop = rows[again][-1] + 1
+    order = np.concatenate([rows[:stop], rows[again], rows[stop:]])
+    if how == "each row twice":
+        order = np.sort(order)
+    frame = pd.DataFrame({"time_s": time[order], "gyro_x": values[order]})
+    recording = gmwm.read(frame, units={"gyro": "rad/s"})
+    np.testing.assert_array_equal(recording["gyro_x"].values, values)
+    assert recording.rate == pytest.approx(100.0, rel=1e-5)
+    (notice,) = [
+        each for each in recording.notices if each.severity != "note" or "rows" in each.code
+    ]
+    assert (notice.code, notice.values["count"]) == ("rows-repeated", rows[again].size)
+
+
+def test_a_clock_that_is_set_back_repeats_stamps_and_no_rows():
+    n, rng = 20_000, np.random.default_rng(5)
+    number = np.arange(n) - 300 * (np.arange(n) >= 9000)
+    frame = pd.DataFrame({"time_s": 0.01 * number, "gyro_x": rng.standard_normal(n)})
+    recording = gmwm.read(frame, units={"gyro": "rad/s"})
+    assert recording.n == n
+    assert "clock-set" in [each.code for each in recording.notices]

@@ -199,3 +199,12 @@ def test_a_model_of_several_recordings_is_loaded_with_all_of_them():
     assert [part.params for part in again.fit.parts] == [
         part.params for part in selection.fit.parts
     ]
+
+
+def test_samples_missing_all_over_leave_a_model_without_a_ramp():
+    # Every block mean of which a slope is made misses twelve samples.
+    x = gmwm.simulate(WhiteNoise(1e-3), 20_000, 0.01, seed=3)
+    x[np.arange(x.size) % 40 < 12] = np.nan
+    best = gmwm.select(gmwm.wavelet_variance(x, dt=0.01)).fit
+    assert list(best.params) == ["N"]
+    assert best.params["N"] == pytest.approx(1e-3, rel=4.0 / np.sqrt(2.0 * 14_000))

@@ -51,6 +51,8 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
         return ()
     local, freedom = _local_background(spectrum.density, smooth)
+    # A filter leaves so little beyond its band that rounding of the computer has peaks there.
+    local = np.maximum(local, tuning.LEAST_LINE**2 * float(np.sum(spectrum.density)))
     ratio = spectrum.density / local
     grid, limits = _limits(last, freedom)
     score, best = _scores(ratio, freedom, grid, limits, 0, last)

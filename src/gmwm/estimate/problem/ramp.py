@@ -63,12 +63,11 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     first = _beside(index)
     difference = wv.blocks[first + 1] - wv.blocks[first]
     column = difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
-    one = np.ones(first.size)
-    solved = _solve(column, first, np.column_stack([one, difference]))
-    information = float(one @ solved[:, 0])
+    weights = _solve(column, first, np.ones(first.size))
+    information = float(np.sum(weights))
     step = wv.block * wv.dt
     variance = _growth(wv) / information / step**2
-    return Slope(float(one @ solved[:, 1]) / information / step, variance)
+    return Slope(float(weights @ difference) / information / step, variance)
 
 
 def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:

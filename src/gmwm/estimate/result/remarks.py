@@ -40,6 +40,7 @@ REASONS = {
     "stuck": "samples_change",
     "dead": "samples_change",
     "held": "samples_measured",
+    "filled": "samples_measured",
     "value-repeated": "samples_measured",
     "variance": "noise_steady",
     "step": "stationary",

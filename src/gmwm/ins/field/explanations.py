@@ -82,18 +82,22 @@ def cost(parameters: int, among: int = 1) -> float:
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant error: how it is allowed for, steps of its derivatives, and what is possible."""
+    """A constant error: how it is allowed for, steps of its derivatives, and what is possible.
+
+    smooth: Allows for it too, less exactly, but with the same noise between two fixes.
+    """
 
     code: str
     names: tuple[str, ...]
     change: Callable[[Replay, FloatArray], Replay]
     step: float
     prior: float
+    smooth: Callable[[Replay, FloatArray], Replay] | None = None
 
 
 _CLOCK = Constant(
     "time-offset", ("time offset",), lambda r, x: r.later(-float(x[0])), 0.05,
-    tuning.LARGEST_OFFSET,
+    tuning.LARGEST_OFFSET, lambda r, x: r.along(-float(x[0])),
 )  # fmt: skip
 _ARM = Constant(
     "lever-arm", ("forward", "right", "down"), lambda r, x: r.with_arm_longer(x), 0.5,
@@ -142,7 +146,10 @@ def clock_step(base: Replay) -> Candidate | None:
 
     def at(i: int) -> Constant:
         since = 0.5 * float(time[i - 1] + time[i])
-        return replace(_CLOCK, code="clock-step", change=lambda r, x: r.later(-float(x[0]), since))
+        return replace(
+            _CLOCK, code="clock-step", change=lambda r, x: r.later(-float(x[0]), since),
+            smooth=lambda r, x: r.along(-float(x[0]), since),
+        )  # fmt: skip
 
     def promised(i: int) -> float:
         column = _columns(base, partial(at(i).change, base), _steps((_CLOCK,)), np.zeros(1))
@@ -252,11 +259,18 @@ def _fitted(
             break
     if not np.any(theta) and start == 0.0:
         return ()
-    gain, deviations = difference(here, base), np.sqrt(np.diag(covariance))
-    if start != 0.0:
-        theta[0] = (theta[0] + start + np.pi) % (2.0 * np.pi) - np.pi
     # Of two errors each has to earn its own: what one alone explains names no other.
     price = sum(cost(len(each.names)) for each in errors)
+    gain = difference(here, base)
+    if errors[0].smooth is not None and np.isfinite(base.log_likelihood):
+        regular, without = _smoothly(base, errors, theta)
+        if len(errors) == 1:  # beside the antenna, what is less exact would tell them apart
+            covariance = without
+        # The stamps' own gain is the exact one; it counts if it is no matter of other noise.
+        gain = gain if regular > price else min(gain, regular)
+    deviations = np.sqrt(np.diag(covariance))
+    if start != 0.0:
+        theta[0] = (theta[0] + start + np.pi) % (2.0 * np.pi) - np.pi
     found = []
     for each, part in zip(errors, parts, strict=True):
         values = dict(zip(each.names, theta[part].tolist(), strict=True))
@@ -267,6 +281,22 @@ def _fitted(
 
         found.append(Explanation(each.code, "", change, here, gain, price, values, spread))
     return tuple(found)
+
+
+def _smoothly(
+    base: Replay, errors: tuple[Constant, ...], theta: FloatArray
+) -> tuple[float, FloatArray]:
+    """Gain and covariance without what comes of other noise: as much, by chance, as that is."""
+
+    def changed(x: FloatArray) -> Replay:
+        replay = base
+        for each, part in zip(errors, _parts(errors), strict=True):
+            replay = (each.smooth or each.change)(replay, x[part])
+        return replay
+
+    here = changed(theta)
+    columns = _columns(here, changed, _steps(errors), theta)
+    return difference(here, base), _step(here, columns, errors, theta)[1]
 
 
 def _steps(errors: tuple[Constant, ...]) -> FloatArray:

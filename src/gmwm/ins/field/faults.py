@@ -80,12 +80,12 @@ class Faults:
         return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
 
 
-def contradicted(replay: Replay) -> bool:
+def contradicted(replay: Replay, level: float = LEVEL) -> bool:
     """Whether the innovations have another size than expected, or depend on those before."""
     if not np.isfinite(replay.log_likelihood):
         return True
     tests = [replay.test(kind) for kind in replay.kinds()]
-    return any(each.nis.p_value <= LEVEL or each.whiteness <= LEVEL for each in tests)
+    return any(each.nis.p_value <= level or each.whiteness <= level for each in tests)
 
 
 def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str]) -> list[Candidate]:
@@ -94,7 +94,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
     cleaned = outliers(here)
     if cleaned is not None:
         found.append(cleaned)
-    if contradicted(here) or any(each.gain > cost(1) for each in found):
+    if contradicted(here, tuning.SUSPECTED) or any(each.gain > cost(1) for each in found):
         sizes = [here.test(kind).nis.value for kind in here.kinds()]
         if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
             found += [far_heading(here), *wrong_signs(here)]

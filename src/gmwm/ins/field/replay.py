@@ -13,7 +13,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.start import Alignment, mean_sd, started
-from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, InitialSd, Solution, navigate
+from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio, lag_one
@@ -106,6 +106,39 @@ class Replay:
             order = np.argsort(time, kind="stable")
             value, sd = each.value[order], each.sd[order]
             fixes.append(replace(each, time=time[order], value=value, sd=sd))
+        return self._from_then(seconds, since, fixes)
+
+    def along(self, seconds: float, since: float = -np.inf) -> Replay:
+        """Fixes moved along the track by as much, in place of their stamps.
+
+        By the velocity of the filter, and by what the accelerometers measure in a second: less
+        averages no noise, and the filter's own change of velocity has the noise of the fix in it.
+        """
+        track, dt = self.solution(tuning.TRACK_STEP), self.imu.dt
+        total = np.cumsum(np.vstack([np.zeros(3), self.imu.velocity]), axis=0)
+        reach = 0.5 * max(abs(seconds), tuning.TRACK_STEP)
+        fixes = []
+        for each in self.aiding.fixes:
+            middle = each.time + 0.5 * seconds
+            ends = (np.clip(middle + by, 0.0, self.imu.n * dt) for by in (-reach, reach))
+            first, last = (np.rint(end / dt).astype(int) for end in ends)
+            force = (total[last] - total[first]) / (np.maximum(last - first, 1) * dt)[:, None]
+            near = np.clip(np.searchsorted(track.time, middle), 0, track.time.size - 1)
+            change = seconds * np.einsum("eij,ej->ei", track.matrix[near], force)
+            change[:, 2] += seconds * gravity_at(np.sin(track.lla[near, 0]), track.lla[near, 2])
+            velocity = np.stack(
+                [np.interp(each.time, track.time, one) for one in track.velocity.T], axis=1
+            )
+            by = {"velocity": change, "standstill": 0.0 * change}.get(
+                each.kind, seconds * (velocity + 0.5 * change)
+            )
+            if each.kind == "height":
+                by = -by[:, 2:]
+            by = np.where(each.time[:, None] >= since, -by, 0.0)
+            fixes.append(replace(each, value=each.moved(by)))
+        return self._from_then(seconds, since, fixes)
+
+    def _from_then(self, seconds: float, since: float, fixes: list[Fixes]) -> Replay:
         state = self.state if since > -np.inf else self._where_at(-seconds)
         return replace(self, state=state, aiding=replace(self.aiding, fixes=tuple(fixes)))
 

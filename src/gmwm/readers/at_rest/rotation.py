@@ -90,15 +90,15 @@ def _integral_means(
     """Means over blocks of the sum of w x a, some blocks at a time: memory is that of the means."""
     middle = [np.nanmedian(column) for column in rate]
     rows = size * max(_ROWS // size, 1)
-    total, means = np.zeros((1, 3)), []
+    total, means = np.zeros(3), []
     for start in range(0, rate[0].size // size * size, rows):
         part = slice(start, min(start + rows, rate[0].size // size * size))
-        w = np.stack([column[part] - m for column, m in zip(rate, middle, strict=True)], axis=1)
-        a = np.stack([column[part] for column in force], axis=1)
-        change = np.cross(np.nan_to_num(w), np.nan_to_num(a))
-        integral = np.cumsum(np.concatenate([total, change]), axis=0)
-        means.append(integral[1:].reshape(-1, size, 3).mean(axis=1))
-        total = integral[-1:]
+        w = [column[part] - m for column, m in zip(rate, middle, strict=True)]
+        a = [column[part] for column in force]
+        change = np.nan_to_num([w[i - 2] * a[i - 1] - w[i - 1] * a[i - 2] for i in range(3)])
+        integral = np.cumsum(change, axis=1, out=change) + total[:, None]
+        means.append(integral.reshape(3, -1, size).mean(axis=2).T)
+        total = integral[:, -1]
     return np.concatenate(means)
 
 

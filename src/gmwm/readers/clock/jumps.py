@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ class Jumps:
     interval : float
         Sampling interval, in the unit of the stamps.
     repeated : (r,) ndarray of int
-        Rows that repeat the one before them.
+        Rows that repeat one before them.
     set_at : (s,) ndarray of int
         First row after each time that the clock was set.
     """
@@ -93,6 +93,11 @@ class Jumps:
         ahead = np.append(0.0, np.cumsum(self.missing)).astype(np.int64)
         again = np.searchsorted(self.repeated, rows, side="right")
         return np.asarray(rows + ahead[np.searchsorted(self.rows, rows, side="right")] - again)
+
+    def among(self, kept: _Rows, copies: _Rows) -> Jumps:
+        """The same by the numbers of all rows, of which some were kept and others repeat one."""
+        repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
+        return replace(self, rows=kept[self.rows], repeated=repeated, set_at=kept[self.set_at])
 
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
@@ -213,12 +218,13 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     missing = np.maximum(np.rint(advance) - 1.0, 0.0)
     real = missing > 0.0
     rows, advance, missing = candidates[real], advance[real], missing[real]
+    del steps  # the line needs as much memory
     advances = np.ones(stamps.size, dtype=np.int64)
     advances[rows] += missing.astype(np.int64)
     # What a jump off the grid goes beyond it belongs to no interval.
     starts = np.zeros(stamps.size, dtype=bool)
     starts[rows[_off_grid(advance, missing)]] = True
-    line = interval_of(stamps, np.cumsum(advances), starts)
+    line = interval_of(stamps, np.cumsum(advances, out=advances), starts)
     return Jumps(rows, advance, missing, line)
 
 

@@ -25,13 +25,15 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
-    rows = np.asarray(number - number[0], dtype=float)
+    lever = np.subtract(number, number[0], dtype=float)
     half = max(max(part.stop - part.start for part in parts) // 2, 1)
-    ends = [(part.start, part.stop - half) for part in parts]
-    first = np.concatenate([np.arange(a, b) for a, b in ends if b > a])
-    between = stamps[first + half] - stamps[first]
-    slope = float(np.median(between / (rows[first + half] - rows[first])))
-    lever = rows.copy()
+    pairs = [(slice(p.start, p.stop - half), slice(p.start + half, p.stop)) for p in parts]
+    slopes = [
+        (stamps[then] - stamps[first]) / (lever[then] - lever[first])
+        for first, then in pairs
+        if first.stop > first.start
+    ]
+    slope = float(np.median(np.concatenate(slopes), overwrite_input=True))
     for part in parts:
         lever[part] -= np.mean(lever[part])
     scale = float(lever @ lever)
@@ -40,9 +42,10 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     late = np.empty(stamps.size)
     for _ in range(tuning.ROUNDS_OF_LINE):
         for part in parts:
-            late[part] = stamps[part] - stamps[part.start] - slope * rows[part]
+            np.subtract(stamps[part], stamps[part.start], out=late[part])
+            late[part] -= slope * lever[part]
             late[part] -= np.median(late[part])
-        bound = 3.0 * 1.4826 * float(np.median(np.abs(late)))
+        bound = 3.0 * 1.4826 * float(np.median(np.abs(late), overwrite_input=True))
         change = float(lever @ np.clip(late, -bound, bound)) / scale
         slope += change
         if abs(change) < tuning.LINE_SETTLED * abs(slope):

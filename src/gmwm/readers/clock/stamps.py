@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock.beat import without_beat
@@ -73,9 +73,8 @@ class Clock:
     where : callable
         Row -> where that is in the file.
     same : callable
-        Which rows have the samples of the row before; asked where stamps repeat.
-    extent : int
-        Rows of the recording, of which these may be a part: of more a gap is none.
+        Which rows, in an order, have the samples of the row before; asked where stamps repeat.
+    extent: int
     """
 
     source: str
@@ -84,7 +83,7 @@ class Clock:
     seconds: float | None
     own_unit: str
     where: Callable[[int], str]
-    same: Callable[[], BoolArray]
+    same: Callable[[IntArray], BoolArray]
     extent: int
 
     @property
@@ -116,6 +115,18 @@ class Clock:
         Else every row is given its sample number: see `gmwm.readers.clock.uneven`.
         """
         self._check_complete()
+        copies = self._copies()
+        if copies.size:
+            kept = np.delete(np.arange(self.stamps.size), copies)
+            rest = replace(
+                self,
+                stamps=self.stamps[kept],
+                where=lambda row: self.where(int(kept[row])),
+                same=lambda order: self.same(kept[order]),
+            )
+            timing = rest.timing(expected)
+            found = (*timing.notices, _repeated_notice(copies.size))
+            return replace(timing, jumps=timing.jumps.among(kept, copies), notices=found)
         unwrapped = _unwrapped(self.stamps)
         if unwrapped is not None:
             text = "the counter of the time stamps ran over: they were continued"
@@ -194,12 +205,26 @@ class Clock:
                 f"remove such lines, or, {_WAY_OUT}",
             )
 
+    def _copies(self) -> IntArray:
+        """Rows, alone or in pieces, that were written again: they are as an earlier one."""
+        none = np.empty(0, dtype=np.int64)
+        if np.all(np.diff(self.stamps) > 0.0):
+            return none
+        order = np.argsort(self.stamps, kind="stable")
+        again = np.diff(self.stamps[order], prepend=np.nan) == 0.0
+        alike = int(np.count_nonzero(again | np.append(again[1:], False)))
+        if not 0 < 2 * alike <= order.size:
+            return none  # bursts: coarse samples repeat by chance
+        copies = again & self.same(order)
+        many = np.count_nonzero(copies) > tuning.COPIES * np.count_nonzero(again)
+        return np.sort(order[copies]) if many else none
+
     def _followed(self, steps: FloatArray) -> Followed:
         """Number the rows one by one, if there is a clock that most of them agree on."""
         repeats = steps == 0.0
         same = np.zeros(self.stamps.size, dtype=bool)
         if np.any(repeats):
-            same[1:] = repeats & self.same()[1:]
+            same[1:] = repeats & self.same(np.arange(self.stamps.size))[1:]
         found = None
         finest = float(np.spacing(np.max(np.abs(self.stamps))))
         if not np.all(repeats) and finest < 0.1 * np.median(np.abs(steps[~repeats])):
@@ -327,9 +352,7 @@ class Clock:
             )
             notices.append(Notice("stamps-in-bursts", "note", "", text, {"rows": found.burst}))
         if count := jumps.repeated.size:
-            text = f"{count:,} row{'s repeat the rows' if count > 1 else ' repeats the row'} before"
-            values = {"count": count}
-            notices.append(Notice("rows-repeated", "note", "", text, values, "left out"))
+            notices.append(_repeated_notice(count))
         astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
         if astray.size:
             worst = astray[np.argmax(np.abs(found.late[astray]))]
@@ -388,6 +411,12 @@ class Clock:
                 "time-unit",
             )
         return 1.0, True
+
+
+def _repeated_notice(count: int) -> Notice:
+    """That rows were written again."""
+    text = f"{count:,} row{'s repeat rows' if count > 1 else ' repeats a row'} before"
+    return Notice("rows-repeated", "note", "", text, {"count": count}, "left out")
 
 
 def _unwrapped(stamps: FloatArray) -> FloatArray | None:

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, Panels, evaluated, haar_gain, quadrature
+from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature
 from gmwm.variance.covariance.haar_kernels import lag_sums
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
 
@@ -153,7 +153,8 @@ def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, Float
 class _Pairs:
     """Weights of the integrals of products of two gains against the square of a spectrum.
 
-    frequency: (P, 12), points of the panels, cycles per sample.
+    panels: Of the frequencies.
+    frequency: (P * 12,), points of the panels, cycles per sample.
     weight: (pairs, P, 12).
     first, second: (pairs,), levels.
     """
@@ -179,7 +180,8 @@ def _pairs(averaging: tuple[float, ...]) -> _Pairs:
         place = np.zeros((len(averaging), len(averaging)), dtype=int)
         place[first, second] = np.arange(first.size)
         weight[place[rows, columns]] += panels.gathered(grid.weight * excess)
-    frequency = np.arctan(np.exp(panels.log_tangent)) / np.pi
+    frequency = np.arctan(np.exp(panels.log_tangent.ravel())) / np.pi
+    frequency.flags.writeable = False  # what spectra make of them is kept
     return _Pairs(panels, frequency, weight, first, second)
 
 
@@ -191,8 +193,8 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
     """
     averaging = tuple(m.tolist())
     pairs = _pairs(averaging)
-    square = (evaluated(psd, pairs.frequency.ravel() / dt, dt) / dt) ** 2
-    square = square.reshape(pairs.frequency.shape)
+    square = (evaluated(psd, in_hertz(pairs.frequency, dt), dt) / dt) ** 2
+    square = square.reshape(pairs.panels.log_tangent.shape)
     smooth = pairs.panels.are_smooth(square)
     square[~smooth] = 0.0
     integral = np.empty((m.size, m.size))
@@ -213,7 +215,9 @@ def _chosen(
     nodes = np.flatnonzero(np.repeat(np.frombuffer(panels, dtype=bool), width))
     _, _, excess = _excess(averaging)
     weights = excess[:, nodes] if excess.size else excess
-    return grid.frequency[nodes], grid.weight[nodes], grid.gain[:, nodes], weights
+    frequency = grid.frequency[nodes]
+    frequency.flags.writeable = False
+    return frequency, grid.weight[nodes], grid.gain[:, nodes], weights
 
 
 def _node_by_node(
@@ -221,7 +225,7 @@ def _node_by_node(
 ) -> FloatArray:
     """A quarter of the integrals over some panels, from all of their nodes."""
     frequency, weight, gain, excess = _chosen(averaging, chosen.tobytes())
-    density = evaluated(psd, frequency / dt, dt) / dt
+    density = evaluated(psd, in_hertz(frequency, dt), dt) / dt
     scaled = gain * (np.sqrt(weight) * density)
     integral = scaled @ scaled.T
     rows, columns, _ = _excess(averaging)

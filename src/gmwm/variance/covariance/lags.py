@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, legendre
+from gmwm.process import PSD, in_hertz, legendre
 from gmwm.variance import tuning
 
 _ZERO = 1e-4  # of a bin: the frequency that stands for zero
@@ -45,7 +45,9 @@ class LagGrid:
         """Frequencies and weights within the bin at zero, and the folds of all frequencies."""
         x, w = legendre(8)
         near = 0.25 / self.size * (x + 1.0)
-        return near, w, _Folds.of(np.concatenate([self.frequency, near]), self.block)
+        folds = _Folds.of(np.concatenate([self.frequency, near]), self.block)
+        folds.frequency.flags.writeable = False  # what spectra make of them is kept
+        return near, w, folds
 
     @cached_property
     def lag(self) -> npt.NDArray[np.intp]:
@@ -124,7 +126,7 @@ class _Folds:
 
     def density(self, psd: PSD, dt: float) -> FloatArray:
         """The spectrum of block means."""
-        found = np.asarray(psd(self.frequency / dt, dt)) / dt
+        found = np.asarray(psd(in_hertz(self.frequency, dt), dt)) / dt
         folded = found[: self.smoothing.size].reshape(self.smoothing.shape)
         total = np.sum(self.smoothing * folded, axis=0)
         if self.rest.size:

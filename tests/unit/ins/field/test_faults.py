@@ -217,6 +217,19 @@ def test_right_models_are_not_blamed():
             assert navigated.fits
 
 
+@pytest.mark.parametrize(
+    ("seed", "vehicle", "options"),
+    [(501, "car", {}), (510, "helicopter", {}), (501, "loiter", {}),
+     (8223, "car", {"duration": 300.0, "rate": 20.0})],
+)  # fmt: skip
+def test_right_models_of_noisy_sensors_are_not_blamed(seed, vehicle, options):
+    """No rest was found in their noise, and stamps moved to other noise were 0.07 s late."""
+    navigated = found(seed, vehicle=vehicle, truth=sensors(gyro=30.0, accel=100.0), **options)
+    assert navigated.verdict.code == "consistent"
+    if vehicle != "loiter":
+        assert navigated.alignment.stood >= 20.0
+
+
 @pytest.mark.slow
 def test_right_models_are_not_blamed_in_a_hundred_logs():
     """By design one log in a thousand is blamed, so that two in a hundred have p = 0.005."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmwm._core.distributions import chi2
 from gmwm._core.spool import release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -45,7 +46,9 @@ def steady(imu: Imu) -> tuple[int, int] | None:
     while begin + least <= count:
         end = begin + 1
         while end < count and end - begin < most:
-            if np.any(np.abs(means[end] - np.mean(means[begin:end], axis=0)) > limit):
+            # The mean of those before is uncertain itself.
+            far = limit * np.sqrt(1.0 + 1.0 / (end - begin))
+            if np.any(np.abs(means[end] - np.mean(means[begin:end], axis=0)) > far):
                 break
             end += 1
         if end - begin >= least:
@@ -55,10 +58,19 @@ def steady(imu: Imu) -> tuple[int, int] | None:
 
 
 def _scatter(windows: FloatArray, dt: float) -> FloatArray:
-    """Standard deviation of the mean over a window from noise within it, the quietest of all."""
+    """Standard deviation of the mean over a window from noise within it.
+
+    From the quietest window, with what the smallest of so many variances is of the usual one: mean
+    squares of successive differences have two thirds of the degrees of freedom.
+    """
+    count, size, _ = windows.shape
     steps = np.diff(windows, axis=1) / dt
-    noise = np.sqrt(np.min(np.mean(steps**2, axis=1), axis=0) / 2.0) if steps.size else np.zeros(6)
-    return np.asarray(noise / np.sqrt(windows.shape[1]), dtype=float)
+    if not steps.size:
+        return np.zeros(6)
+    dof = 2.0 / 3.0 * (size - 1)
+    smallest = chi2.ppf(1.0 - 0.5 ** (1.0 / count), dof) / dof
+    noise = np.sqrt(np.min(np.mean(steps**2, axis=1), axis=0) / (2.0 * smallest))
+    return np.asarray(noise / np.sqrt(size), dtype=float)
 
 
 def at_rest(
