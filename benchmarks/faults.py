@@ -59,14 +59,18 @@ def main() -> None:
                 arguments.seed, vehicle, **DRIVE, truth=sensors(**COARSE), believed=believed
             )
             print(f"  {name:22} {_shown(Navigated.of(log))}", flush=True)
-    blamed = []
-    for i in range(arguments.clean):
-        vehicle = VEHICLES[i % len(VEHICLES)]
-        log, _ = emulated_log(CLEAN + i, vehicle, duration=160.0, rate=10.0, velocity=i % 2 == 0)
-        found = Navigated.of(log)
-        if found.verdict.code != "consistent":
-            blamed.append(f"{CLEAN + i} {vehicle}: {_shown(found)}")
-    print(f"without a fault: {len(blamed)} of {arguments.clean} blamed", *blamed, sep="\n  ")
+    for title, truth in (("", sensors()), (", noisy sensors", sensors(**COARSE))):
+        blamed = []
+        for i in range(arguments.clean):
+            vehicle = VEHICLES[i % len(VEHICLES)]
+            log, _ = emulated_log(
+                CLEAN + i, vehicle, duration=160.0, rate=10.0, velocity=i % 2 == 0, truth=truth
+            )
+            found = Navigated.of(log)
+            if found.verdict.code != "consistent":
+                blamed.append(f"{CLEAN + i} {vehicle}: {_shown(found)}")
+        print(f"without a fault{title}: {len(blamed)} of {arguments.clean} blamed", *blamed,
+              sep="\n  ")  # fmt: skip
 
 
 if __name__ == "__main__":
