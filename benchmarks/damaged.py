@@ -3,9 +3,9 @@
     python benchmarks/damaged.py [--samples 50000] [--seeds 5]
 
 "abrupt-end", "held", "filled" and "value-repeated" of `gmwm.health`: how often sound noise has
-them; shares of the seeds in which rectified noise, noise wrapped round, samples written again and samples
-put between their neighbours are found, by the step of the samples in standard deviations; and white
-noise over its truth where these are fitted.
+them; shares of the seeds in which rectified noise, noise wrapped round, samples written again and
+samples put between their neighbours are found, by the step of the samples in standard deviations;
+and white noise over its truth where these are fitted.
 """
 
 from __future__ import annotations
