@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable
 from html import escape
 from importlib import import_module
 from typing import Any
@@ -43,6 +44,11 @@ def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) ->
             break
     plus = "+" if sign else ""
     return f"{shown:{plus}.{digits}g} {name}".rstrip()
+
+
+def bullets(items: Iterable[object]) -> list[str]:
+    """Lines of texts or notices, each after a hyphen."""
+    return [line for each in items for line in wrapped(str(each), first="- ", indent=2)]
 
 
 def wrapped(text: str, first: str = "", indent: int = 0) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gmwm._core.text import wrapped
+from gmwm._core.text import bullets
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor
 from gmwm.errors import InputError
@@ -174,7 +174,7 @@ class ErrorBudget:
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
                 values = self.total()[quantity]
                 lines.append(f"  {label:<{head - 2}}{_row(quantity, values)}")
-        notes = [line for note in self.notes for line in wrapped(note, first="- ", indent=2)]
+        notes = bullets(self.notes)
         return "\n".join([*lines, *([""] if notes else []), *notes])
 
     def plot(

@@ -30,11 +30,7 @@ AMBIGUITY = "ambiguity"
 class ChannelModel:
     """What was found of a channel.
 
-    Attributes
-    ----------
-    fit : Fit
-    selection : Selection or None
-        None where the model was given.
+    selection: None where the model was given.
     """
 
     fit: Fit
@@ -69,19 +65,11 @@ def channel_model(
 ) -> ChannelModel | Notice:
     """The model of a channel, or why it has none.
 
-    Parameters
-    ----------
-    name : str
-    variances : callable
-        Wavelet variances of each recording without the departures that it is given.
-    model : Process, Model or None
-        Fitted; None selects one.
-    sources : sequence of str
-        Of the recordings.
-    extra : sequence of Process, optional
-        Terms that a selected model may have.
-    removals : int, optional
-        How many times evident departures are taken off, and the rest fitted again.
+    variances: Wavelet variances of each recording without the departures that it is given.
+    model: Fitted; None selects one.
+    sources: Of the recordings.
+    extra: Terms that a selected model may have.
+    removals: How many times evident departures are taken off, and the rest fitted again.
     """
     removed: list[tuple[Departure, ...]] = [()] * len(sources)
     before: Sequence[WaveletVariance] = ()
@@ -129,21 +117,11 @@ def calibration_of(
 ) -> Calibration:
     """What was found of the channels, together.
 
-    Parameters
-    ----------
-    models : mapping
-        Of each channel on which work was done.
-    dead : mapping
-        Why there was none on others.
-    notices : sequence of Notice
-        Of the whole recording.
-    source, rate, n, left_out
-        As in `Calibration`.
-
-    Raises
-    ------
-    InputError
-        If no channel has a model.
+    models: Of each channel on which work was done.
+    dead: Why there was none on others.
+    notices: Of the whole recording.
+    source, rate, n, left_out: As in `Calibration`.
+    Raises InputError if no channel has a model.
     """
     done = {name: each for name, each in models.items() if isinstance(each, ChannelModel)}
     skipped = {name: each for name, each in models.items() if isinstance(each, Notice)}

@@ -27,17 +27,10 @@ def with_departures(
 ) -> Fit:
     """A fit with a notice of each departure; not valid if one accounts for much of the noise.
 
-    Parameters
-    ----------
-    fitted : Fit
-    sources : sequence of str
-        Of its recordings; named where there are several.
-    found, removed : sequence of sequence of Departure
-        What each recording has, and what was taken off before the fit.
-    curves : sequence of sequence of WaveletVariance
-        Of each recording, before that was taken off and without it.
-    removing : bool, optional
-        Whether departures were to be taken off: those that are left are no more.
+    sources: Of its recordings; named where there are several.
+    found, removed: What each recording has, and what was taken off before the fit.
+    curves: Of each recording, before that was taken off and without it.
+    removing: Whether departures were to be taken off: those that are left are no more.
     """
     unit = fitted.wv.unit
     notices = [
@@ -104,13 +97,8 @@ def _removed_notice(found: Departure, unit: str) -> Notice:
 def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Notice:
     """What it is, and whether a fit beside it is valid.
 
-    Parameters
-    ----------
-    found : Departure
-    unit : str
-        Of the channel, SI.
-    stays : bool, optional
-        Whether taking it off was tried, so that it is no advice.
+    unit: Of the channel, SI.
+    stays: Whether taking it off was tried, so that it is no advice.
     """
     size, low, high = (readable(each, unit, sign=True) for each in found.size)
     size = f"{size} ({low} .. {high})"

@@ -26,18 +26,12 @@ _ADVICE = ("stuck", "held", "filled", "saturation", "abrupt-end", "temperature",
 class Screened:
     """A recording after screening.
 
-    Attributes
-    ----------
-    recording : Recording
-        Without the samples of shocks and spikes, with a notice of how many these were.
-    extra : dict
-        Channel name -> terms that its model may have, strongest first.
-    robust : frozenset of str
-        Channels whose wavelet variances are to be robust.
-    repeated : dict
-        Channels of which each sample is written several times, and how often.
-    notices : tuple of Notice
-        Those of the reader, then what was found, with what is done about it here as ``action``.
+    recording: Without the samples of shocks and spikes, with a notice of how many these were.
+    extra: Channel name -> terms that its model may have, strongest first.
+    robust: Channels whose wavelet variances are to be robust.
+    repeated: Channels of which each sample is written several times, and how often.
+    notices: Those of the reader, then what was found, with what is done about it here as
+        ``action``.
     """
 
     recording: Recording
@@ -52,10 +46,7 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
 
     The first of them has the notices of the recording, with one on which stretches are used.
 
-    Raises
-    ------
-    InputError
-        If it is not static and has no stretch at rest.
+    Raises InputError if it is not static and has no stretch at rest.
     """
     if any(notice.code == "rate-changes" for notice in recording.notices):
         return (recording,)  # times of its parts are not known
@@ -103,16 +94,8 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     Outliers all over the record are left out like shocks. Where that would take more than a tenth
     of the samples, or they are not to be left out, the wavelet variances are robust instead.
 
-    Parameters
-    ----------
-    recording : Recording
-    chosen : collection of str, optional
-        Some of `SCREENING`.
-
-    Raises
-    ------
-    InputError
-        If one of those chosen is unknown.
+    chosen: Some of `SCREENING`.
+    Raises InputError if one of those chosen is unknown.
     """
     check_screening(chosen)
     if not chosen:
@@ -145,14 +128,8 @@ def with_treatment(
 ) -> list[Notice]:
     """Notices with what is done about each here, which is not what is advised elsewhere.
 
-    Parameters
-    ----------
-    notices : iterable of Notice
-    found : Health
-    left_out : collection of str
-        Channels of which shocks, spikes, outliers and held samples are left out.
-    robust : collection of str, optional
-        Channels that have robust wavelet variances.
+    left_out: Channels of which shocks, spikes, outliers and held samples are left out.
+    robust: Channels that have robust wavelet variances.
     """
     treated = []
     for notice in notices:
@@ -220,13 +197,8 @@ def with_outcomes(
 ) -> tuple[Notice, ...]:
     """Notices with what became of the lines and resonances among them.
 
-    Parameters
-    ----------
-    notices : sequence of Notice
-    models : mapping of str to Model
-        The model of each channel that has one.
-    offered : mapping of str to sequence of Process
-        Channel name -> terms that its model might have had.
+    models: The model of each channel that has one.
+    offered: Channel name -> terms that its model might have had.
     """
     return tuple(
         replace(

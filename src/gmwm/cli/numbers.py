@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gmwm._core.text import wrapped
+from gmwm._core.text import bullets
 from gmwm.cli.console import progress_bar
 from gmwm.cli.options import seconds, together
 
@@ -139,7 +139,7 @@ def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> st
     if not flags:
         return ""
     text = f"give the bias at switch-on (1 sigma) by {' and '.join(flags)}"
-    return "\n".join(wrapped(text, first="- ", indent=2))
+    return "\n".join(bullets([text]))
 
 
 def show(

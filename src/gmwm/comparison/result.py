@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, made_by, wrapped
+from gmwm._core.text import Printed, bullets, made_by, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -239,8 +239,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         for name, axis in self.items():
             lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
-        for notice in worst_first(list(self.notices)):
-            lines += wrapped(str(notice), first="- ", indent=2)
+        lines += bullets(worst_first(list(self.notices)))
         return "\n".join(lines)
 
     def _numbers(self, axis: AxisComparison) -> str:

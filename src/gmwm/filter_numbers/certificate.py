@@ -12,7 +12,7 @@ from gmwm._core.documents import Document
 from gmwm._core.forms import Form, Notices, NotNegative, Text
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, bullets, wrapped
 from gmwm.estimate.result import plain
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.result import SensorNumbers
@@ -178,8 +178,7 @@ class Certificate(Document, Printed):
                 "belong together: a larger one pays for a smaller other, whose factor can be below "
                 "1."
             )]  # fmt: skip
-        for notice in self.notices:
-            lines += wrapped(str(notice), first="- ", indent=2)
+        lines += bullets(self.notices)
         return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
 
     def _covered(self, quantity: str, units: str) -> list[str]:

@@ -14,7 +14,7 @@ from gmwm._core.forms import Form, Model as ModelForm, Notices, NotNegative, Pos
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, bullets, wrapped
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import MissingNameError
 from gmwm.estimate.result import plain
@@ -187,8 +187,7 @@ class FilterNumbers(Document, Printed):
                 f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
                 f"freedom, predicted/true standard deviation {each.tightness:.3g}"
             )
-        for notice in self.notices:
-            lines += wrapped(str(notice), first="- ", indent=2)
+        lines += bullets(self.notices)
         return "\n".join(lines)
 
     def _shown(self) -> list[tuple[str, float]]:
@@ -354,8 +353,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         places: dict[str, list[str]] = {}
         for notice in self.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
-        for text, names_of in places.items():
-            lines += wrapped(f"{', '.join(names_of)}: {text}", first="- ", indent=2)
+        lines += bullets(f"{', '.join(names)}: {text}" for text, names in places.items())
         return "\n".join(lines)
 
     def to_frame(self) -> pandas.DataFrame:

@@ -19,7 +19,7 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.runs import results
-from gmwm._core.text import made_by, wrapped
+from gmwm._core.text import bullets, made_by, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
@@ -139,18 +139,17 @@ class Fleet(Mapping[str, Calibration | Notice]):
                     f"{axis.channel}: {axis.counts[most]} of {sum(axis.counts.values())} units are "
                     f"{most}, {axis.different} of another structure"
                 )
-                lines += wrapped(text, first="- ", indent=2)
+                lines += bullets([text])
             if axis.invalid:
                 text = f"{axis.channel}: not valid in {some(axis.invalid)}"
-                lines += wrapped(text, first="- ", indent=2)
+                lines += bullets([text])
         for each in self.spreads:
             for outlier in each.outliers:
                 lines += wrapped(
                     f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
                     f"{outlier.value / each.median:.3g} times the median", first="- ", indent=2,
                 )  # fmt: skip
-        for notice in self.notices:
-            lines += wrapped(str(notice), first="- ", indent=2)
+        lines += bullets(self.notices)
         return "\n".join(lines)
 
     def to_frame(self) -> pandas.DataFrame:

@@ -72,10 +72,7 @@ class Quadrature:
 def evaluated(psd: PSD, f: FloatArray, dt: float) -> FloatArray:
     """``psd(f, dt)``, checked: a user's own may be anything.
 
-    Raises
-    ------
-    InputError
-        If it is not one finite, non-negative number a frequency.
+    Raises InputError if it is not one finite, non-negative number a frequency.
     """
     density = np.asarray(psd(f, dt), dtype=float)
     if density.shape != f.shape:
@@ -230,14 +227,9 @@ WIDER = 4
 class Panels:
     """The nodes of a quadrature in panels, on which a smooth spectrum is a polynomial.
 
-    Attributes
-    ----------
-    log_tangent : (P, 12) ndarray
-        Chebyshev points of each panel: log tan(pi f), f in cycles per sample.
-    starts : (P,) ndarray
-        First node of each panel.
-    share : (K, 12) ndarray
-        Lagrange's polynomials of the points of its panel at each node.
+    log_tangent: (P, 12), chebyshev points of each panel: log tan(pi f), f in cycles per sample.
+    starts: (P,), first node of each panel.
+    share: (K, 12), lagrange's polynomials of the points of its panel at each node.
     """
 
     log_tangent: FloatArray

@@ -15,7 +15,7 @@ import numpy as np
 
 from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.montecarlo import GROUPS, FilterErrors, Validation
@@ -192,8 +192,7 @@ class Rotation:
         lines = wrapped(text, indent=2)
         for i, (source, size) in enumerate(zip(self.sources, self.stretches, strict=True)):
             lines += wrapped(f"{source}, {size} stretches", f"{i + 1} ", 2)
-        for notice in self.notices:
-            lines += wrapped(str(notice), "- ", 2)
+        lines += bullets(self.notices)
         return lines
 
     def _row(self, name: str) -> list[Interval]:

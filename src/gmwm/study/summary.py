@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from gmwm._core.text import wrapped
+from gmwm._core.text import bullets
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import cramer_rao
 from gmwm.study.studies import Quantity, Study
@@ -92,7 +92,7 @@ class Summary:
             "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for",
             "estimates by Haar wavelet variances only; covers: 95 % intervals",
         ]
-        return "\n".join([*lines, *(line for note in s.notes for line in wrapped(note, "- ", 2))])
+        return "\n".join([*lines, *bullets(s.notes)])
 
     def markdown(self) -> str:
         """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""

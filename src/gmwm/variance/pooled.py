@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -48,25 +48,15 @@ class PooledVariance(WaveletVariance):
         if all(part.data_covariance is not None for part in parts):
             given = [np.asarray(part.data_covariance) for part in parts]
             covariance = _combined(given, shares)
-        return cls(
-            tau=longest.tau,
-            variance=_mean([part.variance for part in parts], shares),
-            mean=_mean([part.mean for part in parts], shares),
-            blocks=longest.blocks,
-            block=longest.block,
-            n=longest.n,
-            dt=longest.dt,
-            confidence=longest.confidence,
-            name=longest.name,
-            quantity=longest.quantity,
-            unit=longest.unit,
-            wavelet=longest.wavelet,
-            efficiency=longest.efficiency,
-            driftless=driftless,
-            gaps=longest.gaps,
-            data_covariance=covariance,
-            parts=tuple(parts),
-        )
+        own = {each.name: getattr(longest, each.name) for each in fields(WaveletVariance)}
+        pooled = {
+            "variance": _mean([part.variance for part in parts], shares),
+            "mean": _mean([part.mean for part in parts], shares),
+            "driftless": driftless,
+            "fourth_cumulant": 0.0,
+            "data_covariance": covariance,
+        }
+        return cls(**{**own, **pooled}, parts=tuple(parts))
 
     @cached_property
     def shares(self) -> FloatArray:

@@ -3,7 +3,8 @@
 from gmwm.study import choice
 
 
-def test_the_study_counts_right_choices_and_surplus_terms():
+def test_the_study_counts_right_choices_and_surplus_terms(monkeypatch):
+    monkeypatch.setattr(choice, "TRUTHS", choice.TRUTHS[:3])
     found = choice.choice_study(1, 0, 1, lengths=(4_000,))
     assert [item.truth for item in found] == list(choice.TRUTHS)
     white = found[0]

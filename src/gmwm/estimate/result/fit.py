@@ -15,7 +15,7 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import MissingNameError
@@ -333,8 +333,7 @@ class Fit(Document, Printed):
         lines += wrapped(fitness, indent=2)
         lines += wrapped(self.goodness.sentence, indent=2)
         lines.append("valid" if self.valid else "NOT VALID")
-        for notice in self.notices:
-            lines += wrapped(str(notice), first="- ", indent=2)
+        lines += bullets(self.notices)
         return "\n".join(lines)
 
     def _size(self) -> str:

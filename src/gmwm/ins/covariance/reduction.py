@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
-from gmwm._core.text import wrapped
+from gmwm._core.text import bullets
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
@@ -99,9 +99,7 @@ class Reduction:
                 f"{row.read_off:>10.4g} ({row.read_off_predicted:>8.4g}) "
                 f"{row.reduced:>10.4g} ({row.reduced_predicted:>8.4g}) {row.nees:>9.3g}"
             )
-        return "\n".join(
-            [*lines, *(line for each in self.notices for line in wrapped(str(each), "- ", 2))]
-        )
+        return "\n".join([*lines, *bullets(self.notices)])
 
 
 def reduce(

@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice
-from gmwm._core.text import made_by, wrapped
+from gmwm._core.text import bullets, made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -197,8 +197,7 @@ class Comparison:
         lines = [
             f"{self.title}: {self.duration:.6g} s, {len(self.outages)} outages of {length:g} s"
         ]
-        for notice in self.notices:
-            lines += wrapped(str(notice), "- ", 2)
+        lines += bullets(self.notices)
         lines += [
             "", "Errors at the end of the outages, RMS [m]; in brackets as predicted",
             f"{'':{width}}  {'horizontal':>18}  {'vertical':>18}  {'NEES/dof':>9}  {'NIS/dof':>8}",

@@ -282,14 +282,14 @@ def _coloured(fault: Explanation) -> tuple[str, str]:
 def _fix_noise(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"the fixes are {_times(factor)} their standard deviations",
+        f"the fixes are {factor:.2g} times their standard deviations",
         f"multiply those by {factor:.2g}",
     )
 
 
 def _white(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
-    text = f"white noise is {_times(factor)} the model's"
+    text = f"white noise is {factor:.2g} times the model's"
     if factor > tuning.NOT_NOISE:
         return text, "vibration adds to it, but look first at units, axes and stamps"
     return (
@@ -302,13 +302,9 @@ def _white(fault: Explanation) -> tuple[str, str]:
 def _slow(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"slow errors and biases are {_times(factor)} the model's",
+        f"slow errors and biases are {factor:.2g} times the model's",
         "the sensor model or the bias is wrong: calibrate again, or give the bias",
     )
-
-
-def _times(factor: float) -> str:
-    return f"{factor:.2g} times"
 
 
 _WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {

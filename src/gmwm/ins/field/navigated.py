@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.notices import Notice
-from gmwm._core.text import made_by, wrapped
+from gmwm._core.text import bullets, made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -285,8 +285,7 @@ class Navigated:
         imu = self.measured.imu
         length = imu.n * imu.dt - self.alignment.epoch * imu.dt
         lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
-        for notice in self.notices:
-            lines += wrapped(str(notice), "- ", 2)
+        lines += bullets(self.notices)
         lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
         lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,30 +13,28 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import TIME, CsvTable, label, meaning
 
-POSITION_WORDS = {
-    word: quantity
-    for quantity, words in {
-        "latitude": "latitude lat",
-        "longitude": "longitude lon long lng",
-        "height": "height altitude alt h hgt",
-    }.items()
-    for word in words.split()
-}
+
+def by_word(words: Mapping[str, str]) -> dict[str, str]:
+    """What each word stands for, of what is written with blanks between words."""
+    return {word: meant for meant, each in words.items() for word in each.split()}
+
+
+POSITION_WORDS = by_word({
+    "latitude": "latitude lat",
+    "longitude": "longitude lon long lng",
+    "height": "height altitude alt h hgt",
+})  # fmt: skip
 """What the last word of a column's name says, if it is a position."""
 
 FACTORS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "ft": 0.3048}
 """Units of angles and lengths in SI."""
 
-_UNITS = {
-    word: unit
-    for unit, words in {
-        "rad": "rad rads radian radians",
-        "deg": "deg degs degree degrees °",
-        "m": "m meter meters metre metres",
-        "ft": "ft feet",
-    }.items()
-    for word in words.split()
-}
+_UNITS = by_word({
+    "rad": "rad rads radian radians",
+    "deg": "deg degs degree degrees °",
+    "m": "m meter meters metre metres",
+    "ft": "ft feet",
+})  # fmt: skip
 _WORD = re.compile(r"°|[A-Z]?[a-z]+|[A-Z]+")
 _QUARTER = 0.5 * np.pi * (1.0 + 1e-9)
 

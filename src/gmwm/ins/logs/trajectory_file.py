@@ -14,6 +14,7 @@ from gmwm.ins.logs.log_columns import (
     POSITION_WORDS,
     angle_factor,
     angle_unit,
+    by_word,
     check_angles,
     check_rising,
     find_columns,
@@ -27,15 +28,9 @@ from gmwm.readers import TIME, CsvTable, stated_seconds
 
 _HEADER = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
 _ANGLES = ("latitude", "longitude", "roll", "pitch", "yaw")
-_WORDS = POSITION_WORDS | {
-    word: quantity
-    for quantity, words in {
-        "roll": "roll bank",
-        "pitch": "pitch",
-        "yaw": "yaw heading hdg azimuth",
-    }.items()
-    for word in words.split()
-}
+_WORDS = POSITION_WORDS | by_word(
+    {"roll": "roll bank", "pitch": "pitch", "yaw": "yaw heading hdg azimuth"}
+)
 _NOT_THE_VALUE = frozenset(
     {"std", "sigma", "var", "cov", "err", "error", "rate", "ref", "acc", "accuracy", "dot"}
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier
-from gmwm._core.text import made_by, wrapped
+from gmwm._core.text import bullets, made_by, wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -170,10 +170,7 @@ class Validation:
             f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
             f"{word}, seed {self.experiment.seed}"
         )
-        lines = wrapped(first, indent=2)
-        for notice in self.notices:
-            lines += wrapped(str(notice), "- ", 2)
-        return lines
+        return [*wrapped(first, indent=2), *bullets(self.notices)]
 
     def _error_rows(self, outage: int, width: int) -> list[str]:
         rows = [f"{'':{width}} {'':16} {'mean':>9} {'RMS':>9} {'median':>9} {'95 %':>9} "

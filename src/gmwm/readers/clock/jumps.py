@@ -22,20 +22,12 @@ _LONG = 2.25
 class Jumps:
     """Where a clock jumps forward, which rows come twice, and where the clock was set.
 
-    Attributes
-    ----------
-    rows : (k,) ndarray of int
-        First row after each jump.
-    steps : (k,) ndarray
-        How far the clock goes there, in sampling intervals; 1 would be no jump.
-    missing : (k,) ndarray
-        Whole number of rows that are missing there, one or more.
-    interval : float
-        Sampling interval, in the unit of the stamps.
-    repeated : (r,) ndarray of int
-        Rows that repeat one before them.
-    set_at : (s,) ndarray of int
-        First row after each time that the clock was set.
+    rows: (k,) of int, first row after each jump.
+    steps: (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
+    missing: (k,), whole number of rows that are missing there, one or more.
+    interval: Sampling interval, in the unit of the stamps.
+    repeated: (r,) of int, rows that repeat one before them.
+    set_at: (s,) of int, first row after each time that the clock was set.
     """
 
     rows: _Rows
@@ -102,14 +94,8 @@ class Jumps:
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
 
-        Parameters
-        ----------
-        values : (n,) ndarray
-
-        Returns
-        -------
-        ndarray
-            NaN where a row is missing; without those that repeat another.
+        values: (n,).
+        Returns: NaN where a row is missing; without those that repeat another.
         """
         if self.repeated.size:
             values = np.delete(values, self.repeated)
@@ -129,12 +115,8 @@ class Jumps:
 class Change:
     """A change of the sampling rate.
 
-    Attributes
-    ----------
-    row : int
-        Where it is, to within a part of the recording.
-    rates : tuple of float
-        Before and after, in rows per unit of the stamps.
+    row: Where it is, to within a part of the recording.
+    rates: Before and after, in rows per unit of the stamps.
     """
 
     row: int
@@ -152,15 +134,8 @@ def find_change(stamps: FloatArray) -> Change | None:
     Both the median and the mean of the steps, without jumps, must differ: rounded stamps change
     the one from part to part, a few missing rows the other.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
-        Increasing.
-
-    Returns
-    -------
-    Change or None
-        The largest from one part to the next.
+    stamps: (n,), increasing.
+    Returns: the largest from one part to the next.
     """
     steps = np.diff(stamps)
     parts = min(tuning.RATE_PARTS, steps.size // tuning.LEAST_PART)
@@ -277,16 +252,9 @@ def find_shifts(stamps: FloatArray, jumps: Jumps) -> list[tuple[int, float]]:
 
     No lost sample explains such a shift.
 
-    Parameters
-    ----------
-    stamps : (n,) ndarray
-    jumps : Jumps
-        Found in them; what it reports itself is no shift.
-
-    Returns
-    -------
-    list of (int, float)
-        A row near each, and by how much, in sampling intervals.
+    stamps: (n,).
+    jumps: Found in them; what it reports itself is no shift.
+    Returns: a row near each, and by how much, in sampling intervals.
     """
     size = tuning.ROWS_OF_SHIFT
     count = stamps.size // size

@@ -38,16 +38,10 @@ def agree(rate: float, other: float) -> bool:
 class Timing:
     """What time stamps say.
 
-    Attributes
-    ----------
-    rate : float
-        In Hz; not rounded to what was expected.
-    jumps : Jumps
-        Where rows are missing.
-    notices : tuple of Notice
-        On the clock: its rate, its unit, its jitter, its jumps, and what else is uneven.
-    jitter : float
-        Standard deviation of the steps, as a share of a step.
+    rate: In Hz; not rounded to what was expected.
+    jumps: Where rows are missing.
+    notices: On the clock: its rate, its unit, its jitter, its jumps, and what else is uneven.
+    jitter: Standard deviation of the steps, as a share of a step.
     """
 
     rate: float
@@ -60,21 +54,12 @@ class Timing:
 class Clock:
     """Time stamps of a recording.
 
-    Attributes
-    ----------
-    source, column : str
-        File and column, for messages.
-    stamps : (n,) ndarray
-        In a unit of ``seconds``.
-    seconds : float or None
-        The unit, if it is known.
-    own_unit : str
-        The unit as the header states it.
-    where : callable
-        Row -> where that is in the file.
-    same : callable
-        Which rows, in an order, have the samples of the row before; asked where stamps repeat.
-    extent: int
+    source, column: File and column, for messages.
+    stamps: (n,), in a unit of ``seconds``.
+    seconds: The unit, if it is known.
+    own_unit: The unit as the header states it.
+    where: Row -> where that is in the file.
+    same: Which rows, in an order, have the samples of the row before; asked where stamps repeat.
     """
 
     source: str

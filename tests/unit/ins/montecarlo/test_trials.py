@@ -45,15 +45,15 @@ def study(runs=3, seed=1, filters=None, scenario=SCENARIO, source=None, **option
 
 @pytest.fixture(scope="module")
 def reference():
-    return study(25)["good"]
+    return study(12)["good"]
 
 
 # ---- Seeds, filters, workers ----
 
 
 def test_a_seed_gives_one_result(reference):
-    assert reference.runs == 25
-    assert_same(study(25)["good"], reference)
+    assert reference.runs == 12
+    assert_same(study(12)["good"], reference)
     assert not np.any(study(2, seed=2)["good"].error == reference.error[:2])
 
 
@@ -65,7 +65,7 @@ def test_a_longer_study_begins_with_the_shorter_one(reference):
 
 def test_the_result_does_not_depend_on_workers(reference):
     """But for the last digit: vector instructions follow the alignment of arrays."""
-    found = study(25, jobs=2)["good"]
+    found = study(12, jobs=2)["good"]
     for each in fields(FilterErrors):
         expected = getattr(reference, each.name)
         scale = np.nanmax(np.abs(expected)) if expected.dtype == float else 0.0
@@ -105,12 +105,12 @@ def test_the_example_is_the_first_run(reference):
 
 
 def test_a_study_can_be_made_longer(tmp_path, reference):
-    study(13, folder=tmp_path)
+    study(5, folder=tmp_path)
     seen = []
     assert_same(
-        study(25, folder=tmp_path, progress=lambda done, *_: seen.append(done))["good"], reference
+        study(12, folder=tmp_path, progress=lambda done, *_: seen.append(done))["good"], reference
     )
-    assert seen == list(range(13, 26))
+    assert seen == list(range(5, 13))
 
 
 def other_scenarios():
