@@ -2,9 +2,10 @@
 
     python benchmarks/damaged.py [--samples 50000] [--seeds 5]
 
-"abrupt-end" and "held" of `gmwm.health`: how often sound noise has them; shares of the seeds in
-which rectified noise, noise wrapped round and samples written again are found, by the step of the
-samples in standard deviations; and white noise over its truth where these are fitted.
+"abrupt-end", "held", "filled" and "value-repeated" of `gmwm.health`: how often sound noise has
+them; shares of the seeds in which rectified noise, noise wrapped round, samples written again and
+samples put between their neighbours are found, by the step of the samples in standard deviations;
+and white noise over its truth where these are fitted.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 import gmwm
 from gmwm import FitWarning, WhiteNoise
 
+CODES = {"abrupt-end", "held", "filled", "value-repeated"}
 FIRST_SEED, STEPS = 4000, (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 
 
@@ -47,6 +49,12 @@ def held(values: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarr
     return values[np.maximum.accumulate(last)]
 
 
+def filled(values: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Some samples at random replaced by the mean of those beside them."""
+    between = 0.5 * (np.roll(values, 1) + np.roll(values, -1))
+    return np.where(rng.random(values.size) < share, between, values)
+
+
 def in_steps(values: np.ndarray, step: float) -> np.ndarray:
     return step * np.rint(values / step) if step else values
 
@@ -72,10 +80,7 @@ def main() -> None:
             sound(np.random.default_rng(seed), given.samples).items(), STEPS[::2]
         ):
             records += 1
-            alarms += [
-                (name, step, code)
-                for code in codes(in_steps(values, step)) & {"abrupt-end", "held"}
-            ]
+            alarms += [(name, step, code) for code in codes(in_steps(values, step)) & CODES]
     print(f"{len(alarms)} of {records} sound records reported {alarms}")
     damages = {
         "rectified": ("abrupt-end", lambda x, rng: np.abs(x)),
@@ -83,6 +88,7 @@ def main() -> None:
     }
     for share in (0.01, 0.02, 0.05, 0.1, 0.2):
         damages[f"{share:.0%} held"] = ("held", lambda x, rng, share=share: held(x, share, rng))
+    damages["10% between"] = ("filled", lambda x, rng: filled(x, 0.1, rng))
     print(f"{'found at steps of':18}" + "".join(f"{step:>8g}" for step in STEPS))
     for name, (code, damage) in damages.items():
         row = f"{name:18}"

@@ -83,7 +83,7 @@ class Difference:
 
     part: One of `PARTS`.
     shortest, longest: Averaging times of the part, s.
-    ratios: (R,), allan deviation of each recording over the common one; NaN without data there.
+    ratios: (R,), Allan deviation of each recording over the common one; NaN without data there.
     errors: (R,), relative standard errors of these.
     """
 
@@ -126,7 +126,7 @@ class Equality:
 
     tau: (J,), averaging times that two recordings have at least, s.
     common: (J,), their mean wavelet variance, u^2.
-    ratios, errors: (R, J), allan deviation of each recording over the common one, and relative
+    ratios, errors: (R, J), Allan deviation of each recording over the common one, and relative
         standard errors; NaN where a recording has no such level.
     chi_square: Weighted sum of squares about the common curve, on cube roots of the variances.
     differences: Part by part of the plot.

@@ -285,7 +285,9 @@ def repeated_value_notice(
 
     Noise above its step has no such value: the two values on either side come nearly as often. A
     driver that puts zero where the sensor did not answer, or a dead band, makes one. Runs of equal
-    samples count once: what stays is stuck.
+    samples count once: what stays is stuck. Numbers cut towards zero, as by a conversion to
+    integers, have twice as many zeros: the fall from zero to one step is larger then than from one
+    to two, where that of noise is smaller, and of a Laplace law the same.
 
     name, unit: Of the channel.
     values: (n,), samples in their order, none missing.
@@ -304,7 +306,7 @@ def repeated_value_notice(
     share = count / values.size
     usual = tuning.BESIDE_REPEATED * np.max(near)
     if counts[most] - usual < max(tuning.FALSE_ALARM * values.size, tuning.LONG_RUN):
-        return None
+        return _cut_to_zero_notice(name, values, step)
     is_much = share > tuning.MUCH_REPEATED
     text = (
         f"{count:,} samples ({share:.2g} of all) are "
@@ -319,6 +321,30 @@ def repeated_value_notice(
         {"value": float(levels[most]), "samples": float(count), "share": share},
         "if it stands for no answer or a dead band, make such samples missing (NaN)",
     )
+
+
+def _cut_to_zero_notice(name: str, values: FloatArray, step: float) -> Notice | None:
+    """Find twice as many zeros as noise has beside what lies around them."""
+    if step == 0.0:
+        return None
+    zeros, *others = (
+        int(np.count_nonzero(np.abs(np.abs(values) - k * step) < 0.25 * step)) for k in range(3)
+    )
+    one, two = (0.5 * count for count in others)
+    if min(zeros, one, two) < tuning.FEWEST_AT_END:
+        return None
+    error = np.sqrt(1.0 / zeros + 2.0 / one + 0.5 / two)
+    if np.log(zeros * two / one**2) - 3.0 * error < np.log(tuning.CUT_TO_ZERO):
+        return None
+    share = zeros / values.size
+    text = (
+        f"zero comes twice as often ({share:.2g} of all) as the values around it explain: samples "
+        "were cut towards zero, not rounded"
+    )
+    values_of = {"value": 0.0, "samples": float(zeros), "share": share}
+    severity: Severity = "bad" if share > tuning.MUCH_REPEATED else "warning"
+    action = "round to the nearest step before the conversion to integers"
+    return Notice("value-repeated", severity, name, text, values_of, action)
 
 
 def _slowest_fall(near: int, far: int) -> float:

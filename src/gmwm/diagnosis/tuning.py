@@ -87,6 +87,10 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
 
+CUT_TO_ZERO = 1.1
+"""Zeros times those two steps off over the square of those one step off: at most one of noise, that
+of a Laplace law in small steps; 2 to 1.26 of Gaussian noise cut in steps up to 0.7 of it."""
+
 LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
 """Part of the samples, and samples at least, next to an extreme in which the fall of the density is
 looked for; samples of one of so many parts of the record that show it."""
@@ -316,9 +320,10 @@ SHORTEST_STILL = 10.0
 BLOCKS_OF_FLOOR, ROUNDS_OF_FLOOR = 20, 3
 """Blocks (5 s) of the quietest seconds, and rounds in which all quiet ones replace them."""
 
-MOST_OF_FLOOR, MOST_OF_AXIS = 1.8, 3.5
+MOST_OF_FLOOR, MOST_OF_AXIS, CHANCE_OF_BLOCK = 1.8, 3.5, 1e-5
 """Scatter of a block over that of the noise, of all axes and of one: that of 16 samples of white
-noise in six axes is above 1.8 in 1 of 100,000 blocks, in one axis above 3.5 in as many."""
+noise in six axes is above 1.8 in 1 of 100,000 blocks, in one axis above 3.5 in as many. Where fewer
+axes have a larger one as often, that counts."""
 
 BLOCKS_OF_SHOCK = 4
 """Blocks (1 s) of a shock within a stretch, which screening masks."""

@@ -101,6 +101,11 @@ REWEIGHTINGS = 3
 MAX_ROUNDS = 40
 """Rounds of weights of a model before those of the reference mixture take their place."""
 
+WANDERING_ROUNDS, WANDERING_STEP = 20, 0.1
+"""Rounds in which no step below so many standard errors came: the iteration wanders. Of 98 fits of
+the models of 24 channels (four real recordings) the 71 that settled had a step below 0.01 within 15
+rounds; 21 of the others had none below 0.1 within 20."""
+
 REFERENCE_ROUNDS = 3
 """Rounds of slope and discrepancy under these."""
 

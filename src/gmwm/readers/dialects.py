@@ -6,12 +6,35 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from gmwm._core.notices import Notice
 from gmwm.readers.layout import Layout
 from gmwm.readers.names import AXES
 
 _GRAVITY_IN_STEPS = re.compile(rb'"?acc_1G"?\s*,\s*"?([0-9]+)')
 _INDEXED = re.compile(r"(gyroADC|accSmooth)\[([012])\]")
 _ANDROID = {"gyro": "rad/s", "accel": "m/s^2"}
+_FUSED = "Sensor Logger has subtracted gravity from these accelerations, by what other sensors say"
+_NOT_FUSED = "use TotalAcceleration or AccelerometerUncalibrated"
+_SCALES = re.compile(rb"(?m)^([tga])scale,([0-9.eE+-]+)")
+_GYROFLOW = {"t": "time [s]"} | {
+    f"{letter}{axis}": f"{sensor}_{axis} [{unit}]"
+    for letter, sensor, unit in (("g", "gyro", "rad/s"), ("a", "accel", "g"))
+    for axis in AXES
+}
+_KALIBR = {
+    f"{word}_{axis}": f"{sensor}_{axis} [{_ANDROID[sensor]}]"
+    for word, sensor in (("omega", "gyro"), ("alpha", "accel"))
+    for axis in AXES
+}
+_RENAMED = (
+    (frozenset({"timestamp", *_KALIBR}), {"timestamp": "time [ns]", **_KALIBR}),
+    (frozenset({"timestamp", "gyro_rad[0]"}), {"timestamp": "time [us]"}),
+    (
+        frozenset({"time", "field.header.stamp"}),
+        {"time": "time [ns]", "field.header.stamp": "field.header.stamp [ns]"},
+    ),
+)
+"""Names by which an exporter is known, and what they mean."""
 
 
 def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
@@ -19,7 +42,8 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
 
     Betaflight (blackbox_decode): time in microseconds, gyros in deg/s, accelerometers in steps of
     which the preamble has the number per g. Sensor Logger: axes without the sensor, which is in the
-    name of the file, and time in nanoseconds.
+    name of the file, and time in nanoseconds. Gyroflow (gcsv): scales in the preamble. Xsens DOT:
+    a clock of 1 MHz, where MTi has 10 kHz. Kalibr, ulog2csv of PX4 and rostopic: units of time.
 
     source: Name of the file.
     head: Its beginning.
@@ -33,12 +57,28 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
             scale = 1.0 / max(int(steps[1]), 1)
             scales = {i: scale for i, name in enumerate(names) if name.startswith("accSmooth")}
         return replace(layout, names=renamed, scales=scales)
+    preamble = head[: layout.offset]
+    if preamble.startswith(b"GYROFLOW IMU LOG"):
+        sizes = {letter.decode(): float(size) for letter, size in _SCALES.findall(preamble)}
+        renamed = tuple(_GYROFLOW.get(n, n) if n[:1] in sizes else n for n in names)
+        scales = {i: sizes[n[0]] for i, n in enumerate(names) if renamed[i] != n}
+        return replace(layout, names=renamed, scales=scales)
+    if b"DOT" in preamble:
+        renamed = tuple("time [us]" if n == "SampleTimeFine" else n for n in names)
+        return replace(layout, names=renamed)
+    for known, meant in _RENAMED:
+        if known <= set(names):
+            return replace(layout, names=tuple(meant.get(name, name) for name in names))
     if set(AXES) <= set(names) and "seconds_elapsed" in names:
         sensor = next((each for each in _ANDROID if each in source.lower()), None)
         if sensor is not None:
             units = {axis: f"{sensor}_{axis} [{_ANDROID[sensor]}]" for axis in AXES}
             units["time"] = "time [ns]"
-            return replace(layout, names=tuple(units.get(name, name) for name in names))
+            renamed = tuple(units.get(name, name) for name in names)
+            notices = layout.notices
+            if source.lower().startswith("accelerometer."):
+                notices += (Notice("gravity-absent", "warning", "accel", _FUSED, {}, _NOT_FUSED),)
+            return replace(layout, names=renamed, notices=notices)
     return layout
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from statistics import mode
 
@@ -71,7 +72,8 @@ def find_layout(source: str, head: bytes) -> Layout:
     Raises InputError if this is not a text, has no data, or its header does not fit the data.
     """
     _check_is_text(source, head)
-    comments, lines = _first_lines(source, head)
+    comments, read = _first_lines(source, head)
+    lines = _without_preamble(read)
     first, following = lines[0], lines[1:]
     sample = [line.text for line in following or lines]
     delimiter = _delimiter(sample)
@@ -112,6 +114,7 @@ def find_layout(source: str, head: bytes) -> Layout:
         notices=(
             *((_numbering(first.number),) if data is following and not has_header else ()),
             *(_of_dates(named[i]) for i in dates),
+            *((_preamble(first.number),) if lines is not read else ()),
         ),
         dates=dates,
     )
@@ -120,6 +123,11 @@ def find_layout(source: str, head: bytes) -> Layout:
 def _of_dates(name: str) -> Notice:
     text = f"column {name!r} holds dates: they count as seconds since 1970-01-01"
     return Notice("dates", "note", "", text, {"column": name})
+
+
+def _preamble(line: int) -> Notice:
+    text = f"the lines before the header (line {line}) were left out"
+    return Notice("preamble", "note", "", text, {"line": line})
 
 
 def _numbering(line: int) -> Notice:
@@ -167,6 +175,24 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
         what = "holds only comments" if comments else "is empty"
         raise InputError(f"{source} {what}: give a file with samples")
     return comments, lines
+
+
+def _without_preamble(lines: list[_Line]) -> list[_Line]:
+    """From the header on, if only lines of words and of other widths than the data's are before."""
+    rows = [line.text for line in lines[len(lines) // 2 :]]
+    delimiter = _delimiter(rows)
+    if delimiter is None:
+        return lines
+    decimal = _decimal(rows, delimiter)
+    with suppress(ValueError):  # quotes that do not match are reported where they are read
+        width = mode(len(split_line(row, delimiter)) for row in rows)
+        for i, line in enumerate(lines):
+            cells = split_header(line.text, delimiter)
+            if len(cells) == width:
+                return lines[i:] if i and _are_names(cells, decimal) else lines
+            if all(number(cell, decimal) is not None for cell in cells):
+                return lines
+    return lines
 
 
 def _check_utf8(source: str, line: int, raw: bytes) -> None:

@@ -40,7 +40,7 @@ _SENSOR_LETTERS = {"g": "gyro", "w": "gyro", "a": "accel", "f": "accel"}
 _OTHER_MEANINGS = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "covariance", "err", "error", "ref"}
     | {"reference", "true", "truth", "cmd", "desired", "setpoint", "temp", "temperature"}
-    | {"delta", "mag"}
+    | {"delta", "mag", "free"}
 )
 
 _AUXILIARY_WORDS = {

@@ -16,12 +16,12 @@ from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.readers import tuning
 
 READING = frozenset(
-    {"column-numbers", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
+    {"column-numbers", "preamble", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
     | {"rate-unlikely"}
     | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
-    | {"stamps-in-turns", "clock-shifts", "sentinel", "sensor-absent"}
+    | {"stamps-in-turns", "clock-shifts", "sentinel", "sensor-absent", "gravity-absent"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
     | {"partial-record", "still-stretches", "summer-time"}
 )

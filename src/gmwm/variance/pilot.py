@@ -15,7 +15,7 @@ from gmwm.variance import tuning
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """Power-law pieces between the pass bands of the levels, fitted to the wavelet variances.
 
-    variance: (J,), haar wavelet variances, u^2, positive.
+    variance: (J,), Haar wavelet variances, u^2, positive.
     averaging: (J,), averaging times in samples, dyadic.
     dt: Sampling interval, s.
     Returns: ``psd(f, dt)``.

@@ -54,6 +54,9 @@ SPOILT = {
     "every other one is zero": (
         "value-repeated", "samples_measured", np.where(np.arange(N) % 2, clean(1), 0.0)
     ),
+    "cut towards zero in steps of 0.5 sd": (
+        "value-repeated", "samples_measured", 0.5 * SD * np.trunc(clean(1) / (0.5 * SD))
+    ),
     "stuck": (
         "stuck", "samples_change",
         np.repeat(clean(1)[: 36 * N // 50], np.tile([1] * 35 + [15], N // 50)),

@@ -161,6 +161,17 @@ def test_a_boat_is_never_at_rest():
     assert find_still(recording).stretches == ()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_one_axis_is_not_cut_up_beside_what_is_twice_as_loud(seed):
+    # A block of one axis has a sixth of the samples, and scatters the more by chance.
+    noise = WhiteNoise(GYRO).simulate(72_000, 1.0 / RATE, seed)
+    noise[36_000:] *= 2.0
+    recording = gmwm.Recording.from_arrays({"gyro_x": noise}, RATE, {"gyro": "rad/s"})
+    found = rest_of(recording)
+    (stretch,) = found.stretches
+    assert stretch == pytest.approx((0.0, 360.0), abs=1.0)
+
+
 def test_they_are_calibrated_jointly():
     recording, rest = log(*FLIGHT)
     recording = replace(recording, channels=recording.channels[::5])

@@ -55,7 +55,9 @@ def test_xsens(save, rows, start):
     assert ("clock-wraps" in codes) == (start > 1000)
 
 
-@pytest.mark.parametrize(("sensor", "first"), [("Gyroscope", 0), ("TotalAcceleration", 3)])
+@pytest.mark.parametrize(("sensor", "first"), [
+    ("Gyroscope", 0), ("TotalAcceleration", 3), ("Accelerometer", 3),
+])  # fmt: skip
 def test_android_sensor_logger(save, rows, sensor, first):
     stamps = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(N)
     table = [[t, 0.01 * i, *row[first : first + 3][::-1]]
@@ -63,6 +65,8 @@ def test_android_sensor_logger(save, rows, sensor, first):
     found = read(save(f"{sensor}.csv", ["time,seconds_elapsed,z,y,x"], table))
     np.testing.assert_array_equal(values(found), rows[:, first : first + 3])
     assert found.rate == pytest.approx(100.0, rel=1e-6)
+    codes = {notice.code for notice in found.notices}
+    assert ("gravity-absent" in codes) == (sensor == "Accelerometer")
 
 
 BLACKBOX = ['"Product","Blackbox flight data recorder by Nicholas Sherlock"',
@@ -86,6 +90,55 @@ def test_betaflight_blackbox(save):
 def test_a_blackbox_log_without_its_header(save):
     with pytest.raises(InputError, match="preamble of a blackbox log but no line that begins"):
         read(save("btfl.csv", BLACKBOX, [[1, 2, 3]]))
+
+
+DOT = ["sep=,", "DeviceTag:,Xsens DOT 1", "OutputRate:,100Hz", "",
+       "PacketCounter,SampleTimeFine,FreeAcc_X,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"]  # fmt: skip
+EPSON = ["2024/01/15,Version 1.0", "M-G370PDF1,FW 1.0,SN 123", "Scale: 0.0066,0.4",
+         "Sample No,time,Gx,Gy,Gz,Ax,Ay,Az,Count"]  # fmt: skip
+OMEGA = "omega_x,omega_y,omega_z,alpha_x,alpha_y,alpha_z"
+PX4 = ("timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],"
+       "accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2]")  # fmt: skip
+ECHO = ["%time,field.header.stamp"] + [
+    f"field.{what}.{axis}" for what in ("angular_velocity", "linear_acceleration") for axis in "xyz"
+]
+
+
+def test_preambles_and_clocks_of_exporters(save, rows):
+    count, ns = np.arange(N), 1_403_636_579_000_000_000 + 10_000_000 * np.arange(N)
+    turned = rows[:, [3, 4, 5, 0, 1, 2]]
+    wrapping = (2**32 - 500_000 + 10_000 * count) % 2**32
+    for name, head, table, units in (
+        ("dot.csv", DOT, [count, wrapping, 0.1 * rows[:, 0], *turned.T], SI),
+        ("epson.csv", EPSON, [count, 0.01 * count, *rows.T, count], SI),
+        ("imu0.csv", [f"timestamp,{OMEGA}"], [ns, *rows.T], {}),
+        ("sensor_combined.csv", [PX4], [ns // 1000, *rows.T], {}),
+        ("echo.csv", [",".join(ECHO)], [ns + 2_000_000, ns, *rows.T], SI),
+    ):
+        # As objects: whole nanoseconds stay whole.
+        found = read(save(name, head, zip(*(each.tolist() for each in table), strict=True)),
+                     units=units)  # fmt: skip
+        np.testing.assert_allclose(values(found), rows, rtol=1e-15, err_msg=name)
+        assert found.rate == pytest.approx(100.0, rel=1e-6), name
+        has_preamble = any(notice.code == "preamble" for notice in found.notices)
+        assert has_preamble == (len(head) > 1)
+
+
+def test_scales_of_gyroflow(save):
+    rng = np.random.default_rng(6)
+    steps = rng.integers(-20, 20, (N, 6))
+    steps[:, 5] += 2048
+    head = ["GYROFLOW IMU LOG", "version,1.3", "orientation,YxZ", "tscale,0.001",
+            "gscale,0.00122173047", "ascale,0.00048828125", "t,gx,gy,gz,ax,ay,az"]  # fmt: skip
+    found = read(save("video.gcsv", head, [[5 * i, *row] for i, row in enumerate(steps)]))
+    scales = np.repeat([0.00122173047, 0.00048828125 * 9.80665], 3)
+    np.testing.assert_allclose(values(found), steps * scales, rtol=1e-14)
+    assert found.rate == pytest.approx(200.0, rel=1e-9)
+
+
+def test_a_header_of_another_width_than_the_data_is_no_preamble(save, rows):
+    with pytest.raises(InputError, match=r"6 fields where the header \(line 1\) has 7"):
+        read(save("wide.csv", ["time,gx,gy,gz,ax,ay,az"], rows), rate=100, units=SI)
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,8 @@ def naive(data: bytes, delimiter: str | None) -> np.ndarray | None:
         if delimiter != ",":
             cells = [cell.replace(",", ".") for cell in cells]
         try:
-            rows.append([_value(cell) for cell in cells[1:7]])
+            # A line of words before the header has other widths.
+            rows.append([_value(cell) for cell in (cells if len(cells) < 7 else cells[1:7])][-6:])
         except ValueError:
             if rows:
                 return None

@@ -22,7 +22,7 @@ class Bands:
     """Mean logarithm of the spectrum in bands of equal width in log frequency.
 
     edges: (J + 1,) of int, bins of the spectrum.
-    frequency: (J,), hz.
+    frequency: (J,), Hz.
     level: (J,), logarithm of the density.
     variance: (J,), of ``level``.
     smooth: (J,), running median of ``level`` over an octave.

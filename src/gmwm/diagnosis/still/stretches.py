@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
@@ -102,8 +103,8 @@ def find_still(recording: Recording) -> Still:
         return Still((), 0.0, (), recording.duration)
     channels, size, means, scatter = blocks.channels, blocks.size, blocks.means, blocks.scatter
     gyro, count = blocks.is_gyro, means.shape[0]
-    floor = _floor(scatter)
-    quiet_blocks = _quiet(scatter, floor) & ~blocks.loudness.loud
+    floor = _floor(scatter, size)
+    quiet_blocks = _quiet(scatter, floor, size) & ~blocks.loudness.loud
     # A turn may begin between two blocks.
     turns = np.maximum(tuning.TURNS, tuning.BEYOND_WHITE * np.sqrt(floor[gyro] / size))
     quiet_blocks[1:] &= np.all(np.abs(np.diff(means[:, gyro], axis=0)) < turns, axis=1)
@@ -143,7 +144,7 @@ def rest_of(recording: Recording) -> Still | None:
     return replace(find_still(recording), vibrating=blocks.loud_stretches)
 
 
-def _floor(scatter: FloatArray) -> FloatArray:
+def _floor(scatter: FloatArray, size: int) -> FloatArray:
     """Variance of the noise of each axis, from the quietest seconds."""
     least = np.nanmin(np.where(scatter > 0.0, scatter, np.nan), axis=0)
     logs = np.log(np.maximum(scatter, least)).sum(axis=1)
@@ -153,20 +154,20 @@ def _floor(scatter: FloatArray) -> FloatArray:
     first = int(np.nanargmin(median)) if not np.all(np.isnan(median)) else 0
     floor = np.maximum(np.nanmedian(scatter[first : first + width], axis=0), least)
     for _ in range(tuning.ROUNDS_OF_FLOOR):
-        quiet = _quiet(scatter, floor)
+        quiet = _quiet(scatter, floor, size)
         if np.count_nonzero(quiet) < width:
             break
         floor = np.maximum(np.median(scatter[quiet], axis=0), least)
     return floor
 
 
-def _quiet(scatter: FloatArray, floor: FloatArray) -> BoolArray:
-    """Whether the ratio of a block and its neighbours is that of noise."""
+def _quiet(scatter: FloatArray, floor: FloatArray, size: int) -> BoolArray:
+    """Whether the ratio of a block of so many samples is that of noise."""
     ratio = scatter / floor
     together = np.mean(ratio, axis=1)
-    return np.asarray(
-        (together < tuning.MOST_OF_FLOOR) & (np.max(ratio, axis=1) < tuning.MOST_OF_AXIS)
-    )
+    freedom = (size - 1.0) * floor.size
+    most = max(tuning.MOST_OF_FLOOR, float(chi2.isf(tuning.CHANCE_OF_BLOCK, freedom)) / freedom)
+    return np.asarray((together < most) & (np.max(ratio, axis=1) < tuning.MOST_OF_AXIS))
 
 
 def _runs(quiet: BoolArray, count: int, rate: FloatArray) -> list[tuple[int, int]]:

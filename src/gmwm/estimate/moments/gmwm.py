@@ -219,7 +219,7 @@ def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights)
     relaxation).
     """
     moments, relaxed, point = start.moments, start.covariance, start.point
-    part = 1.0
+    part, least = 1.0, np.inf
     curve = _implied(design, point)
     step = np.zeros_like(curve)
     for rounds in range(1, tuning.MAX_ROUNDS + 1):
@@ -235,7 +235,11 @@ def _iterate(design: Design, start: State, level: Discrepancy, weights: Weights)
         point = search(profile) if rounds == 1 else profile.refine(profile.at(point.shapes))
         previous, curve = curve, _implied(design, point)
         before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))
-        converged = bool(np.max(np.abs(step)) < tuning.SETTLED)
+        largest = float(np.max(np.abs(step)))
+        least = min(least, largest)
+        if rounds == tuning.WANDERING_ROUNDS and least > tuning.WANDERING_STEP:
+            return None
+        converged = largest < tuning.SETTLED
         if converged or _discrepancy_is_due(level.value, rounds):
             changed = level.update(moments.target - curve, statistical, moments.target, previous)
             if converged and not changed:

@@ -157,7 +157,7 @@ def _limit(terms: list[Process], start: float, dt: float) -> tuple[float, float]
         slopes = np.diff(np.log10(density))
         changes = np.abs(np.diff(slopes, prepend=np.inf))
         settled = np.abs(slopes) < tuning.SETTLED
-        if not _has_variance(term, dt):
+        if not settled[0] and not _has_variance(term, dt):
             # Above the corner of a slow stationary process the slope is constant too.
             settled |= changes < tuning.SETTLED
         place = int(np.argmax(settled)) if np.any(settled) else slopes.size - 1

@@ -131,7 +131,7 @@ def open_frame(data: Any) -> FrameTable:
             table = data.to_arrow() if hasattr(data, "to_arrow") else pa.table(data)
     except (pa.ArrowException, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"{source} is not a table of numbers: {error}") from error
-    return _table(source, table.schema, table.num_rows, table.column, partial(_slices, table))
+    return _in_memory(source, table)
 
 
 def open_parquet(path: Path) -> FrameTable:
@@ -143,10 +143,15 @@ def open_parquet(path: Path) -> FrameTable:
 
     with damage_named(path.name):
         file = parquet.ParquetFile(path, memory_map=True)
-        schema, rows = file.schema_arrow, file.metadata.num_rows
+        schema, rows = _flat_schema(file), file.metadata.num_rows
         return _table(
             path.name, schema, rows, partial(_parquet_column, path), partial(_parquet_parts, path)
         )
+
+
+def _flat_schema(file: Any) -> Any:
+    """With the fields of messages, ``angular_velocity.x``, as columns."""
+    return file.schema_arrow.empty_table().flatten().schema
 
 
 def _parquet_column(path: Path, column: int) -> Any:
@@ -154,7 +159,7 @@ def _parquet_column(path: Path, column: int) -> Any:
 
     file = parquet.ParquetFile(path, memory_map=True)
     # By name, since a nested column has several leaves.
-    return file.read(columns=[file.schema_arrow.names[column]]).column(0)
+    return file.read(columns=[_flat_schema(file).names[column]]).flatten().column(0)
 
 
 def _parquet_parts(path: Path, columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
@@ -162,9 +167,10 @@ def _parquet_parts(path: Path, columns: Sequence[int], rows: int) -> Iterator[Se
     from pyarrow import parquet
 
     file = parquet.ParquetFile(path)  # not mapped: what was read would stay in memory
-    names = [file.schema_arrow.names[column] for column in columns]
+    names = [_flat_schema(file).names[column] for column in columns]
     for batch in file.iter_batches(batch_size=rows, columns=names):
-        yield [pa.chunked_array([batch.column(name)]) for name in names]
+        part = pa.Table.from_batches([batch]).flatten()
+        yield [part.column(name) for name in names]
 
 
 def _slices(table: Any, columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
@@ -180,10 +186,12 @@ def open_feather(path: Path) -> FrameTable:
     from pyarrow import feather
 
     with damage_named(path.name):
-        table = feather.read_table(path, memory_map=True)
-        return _table(
-            path.name, table.schema, table.num_rows, table.column, partial(_slices, table)
-        )
+        return _in_memory(path.name, feather.read_table(path, memory_map=True))
+
+
+def _in_memory(source: str, table: Any) -> FrameTable:
+    flat = table.flatten()
+    return _table(source, flat.schema, flat.num_rows, flat.column, partial(_slices, flat))
 
 
 def _table(

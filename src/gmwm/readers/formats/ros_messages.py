@@ -30,8 +30,12 @@ ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
 class Message:
     """A type of message: a header, then numbers.
 
-    count: Numbers behind the header.
-    columns: Name of a column, with its unit -> which of the numbers it is.
+    Attributes
+    ----------
+    count : int
+        Numbers behind the header.
+    columns : mapping of str to int
+        Name of a column, with its unit -> which of the numbers it is.
     """
 
     count: int
@@ -54,8 +58,12 @@ COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
 class Serialization:
     """How the header is written.
 
-    stamp: Offset of the stamp, bytes.
-    is_cdr: Whether an encapsulation header says the byte order and numbers are aligned.
+    Attributes
+    ----------
+    stamp : int
+        Offset of the stamp, bytes.
+    is_cdr : bool
+        Whether an encapsulation header says the byte order and numbers are aligned.
     """
 
     stamp: int
@@ -85,11 +93,25 @@ def decode(
 ) -> tuple[_Integers, list[FloatArray]]:
     """Stamps and numbers of messages.
 
-    raw: Messages as they are stored.
-    wanted: Which of the numbers behind the header.
-    where: Index of a message -> where it is.
-    Returns: stamps (n,) of int, of the headers, ns; numbers.
-    Raises InputError at a message that is too short, or of another encoding.
+    Parameters
+    ----------
+    raw : sequence of bytes
+        Messages as they are stored.
+    wanted : sequence of int
+        Which of the numbers behind the header.
+    where : callable
+        Index of a message -> where it is.
+
+    Returns
+    -------
+    stamps : (n,) ndarray of int
+        Of the headers, ns.
+    numbers : list of (n,) ndarray
+
+    Raises
+    ------
+    InputError
+        At a message that is too short, or of another encoding.
     """
     n = len(raw)
     sizes = np.fromiter(map(len, raw), np.int64, n)
@@ -108,8 +130,8 @@ def decode(
         if foreign.size:
             row = int(foreign[0])
             raise InputError(
-                f"{where(row)}: encoding {int(head[row, 0]) << 8 | int(head[row, 1]):#06x} is not "
-                "plain CDR: record with a usual RMW, or convert the bag with ros2 bag convert"
+                f"{where(row)}: encoding 0x{head[row, :2].tobytes().hex()} is not plain CDR: "
+                "record with a usual RMW, or convert the bag with ros2 bag convert"
             )
     length = np.ascontiguousarray(head[:, -4:])
     frames = length.view("<u4")[:, 0].astype(np.int64)

@@ -8,10 +8,12 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
+from pyarrow import parquet
 from scipy.io import savemat
 
 import gmwm
 from bags import START, at_rest
+from gmwm.readers import read_blocks
 from gmwm.readers.names import CANONICAL
 
 X = at_rest()
@@ -111,6 +113,19 @@ def test_files_of_arrow(tmp_path, frame, end):
     for size in (0, 4, len(whole) // 2):
         path.write_bytes(whole[:size])
         assert "is damaged or cut off" in refusal(path)
+
+
+def test_fields_of_messages_are_columns(tmp_path):
+    columns = {"time": pa.array(START + 10_000_000 * np.arange(len(X)), pa.timestamp("ns"))}
+    for name, part in (("angular_velocity", X[:, :3]), ("linear_acceleration", X[:, 3:])):
+        columns[name] = pa.array([dict(zip("xyz", row, strict=True)) for row in part.tolist()])
+    table = pa.table(columns)
+    parquet.write_table(table, tmp_path / "a.parquet")
+    for data in (table, tmp_path / "a.parquet"):
+        assert exact(gmwm.read(data, units=SI))
+        parts = list(read_blocks(data, units=SI, rows=300))
+        found = np.concatenate([part["accel_z"].values for part in parts])
+        np.testing.assert_array_equal(found, X[:, 5])
 
 
 # -- MAT and HDF5 ---------------------------------------------------------------------------------
