@@ -105,7 +105,7 @@ def compare(fitted: Fit, truth: Model) -> list[Comparison]:
     return rows
 
 
-RATE, DRIVE = 25.0, 600.0
+FILES_RATE, DRIVE = 25.0, 600.0
 """Hz; s. Small files, and a drive long enough to compare sensor models on."""
 
 _GRAVITY = 9.80665
@@ -118,10 +118,14 @@ def write_demo_files(folder: Path, seconds: float, seed: int) -> tuple[float, fl
     seconds: Length of the recording at rest.
     Returns: from the IMU to the antenna: forward, right, down; m.
     """
-    still = sensors().simulate(round(seconds * RATE), 1.0 / RATE, np.random.default_rng(seed)).total
+    still = (
+        sensors()
+        .simulate(round(seconds * FILES_RATE), 1.0 / FILES_RATE, np.random.default_rng(seed))
+        .total
+    )
     _write(folder / "static.csv", _inertial(still + np.array([0, 0, 0, 0, 0, -_GRAVITY])))
-    log, _ = emulated_log(seed, duration=DRIVE, rate=RATE)
-    moving = np.hstack([log.imu.rotation, log.imu.velocity]) * RATE
+    log, _ = emulated_log(seed, duration=DRIVE, rate=FILES_RATE)
+    moving = np.hstack([log.imu.rotation, log.imu.velocity]) * FILES_RATE
     _write(folder / "imu.csv", _inertial(moving))
     position, velocity = log.aiding.fixes
     columns = {"time_s": position.time}
@@ -138,7 +142,7 @@ def _inertial(values: FloatArray) -> dict[str, FloatArray]:
     values = np.round(values, 8)  # far below the noise
     columns = {f"{a} [{SI_UNIT[a.split('_')[0]]}]": values[:, i] for i, a in enumerate(_AXES)}
     # A sample is the mean over the interval that ends at its stamp.
-    return {"time [s]": np.round((np.arange(len(values)) + 1) / RATE, 6)} | columns
+    return {"time [s]": np.round((np.arange(len(values)) + 1) / FILES_RATE, 6)} | columns
 
 
 def _write(path: Path, columns: dict[str, FloatArray]) -> None:
