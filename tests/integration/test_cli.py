@@ -625,7 +625,7 @@ def test_channels_and_a_stretch(run, good_file):
         (("--start", "-1"), "fewer than 64 samples"),
         (("--stop", "nan"), "fewer than 64 samples"),
         (("--start", "inf"), "fewer than 64 samples"),
-        (("--model", "N + X"), "'X' is no term: write terms such as N, K, B"),
+        (("--model", "N + X"), "'X' is no term: write Q, N, B, K, R, GM, Res"),
         (("--model", "N - K"), "'N - K' is no term"),
         (("--model", ""), "is no term"),
         (("--model", "N + N"), "two WhiteNoise"),

@@ -110,6 +110,14 @@ def test_a_unit_of_time_is_asked_for_with_the_others_and_what_is_advised_helps(t
     assert read(path, rate=50, units=UNITS).rate == 50.0
 
 
+@pytest.mark.parametrize("units", ["deg/h", {"gyro": 3.0}, [("gyro", "deg/s")]])
+def test_units_are_those_of_sensors(timed, units):
+    with pytest.raises(
+        InputError, match=r'^units = .*: give that of each sensor, e.g. units={"gyro"'
+    ):
+        read(timed(0.01 * np.arange(80)), units=units)
+
+
 def test_a_unit_of_time_that_nothing_is_like(timed):
     assert problem(timed(3e12 * np.arange(80))).endswith(
         "without a unit: name the column by its unit, or give the sampling rate, rate=100"
