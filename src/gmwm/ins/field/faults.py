@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import brief
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
     LEVEL,
@@ -262,7 +263,7 @@ def _signs(fault: Explanation) -> tuple[str, str]:
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
-    share = f"{100.0 * fault.values['fraction']:.2g} %"
+    share = f"{brief(100.0 * fault.values['fraction'])} %"
     return (
         f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
         "leave them out",
@@ -282,14 +283,14 @@ def _coloured(fault: Explanation) -> tuple[str, str]:
 def _fix_noise(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"the fixes are {factor:.2g} times their standard deviations",
+        f"the fixes are {brief(factor)} times their standard deviations",
         f"multiply those by {factor:.2g}",
     )
 
 
 def _white(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
-    text = f"white noise is {factor:.2g} times the model's"
+    text = f"white noise is {brief(factor)} times the model's"
     if factor > tuning.NOT_NOISE:
         return text, "vibration adds to it, but look first at units, axes and stamps"
     return (
@@ -302,7 +303,7 @@ def _white(fault: Explanation) -> tuple[str, str]:
 def _slow(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"slow errors and biases are {factor:.2g} times the model's",
+        f"slow errors and biases are {brief(factor)} times the model's",
         "the sensor model or the bias is wrong: calibrate again, or give the bias",
     )
 
