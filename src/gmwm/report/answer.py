@@ -129,7 +129,7 @@ def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
 def bias_instability(fit: Fit) -> dict[str, str]:
     """B from the lowest point of the curve; an upper bound where it falls to the end."""
     low = floor(fit)
-    sign = "" if low.tau < fit.wv.tau[-1] else "≤ "
+    sign = "≤ " if low.falls else ""
     text = quantity_text(low.bias_instability, "u", fit)
     return {key: sign + each for key, each in text.items()}
 
