@@ -29,7 +29,7 @@ HINTS = {
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
-    "time-unit": "--rate 100",
+    "time-unit": "--rate {rate:.6g}, or name the column {column}",
     "topic": "--topic NAME",
     "topics-apart": "--topic NAME or --clock log",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
@@ -39,6 +39,7 @@ HINTS = {
 def with_hint(error: InputError) -> str:
     """The message of an error, its mend in the words of the command line."""
     hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
+    hint = hint.format(**({"rate": 100.0, "column": "by its unit"} | error.values))
     if not hint:
         return str(error)
     if error.mend:
