@@ -6,7 +6,7 @@ import hashlib
 import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -178,7 +178,7 @@ def calibrate(
                 )
             )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
-        origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
+        origin = {"command": _command()} | _hashes(files)
         own = recordings[0] if len(recordings) == 1 and not in_blocks else None
         written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
@@ -286,9 +286,16 @@ def _command() -> str:
     return shlex.join(["gmwm", *sys.argv[1:]])
 
 
-def _hash(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _hashes(files: Iterable[Path]) -> dict[str, str]:
+    """Of each file, and of those in a folder, as a bag is one."""
+    found = {}
+    for file in files:
+        for one in sorted(file.rglob("*")) if file.is_dir() else [file]:
+            if one.is_file():
+                with one.open("rb") as stream:
+                    digest = hashlib.file_digest(stream, "sha256").hexdigest()
+                found[f"sha256 of {one.relative_to(file.parent)}"] = digest
+    return found
 
 
 def write_files(
