@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 pytest.importorskip("rosbags")  # where the lowest versions are tested, the extras are absent
-from bags import ROS1, at_rest, imu_topic, write1
+from bags import ROS1, ROS2, at_rest, imu_topic, write1, write2
 
 X = at_rest(2000)
 
@@ -22,6 +22,14 @@ def test_bag_to_kalibr(run, tmp_path):
     assert code == 2
     assert "--export" in told and "kalibr" in told
     assert not (tmp_path / "new").exists()
+
+
+def test_a_bag_that_is_a_folder(run, tmp_path):
+    """All was computed, and then a folder has no digest: nothing was written."""
+    write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
+    code, _, told = run("calibrate", "bag", "--model", "N", "--leave", "all", "-q", "-o", "out")
+    assert (code, told) == (0, "")
+    assert "sha256 of bag/metadata.yaml" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_accelerometer_alone(run, tmp_path):

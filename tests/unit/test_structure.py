@@ -1,6 +1,7 @@
 """The house: rooms with faces, no circles, nothing lost in a crowd."""
 
 import ast
+import re
 import sys
 from collections import defaultdict
 from importlib.metadata import packages_distributions
@@ -130,3 +131,21 @@ def test_no_script_stands_in_front_of_a_package(folder):
     taken = set(sys.stdlib_module_names) | set(packages_distributions()) | {"coverage"}
 
     assert scripts.isdisjoint(taken)
+
+
+def test_where_things_are_added_is_there():
+    """Files and names of the table in CONTRIBUTING.md; capitals of a file stand for any name."""
+    _, table = (REPOSITORY / "CONTRIBUTING.md").read_text().split("| to add |")
+    quoted = set(re.findall(r"`([^`]+)`", table.split("\n\n")[0]))
+    places = [REPOSITORY, REPOSITORY / "tests" / "unit", ROOT]
+    known = {f"{file}" for place in places[1:] for file in place.rglob("*.*")}
+    code = "\n".join(file.read_text() for file in [*FILES, *ROOT.rglob("*.pyi")])
+    for text in quoted:
+        place = text.removeprefix("python ").rstrip("/")
+        if "/" in text or place.endswith((".py", ".pyi", ".md")):
+            if not re.search("[A-Z]{4}", place):
+                assert any(f"{one}".endswith(f"/{place}") or (base / place).exists()
+                           for base in places for one in known), text  # fmt: skip
+        else:
+            for name in re.findall(r"[A-Za-z_]\w+", text):
+                assert re.search(rf"\b{name}", code), f"{name} of `{text}` is gone"

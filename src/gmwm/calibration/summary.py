@@ -27,10 +27,12 @@ class Floor:
 
     deviation: SI.
     tau: Averaging time, s.
+    falls: Whether the model still falls at the last averaging time: there may be no floor.
     """
 
     deviation: float
     tau: float
+    falls: bool
 
     @property
     def bias_instability(self) -> float:
@@ -69,13 +71,16 @@ def floor(fitted: Fit) -> Floor:
     """Lowest point of the fitted Allan deviation at averaging times with data.
 
     A model that runs below the data is not believed: where it does, the lower end of the data's
-    interval (95 %) counts.
+    interval (95 %) counts; and where it is lowest below all the data, the lowest of these.
     """
     at, wv = fitted.goodness, fitted.wv
     share = np.sqrt(wv.lower / np.maximum(wv.variance, np.finfo(float).tiny))
     deviation = np.fmax(np.sqrt(2.0 * fitted.implied), at.data * share)
     lowest = int(np.argmin(deviation))
-    return Floor(float(deviation[lowest]), float(fitted.wv.tau[lowest]))
+    falls, seen = lowest == wv.tau.size - 1, int(np.argmin(at.data))
+    if deviation[lowest] < at.data[seen]:
+        return Floor(float(at.data[seen]), float(wv.tau[seen]), falls)
+    return Floor(float(deviation[lowest]), float(wv.tau[lowest]), falls)
 
 
 @dataclass(frozen=True)
@@ -139,7 +144,7 @@ def sentence(fitted: Fit) -> str:
     noise = "No white noise"
     if density > 0.0:
         noise = f"Total white noise of {shown(density, 'u/sqrt(Hz)')}"
-    end = "" if low.tau < fitted.wv.tau[-1] else " (still falling at the end of the record)"
+    end = " (the model still falls at the end of the record)" if low.falls else ""
     return (
         f"{noise}; averaging helps up to {low.tau:.4g} s, down to {shown(low.deviation, 'u')}{end}."
     )

@@ -6,7 +6,7 @@ import hashlib
 import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -178,7 +178,7 @@ def calibrate(
                 )
             )  # fmt: skip
         # The files first: who pipes the table into head must not lose them.
-        origin = {"command": _command()} | {f"sha256 of {file.name}": _hash(file) for file in files}
+        origin = {"command": _command()} | _hashes(files)
         own = recordings[0] if len(recordings) == 1 and not in_blocks else None
         written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
@@ -235,15 +235,21 @@ def show(result: Calibration) -> None:
     # `click.echo` takes a terminal of ASCII for one of UTF-8.
     print("\n".join(wrapped(f"{result.source}: {size}", indent=2)))
     print_whole(new_console(), _table(result))
-    shown = worst_first([each for each in result.notices if _is_shown(each)])
-    remarks = [str(with_option(notice)) for notice in shown]
+    reasons = {
+        (name, notice.code): f"{name} is not valid: {with_option(notice)}"
+        for name, fit in result.fits.items()
+        for notice in fit.notices
+        if notice.severity == "bad"
+    }
+    shown = [each for each in result.notices if (each.where, each.code) not in reasons]
+    remarks = [str(with_option(each)) for each in worst_first(shown) if _is_shown(each)]
     remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             remarks.append(f"{name}: {fit.agreement}")
-        of_fit = [notice for notice in fit.notices if notice.code not in _OF_RECORDING]
-        remarks += [f"{name}: {with_option(notice)}" for notice in of_fit]
-    for remark in remarks:
+        of_fit = [each for each in fit.notices if each.code not in _OF_RECORDING]
+        remarks += [f"{name}: {with_option(n)}" for n in of_fit if (name, n.code) not in reasons]
+    for remark in (*reasons.values(), *remarks):
         print("\n".join(wrapped(remark, first="- ", indent=2)))
 
 
@@ -286,9 +292,16 @@ def _command() -> str:
     return shlex.join(["gmwm", *sys.argv[1:]])
 
 
-def _hash(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _hashes(files: Iterable[Path]) -> dict[str, str]:
+    """Of each file, and of those in a folder, as a bag is one."""
+    found = {}
+    for file in files:
+        for one in sorted(file.rglob("*")) if file.is_dir() else [file]:
+            if one.is_file():
+                with one.open("rb") as stream:
+                    digest = hashlib.file_digest(stream, "sha256").hexdigest()
+                found[f"sha256 of {one.relative_to(file.parent)}"] = digest
+    return found
 
 
 def write_files(

@@ -60,6 +60,14 @@ def in_options(calibration: Calibration) -> Calibration:
 def with_option(notice: Notice) -> Notice:
     """A notice with the options that do what it advises."""
     values = notice.values
+    if notice.code == "sd-assumed":
+        return replace(notice, action=f"give --{notice.where}-sd")
+    if notice.code == "axis-up":
+        action = (
+            "if it is mounted upside down, fine; else give --channel gyro_z=-NAME "
+            "--channel accel_z=-NAME, and the same of y if that points left"
+        )
+        return replace(notice, action=action)
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")

@@ -37,6 +37,9 @@ STATES: dict[State, str] = {
 }
 """Verdicts in words, the best first."""
 
+_ONE = {word: word.replace(verb, f"{verb}s") for word in STATES.values()
+        for verb in ("agree", "differ") if word.startswith(verb)}  # fmt: skip
+
 _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 _NAMES = {"short": "short times", "R": "drift"}
 
@@ -219,7 +222,11 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
     def summary(self) -> str:
         """How many axes agree."""
         counts = Counter(axis.state for axis in self.values())
-        parts = [f"{counts[state]} {word}" for state, word in STATES.items() if counts[state]]
+        parts = [
+            f"{counts[state]} {_ONE.get(word, word) if counts[state] == 1 else word}"
+            for state, word in STATES.items()
+            if counts[state]
+        ]
         return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
 
     def __repr__(self) -> str:
@@ -239,7 +246,9 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         for name, axis in self.items():
             lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
-        lines += bullets(worst_first(list(self.notices)))
+        # The verdicts stand above.
+        others = [each for each in self.notices if not each.code.startswith("curves-")]
+        lines += bullets(worst_first(others))
         return "\n".join(lines)
 
     def _numbers(self, axis: AxisComparison) -> str:
@@ -252,8 +261,10 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
                 shown = " ".join(axis.number_text(letter, value))
                 found.append(f"{letter} {sign}{shown}{times}")
         own = len(axis.numbers.each)
+        if not found:
+            return "none: no recording has a curve of noise alone"
         few = f" (of {own} only)" if own < len(self.labels) else ""
-        return (", ".join(found) or "none") + few
+        return ", ".join(found) + few
 
     @property
     def promise(self) -> str:

@@ -249,7 +249,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
-        rounding_notice(name, unit, step, errors.level),
+        rounding_notice(name, unit, step, errors.level, noise),
         variance_notice(name, unit, dt, errors, usable, step, is_heavy=tails is not None),
         drift_notice(name, unit, dt, quiet),
     ]

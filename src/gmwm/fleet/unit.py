@@ -205,7 +205,7 @@ def digest_of(path: str) -> str:
 def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     """Those of `DERIVED` that a fit gives."""
     low = floor(fit)
-    found = {"floor_B": Number(low.bias_instability, None, bool(low.tau < fit.wv.tau[-1]))}
+    found = {"floor_B": Number(low.bias_instability, None, not low.falls)}
     try:
         numbers = filter_numbers.bound(fit, horizon=horizon)
         for letter, value, level in (

@@ -130,7 +130,7 @@ def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
 def bias_instability(fit: Fit) -> dict[str, str]:
     """B from the lowest point of the curve; an upper bound where it falls to the end."""
     low = floor(fit)
-    sign = "" if low.tau < fit.wv.tau[-1] else "≤ "
+    sign = "≤ " if low.falls else ""
     text = quantity_text(low.bias_instability, "u", fit)
     return {key: sign + each for key, each in text.items()}
 
@@ -150,7 +150,7 @@ def slow_terms(fit: Fit) -> list[dict[str, str]]:
         sign = "< " if item.key in bounds else ""
         value = bounds.get(item.key, item.value or 0.0)
         text = quantity_text(value, size.unit, fit)
-        tail = f", {duration_text(times[0])}" if times and not sign else ""
+        tail = f", {short(times[0])} s" if times and not sign else ""
         word = "ramp" if term.is_drift else "walk" if term.is_walk else "GM"
         shown.append({key: f"{word} {sign}{each}{tail}" for key, each in text.items()})
     return shown

@@ -144,7 +144,7 @@ def test_sentence_for_a_gyro():
     assert text.startswith("Total white noise of 1.03 deg/sqrt(h); ")
     assert f"up to {low.tau:.3g} s" in text
     assert f"down to {np.degrees(low.deviation) * 3600.0:.3g} deg/h." in text
-    assert "still falling" not in text
+    assert "still falls" not in text
 
 
 def test_sentence_for_an_accelerometer():
@@ -152,7 +152,7 @@ def test_sentence_for_an_accelerometer():
     text = sentence(fit)
     assert text.startswith("Total white noise of 102 ug/sqrt(Hz); ")
     assert f"{floor(fit).deviation / 9.80665e-6:.3g} ug" in text
-    assert text.endswith("(still falling at the end of the record).")
+    assert text.endswith("(the model still falls at the end of the record).")
     assert sentence(fitted(RandomWalk(1e-3))).startswith("No white noise; ")
 
 
@@ -160,7 +160,17 @@ def test_sentence_for_anything_else_keeps_its_unit():
     text = sentence(fitted(WhiteNoise(2e-3), None))
     assert "Total white noise of 0.002 V/sqrt(Hz)" in text
     assert "deg" not in text
-    assert " V (still falling" in text
+    assert " V (the model still falls" in text
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_model_that_falls_has_its_floor_where_the_data_are_lowest(seed):
+    """White noise: the last of its levels is as likely above the others as below them."""
+    fit = gmwm.fit(WhiteNoise(), np.random.default_rng(seed).normal(size=5000), dt=1.0)
+    found = floor(fit)
+    assert found.falls
+    assert found.deviation >= np.min(fit.goodness.data)
+    assert "still falls at the end" in sentence(fit)
 
 
 def test_no_floor_lies_below_the_data():
