@@ -188,15 +188,16 @@ def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[No
 
 
 def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
-    """Where another form is worth its state."""
-    if found.tightness <= tuning.LOOSE or best.tightness > found.tightness / tuning.WORTH_A_STATE:
+    """What a form costs, and where another is worth its state."""
+    if found.tightness <= tuning.LOOSE:
         return ()
     text = (
         f"after {found.time:g} s without aiding errors are believed {found.tightness:.3g} times as "
         f"large as they are; with {TIGHTEST}, {best.tightness:.3g} times"
     )
     values = {"tightness": found.tightness, "with_state": best.tightness}
-    mend = f"use {TIGHTEST} where the filter has a state for it"
+    is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
+    mend = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
     return (Notice("loose-form", "note", "", text, values, mend),)
 
 
@@ -232,9 +233,7 @@ def predicted(
 ) -> tuple[Predicted, ...]:
     """What a filter with these numbers knows of its error after some times without aiding."""
     try:
-        errors = chain.errors(
-            axis.model, model, axis.dt, times, true_sd=axis.bias_sd, believed_sd=sd
-        )
+        errors = chain.worse(axis.model, model, axis.dt, times, axis.bias_sd, sd)
     except InputError:
         nan = float("nan")
         return tuple(Predicted(time, nan, nan) for time in times)

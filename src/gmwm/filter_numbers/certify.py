@@ -72,9 +72,10 @@ def certify(
     Notes
     -----
     Exact covariance analysis of linear filters, for the truth given: of each axis alone (fixes of
-    its last integral every second, then none), of each axis between keyframes (the pose starts
-    anew at each, the bias goes on), and of a whole INS/GNSS filter on a loiter, where all six axes
-    are known. It covers neither nonlinearity nor errors that are not in the models.
+    its last integral every second, then none; of a heading, the angle gained since where that is
+    the worse), of each axis between keyframes (the pose starts anew at each, the bias goes on), and
+    of a whole INS/GNSS filter on a loiter, where all six axes are known. It covers neither
+    nonlinearity nor errors that are not in the models.
     """
     times = sorted({checks.positive("outage", each) for each in outages})
     if not times:
@@ -121,10 +122,9 @@ def _of_axis(
         ("free", axis.chain, times),
         ("keyframes", axis.between(keyframe), (keyframe,)),
     ):
-        errors = chain.errors(
-            axis.model, believed.model, axis.dt, ends,
-            true_sd=axis.bias_sd, believed_sd=believed.initial_sd,
-        )  # fmt: skip
+        errors = chain.worse(
+            axis.model, believed.model, axis.dt, ends, axis.bias_sd, believed.initial_sd
+        )
         unit, scale = _SHOWN[chain.order] if axis.quantity else ("u s", 1.0)
         what = _INTEGRALS[chain.order] if axis.quantity else "integral"
         for time, actual, predicted, nees in zip(

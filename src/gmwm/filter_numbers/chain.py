@@ -9,7 +9,7 @@ processes, exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 
 import numpy as np
@@ -67,6 +67,7 @@ class Chain:
     initial_sd: Of the integrals at the start.
     is_relative: Whether the last integral starts anew at each fix, as a relative pose at a
         keyframe.
+    is_gained: Whether it is counted from the last fix, of whose error it has no part.
     """
 
     order: int
@@ -75,6 +76,7 @@ class Chain:
     interval: float = tuning.FIX_INTERVAL
     initial_sd: tuple[float, ...] = tuning.INITIAL_SD
     is_relative: bool = False
+    is_gained: bool = False
 
     @classmethod
     def usual(cls, quantity: str) -> Chain:
@@ -119,6 +121,9 @@ class Chain:
             )  # fmt: skip
             ages = (np.arange(shape[0]) + 1 - fixes) * self.interval
             kept = list(zip(ages, after_P, after_J, strict=True))
+        if self.is_gained:
+            for each in (P, J):
+                each[n - 1], each[:, n - 1] = 0.0, 0.0
         before = 0.0
         for time in times:
             P, J = _Step.of(real, own, dt, n, time - before).over(P, J)
@@ -126,6 +131,34 @@ class Chain:
             kept.append((time, P[:n, :n], J[:n, :n]))
         columns = list(zip(*kept, strict=True))
         return ChainErrors(*(np.array(column) for column in columns))
+
+    def worse(
+        self,
+        truth: Model,
+        believed: Model,
+        dt: float,
+        times: Sequence[float],
+        true_sd: float,
+        believed_sd: float,
+    ) -> ChainErrors:
+        """The same errors; of one integral, those of what it gains where they are the worse.
+
+        An absolute fix of half a degree hides what it gains in a minute, which is what counts for a
+        dead reckoning, or for a filter that has no fixes of it.
+        """
+        whole = self.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
+        if self.order > 1 or self.is_relative:
+            return whole
+        gained = replace(self, is_gained=True).errors(
+            truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd
+        )
+        least = tuning.HIDDEN * np.maximum(whole.nees(), 1.0)[:, None, None]
+        worse = (gained.predicted > 0.0) & (gained.actual > least * gained.predicted)
+        return ChainErrors(
+            whole.time,
+            np.where(worse, gained.predicted, whole.predicted),
+            np.where(worse, gained.actual, whole.actual),
+        )
 
 
 @dataclass(frozen=True, eq=False)

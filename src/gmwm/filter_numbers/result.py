@@ -68,7 +68,7 @@ class Predicted:
     """How well a filter with these numbers knows its error, after some time without aiding.
 
     It is the expected one of the filter of `gmwm.filter_numbers.chain.Chain`, by covariance
-    analysis.
+    analysis; of one integral, that of what it gains where this is the worse.
 
     time: Without aiding, s.
     nees: Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it

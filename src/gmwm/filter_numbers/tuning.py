@@ -133,6 +133,10 @@ ENVELOPE = 1.02
 
 # -- the filter by which numbers are judged -------------------------------------------------------
 
+HIDDEN = 1.001
+"""Times the NEES of a heading, and times one, above which that of the angle gained since the last
+fix is given: where both are consistent rounding does not choose."""
+
 SETTLING = 120.0
 """s of aiding before it ends: as long as between the outages of `gmwm.ins.reduce`."""
 

@@ -276,6 +276,8 @@ def test_what_is_left_out_and_is_not_small_is_a_warning():
         warned = [n for n in found.notices if n.code == "optimistic"]
         times = (6.0, 18.0, 60.0, 180.0, 600.0)
         chain = Chain.usual("gyro" if name == "gyro_x" else "")
+        # Of a heading, what it gains counts: half a degree at the start would hide it.
+        chain = replace(chain, is_gained=name == "gyro_z")
         errors = chain.errors(truth, found.model, DT, times, believed_sd=found.initial_sd)
         worst = int(np.argmax(errors.nees()))
         assert len(warned) == (errors.nees()[worst] > 1.05) == ((name, truth) in large)
@@ -285,10 +287,30 @@ def test_what_is_left_out_and_is_not_small_is_a_warning():
     assert max(gmwm.bound({"gyro_z": line})["gyro_z"].nees.values()) < 1.0
 
 
+@pytest.mark.parametrize("horizon", [1.0, 10.0, 60.0])
+@pytest.mark.parametrize("name", ["gyro_z", "heading"])
+def test_a_start_of_half_a_degree_hides_no_quantization_of_a_heading(name, horizon):
+    """The angle gained has N^2 T and two quantization errors, Q^2 each."""
+    N, Q, dt = 5.8e-7, 4.85e-6, 0.005
+    truth = WhiteNoise(N) + QuantizationNoise(Q)
+    found = gmwm.bound({name: truth}, "N+K", horizon, dt=dt)[name]
+    (notice,) = (n for n in found.notices if n.code == "optimistic")
+    for time, nees in found.nees.items():
+        assert nees == pytest.approx(1.0 + 2.0 * Q**2 / (N**2 * time), rel=1e-3)
+    assert notice.values["time"] == 0.1 * horizon
+    assert notice.values["nees"] == pytest.approx(1.0 + 2.0 * Q**2 / (N**2 * 0.1 * horizon), 1e-3)
+    shown = gmwm.certify({name: truth}, {name: found}, outages=(horizon,), dt=dt).of("free")[0]
+    assert shown.nees == pytest.approx(found.nees[horizon], rel=1e-6)
+    steps = np.random.default_rng(5).uniform(-0.5, 0.5, (2, 4000)) * np.sqrt(12.0) * Q
+    gained = np.mean((steps[1] - steps[0]) ** 2) + N**2 * horizon
+    assert found.nees[horizon] == pytest.approx(gained / (N**2 * horizon), rel=0.08)
+
+
 def test_a_loose_form_names_the_one_that_is_worth_its_state():
     truth = {"accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
     plain, tight = (gmwm.bound(truth, form)["accel_x"] for form in ("N+K", "N+K+GM"))
     (notice,) = (n for n in plain.notices if n.code == "loose-form")
+    assert notice.action
     assert notice.values["tightness"] == plain.tightness[60.0] > 1.2
     assert notice.values["with_state"] == pytest.approx(tight.tightness[60.0], abs=1e-6)
     short = gmwm.bound(truth, horizon=1.0)["accel_x"]
@@ -429,7 +451,11 @@ def test_a_resonance_counts_by_its_low_frequency_density():
 def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
     slow = Resonance(1e-3, 0.01, 0.003)
     found = gmwm.bound(ONE + slow, "N+K", 60.0)
-    assert not found.notices
+    # No form is better; what this one costs is there to read all the same.
+    (notice,) = found.notices
+    assert (notice.code, notice.action) == ("loose-form", "")
+    assert notice.values["tightness"] == found.tightness[60.0] > 1.2
+    assert notice.values["with_state"] > 1.2
     f = np.geomspace(1e-8, 50.0, 3000)
     assert np.min(found.model.psd(f, DT) / (ONE + slow).psd(f, DT)) > 1.0 - 1e-4
     _, notices = notices_of(Sinusoid(1e-4, 1e-3))

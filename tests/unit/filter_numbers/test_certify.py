@@ -57,6 +57,13 @@ def test_a_data_sheet_is_too_optimistic_for_every_consumer(sheet):
     assert sheet.worst.nees == max(check.nees for check in sheet.checks)
 
 
+def test_numbers_of_a_heading_that_are_too_small_are_not_hidden_by_its_start():
+    truth = {"gyro_z": WhiteNoise(1e-4) + RandomWalk(1e-7)}
+    small, right = (gmwm.certify(truth, {"gyro": (N, 1e-7)}).of("free") for N in (1e-5, 1e-4))
+    assert all(each.nees > 20.0 for each in small)
+    assert all(each.nees == pytest.approx(1.0) for each in right)
+
+
 def test_its_errors_are_those_of_a_covariance_analysis(sheet):
     scenario = loiter_with_outages((10.0, 60.0), 0.1)
     believed = SensorModels.of(
