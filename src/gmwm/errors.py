@@ -1,5 +1,11 @@
 """The exceptions and warnings of the package."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_NONE: Mapping[str, float | str] = MappingProxyType({})
 _LONGEST = 800  # characters of a message: it may list names, and quotes no document
 
 
@@ -31,6 +37,8 @@ class InputError(ValueError):
         What kind of thing is wrong, for programs.
     mend : str, optional
         How to correct it, where the command line has words of its own; ends the message.
+    values : mapping of str to (float or str), optional
+        What the words of the command line hold.
 
     Attributes
     ----------
@@ -38,12 +46,15 @@ class InputError(ValueError):
         The message without the mend.
     """
 
-    def __init__(self, text: str, code: str = "", mend: str = "") -> None:
+    def __init__(
+        self, text: str, code: str = "", mend: str = "", values: Mapping[str, float | str] = _NONE
+    ) -> None:
         self.problem = printable(text)
         text = f"{self.problem}: {printable(mend)}" if mend else self.problem
         super().__init__(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
         self.code = code
         self.mend = mend
+        self.values = dict(values)
 
 
 class MissingNameError(InputError, KeyError):

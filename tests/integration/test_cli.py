@@ -372,6 +372,26 @@ BAD = {
         ("--rate", "200", *SI),
         ("stamps give 100 Hz, not the 200 Hz stated", "leave out the rate"),
     ),
+    "time without a unit, nor have the channels": (
+        [
+            f"{a},{b}"
+            for a, b in zip(["t", *range(0, ROWS * 20_000, 20_000)], good_lines(), strict=True)
+        ],
+        (),
+        (
+            "50 Hz if they are microseconds",
+            "e.g. --gyro-unit deg/s --accel-unit g --rate 50, or",
+            "name the column 't [us]'",
+        ),
+    ),
+    "a rate that time without a unit cannot have": (
+        [
+            f"{a},{b}"
+            for a, b in zip(["t", *range(0, ROWS * 20_000, 20_000)], good_lines(), strict=True)
+        ],
+        ALL,
+        ("50 Hz if they are microseconds, not the 100 Hz stated", "e.g. --rate 50"),
+    ),
     "a clock that stops": (
         with_time(0.0, 0.0),
         SI,
@@ -605,7 +625,7 @@ def test_channels_and_a_stretch(run, good_file):
         (("--start", "-1"), "fewer than 64 samples"),
         (("--stop", "nan"), "fewer than 64 samples"),
         (("--start", "inf"), "fewer than 64 samples"),
-        (("--model", "N + X"), "'X' is no term: write terms such as N, K, B"),
+        (("--model", "N + X"), "'X' is no term: write Q, N, B, K, R, GM, Res"),
         (("--model", "N - K"), "'N - K' is no term"),
         (("--model", ""), "is no term"),
         (("--model", "N + N"), "two WhiteNoise"),

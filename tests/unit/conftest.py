@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from gmwm._core.notices import Notice
-from gmwm.ins import FilterErrors, MonteCarlo, Outage, car_drive
+from gmwm.ins import FilterErrors, MonteCarlo, Outage, SensorModels, car_drive
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.geometry.rotation import matrix_from_rpy
 from gmwm.ins.montecarlo.filter_errors import GROUPS
 from gmwm.ins.montecarlo.validation import Validation
+from gmwm.process import WhiteNoise, as_model
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}
 """Name -> true errors in units of the predicted ones."""
@@ -34,7 +35,7 @@ def _made_up(factors=None, outages=((20, 10), (40, 15)), runs=40, seed=1, durati
     filters = {name: _runs(each, spans, draws, rng, name in dead) for name, each in factors.items()}
     example = {name: _solution(runs, truth) for name, runs in filters.items()}
     experiment = SimpleNamespace(title="made up", seed=seed, filters={
-        name: SimpleNamespace(models={"gyro_x": f"model of {name}"}) for name in factors
+        name: SensorModels({"gyro_x": as_model(WhiteNoise(1e-4))}) for name in factors
     })  # fmt: skip
     return Validation(experiment, MonteCarlo(filters, spans, example, truth, (NOTE,)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -15,13 +15,14 @@ from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.text import made_by, wrapped
 from gmwm.calibration.summary import sentence
-from gmwm.errors import MissingNameError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
 from gmwm.process import Model, model_from_list
 from gmwm.readers import Recording
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
     from gmwm._core.forms import Form
 
@@ -129,6 +130,36 @@ class Calibration(Mapping[str, Fit], Document):
         if found:
             lines.append(f"notices: {', '.join(found)}")
         return "\n".join(lines)
+
+    def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
+        """Allan deviations with their models, three channels a row; see `Fit.plot`.
+
+        Parameters
+        ----------
+        channels : iterable of str, optional
+            Names; all by default.
+        units : {"field", "si"}
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, or none at all.
+        """
+        import matplotlib.pyplot as plt
+
+        fits = [self[name] for name in (self if channels is None else channels)]
+        if not fits:
+            raise InputError(f"channels names none: give some of {', '.join(self)}")
+        rows, columns = -(-len(fits) // 3), min(len(fits), 3)
+        size = (5.0 * columns, 4.0 * rows)
+        figure, axes = plt.subplots(
+            rows, columns, figsize=size, squeeze=False, layout="constrained"
+        )
+        for fit, ax in zip(fits, axes.flat, strict=False):
+            fit.plot(ax, units=units)
+        for ax in axes.flat[len(fits) :]:
+            ax.remove()
+        return figure
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the parameters of all channels, one a row, in SI units; needs pandas."""

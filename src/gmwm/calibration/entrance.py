@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm._core.runs import PROCESSES, beside, shared, spare
 from gmwm._core.typing import Progress
@@ -35,7 +35,7 @@ from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError
 from gmwm.process import Model, Process
-from gmwm.readers import Channel, Recording, is_frame, read
+from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.variance import MIN_SAMPLES
 
 
@@ -206,7 +206,7 @@ class _Channel:
 
 def _recordings(given: Any) -> list[Any]:
     """What was given, as a list; frames are read."""
-    alone = isinstance(given, Recording) or is_frame(given)
+    alone = isinstance(given, Recording | str | os.PathLike) or is_frame(given)
     return [read(each) if is_frame(each) else each for each in ([given] if alone else given)]
 
 
@@ -234,11 +234,7 @@ def _check_together(recordings: Sequence[Recording]) -> None:
     if not recordings:
         raise InputError("there is no recording: give one at least")
     for each in recordings:
-        if not isinstance(each, Recording):
-            raise InputError(
-                f"{checks.shown(each)} is not a recording: give what gmwm.read returns, or "
-                "make one with Recording.from_arrays"
-            )
+        require_recording(each)
     first = recordings[0]
     for other in recordings[1:]:
         for channel in other.inertial:

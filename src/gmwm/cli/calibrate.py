@@ -235,15 +235,21 @@ def show(result: Calibration) -> None:
     # `click.echo` takes a terminal of ASCII for one of UTF-8.
     print("\n".join(wrapped(f"{result.source}: {size}", indent=2)))
     print_whole(new_console(), _table(result))
-    shown = worst_first([each for each in result.notices if _is_shown(each)])
-    remarks = [str(with_option(notice)) for notice in shown]
+    reasons = {
+        (name, notice.code): f"{name} is not valid: {with_option(notice)}"
+        for name, fit in result.fits.items()
+        for notice in fit.notices
+        if notice.severity == "bad"
+    }
+    shown = [each for each in result.notices if (each.where, each.code) not in reasons]
+    remarks = [str(with_option(each)) for each in worst_first(shown) if _is_shown(each)]
     remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             remarks.append(f"{name}: {fit.agreement}")
-        of_fit = [notice for notice in fit.notices if notice.code not in _OF_RECORDING]
-        remarks += [f"{name}: {with_option(notice)}" for notice in of_fit]
-    for remark in remarks:
+        of_fit = [each for each in fit.notices if each.code not in _OF_RECORDING]
+        remarks += [f"{name}: {with_option(n)}" for n in of_fit if (name, n.code) not in reasons]
+    for remark in (*reasons.values(), *remarks):
         print("\n".join(wrapped(remark, first="- ", indent=2)))
 
 

@@ -29,7 +29,7 @@ HINTS = {
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
-    "time-unit": "--rate 100",
+    "time-unit": "--rate {rate:.6g}, or name the column {column}",
     "topic": "--topic NAME",
     "topics-apart": "--topic NAME or --clock log",
     "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
@@ -39,6 +39,7 @@ HINTS = {
 def with_hint(error: InputError) -> str:
     """The message of an error, its mend in the words of the command line."""
     hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
+    hint = hint.format(**({"rate": 100.0, "column": "by its unit"} | error.values))
     if not hint:
         return str(error)
     if error.mend:
@@ -59,6 +60,14 @@ def in_options(calibration: Calibration) -> Calibration:
 def with_option(notice: Notice) -> Notice:
     """A notice with the options that do what it advises."""
     values = notice.values
+    if notice.code == "sd-assumed":
+        return replace(notice, action=f"give --{notice.where}-sd")
+    if notice.code == "axis-up":
+        action = (
+            "if it is mounted upside down, fine; else give --channel gyro_z=-NAME "
+            "--channel accel_z=-NAME, and the same of y if that points left"
+        )
+        return replace(notice, action=action)
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import click
 
 from gmwm.cli.console import progress_bar
+from gmwm.cli.hints import with_option
 from gmwm.cli.options import arguments_of_read, reading_options
 from gmwm.errors import InputError
 
@@ -27,7 +29,8 @@ _READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "ti
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 _OF_FILE = (
     "trajectory", "duration", "truth", "filters", "outages", "runs", "seed", "imu", "gnss_fixes",
-    "lever_arm", "heading", "attitude", "barometer", "zero_velocity", "gate",
+    "lever_arm", "heading", "attitude", "barometer", "zero_velocity", "gate", "position_sd",
+    "velocity_sd",
 )  # fmt: skip
 """Options that are keys of the file of a study; paths are relative to where one is."""
 
@@ -55,6 +58,13 @@ def _three(name: str, text: str, form: str = "X,Y,Z in metres, e.g. 0.5,0,-1.2")
     except ValueError:
         raise InputError(f"{name} {text}: write {form}") from None
     return [x, y, z]
+
+
+def _sd(name: str, text: str) -> float | list[float]:
+    try:
+        return float(text)
+    except ValueError:
+        return _three(name, text, "one number, or NORTH,EAST,DOWN, e.g. 0.1,0.1,0.15")
 
 
 def _attitude(text: str) -> list[str]:
@@ -146,6 +156,11 @@ def _named(option: str, texts: tuple[str, ...]) -> dict[str, str]:
               )  # fmt: skip
 @click.option("--gate", type=float, metavar="P",
               help="Reject fixes whose innovation is less probable, e.g. 1e-5.")  # fmt: skip
+@click.option("--position-sd", metavar="N[,E,D]", callback=_as(partial(_sd, "--position-sd")),
+              help="Standard deviations of fixes that have none, metres: north, east, down.  "
+                   "[default: 1,1,1.5]")  # fmt: skip
+@click.option("--velocity-sd", metavar="N[,E,D]", callback=_as(partial(_sd, "--velocity-sd")),
+              help="The same of velocities, m/s.  [default: 0.1,0.1,0.15]")  # fmt: skip
 @click.option("--gyro-bias", metavar="VALUE",
               help="Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]")  # fmt: skip
 @click.option("--accel-bias", metavar="VALUE",
@@ -279,6 +294,7 @@ def _filter(
 
     with _named_in_messages(place):
         measured = Measured.of(content, base)
+    measured = replace(measured, notices=tuple(map(with_option, measured.notices)))
     with folder_to_fill(output) as folder:
         paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
         navigated = Navigated.of(measured)
@@ -300,6 +316,7 @@ def _compare(
 
     with _named_in_messages(place):
         comparison = Comparison.of(content, base)
+    comparison = replace(comparison, notices=tuple(map(with_option, comparison.notices)))
     with folder_to_fill(output) as folder:
         page = comparison.report(replaceable(folder / "comparison.html"))
     if as_json:

@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from gmwm.readers import Recording
 
 _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
-_EXAMPLE = "write terms such as N, K, B, Q, R and GM with +, e.g. --model 'N + K + 2 GM'"
+
+TERMS = "Q, N, B, K, R, GM, Resonance, LowPassNoise, AveragedNoise, Sinusoid, AR, MA, ARMA, ARIMA"
+"""What `gmwm.process.CATALOGUE` has, which would take long to import for a line of help."""
 
 CLOCKS = ("header", "log")
-"""As in `gmwm.read`, which would take long to import for a line of help."""
+"""As in `gmwm.read`, for the same reason."""
 
 FORMATS = (
     "text", "numpy", "hdf5", "mat", "parquet", "feather", "rosbag", "rosbag2", "ulog", "ardupilot",
@@ -74,9 +76,8 @@ part_options = together(
 
 estimating_options = together(
     click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
-                 help="Fit this in place of selecting: terms N, K, B, Q, R, GM, Resonance, "
-                      "Sinusoid, e.g. 'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; "
-                      "repeat."),
+                 help=f"Fit this in place of selecting: terms {TERMS}, e.g. 'N + K + 2 GM'; or "
+                      "'gyro=N + 2 GM' for a sensor or channel; repeat."),
     click.option("--leave", "left", multiple=True,
                  type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
                  metavar="WHAT",
@@ -264,7 +265,10 @@ def _model(text: str) -> Model:
     for part in text.split("+"):
         found = _TERM.fullmatch(part)
         if found is None or found[2] not in kinds:
-            raise InputError(f"--model {text}: {part.strip()!r} is no term: {_EXAMPLE}")
+            raise InputError(
+                f"--model {text}: {part.strip()!r} is no term: write {TERMS} with +, e.g. "
+                "--model 'N + K + 2 GM'"
+            )
         terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]
     try:
         return Model(tuple(terms))

@@ -84,8 +84,11 @@ def compare(
         notices += [replace(why, where=name, source=label) for label, why in out.items()]
     shared = [name for name, (fits, _) in members.items() if len(fits) > 1]
     if not shared:
-        why = next((n.text for n in notices if n.source), "they have no channel in common")
-        raise InputError(f"there is nothing to compare: {why}")
+        why = next((str(replace(n, action="")) for n in notices if n.source), "")
+        raise InputError(
+            f"there is nothing to compare: {why or 'they have no channel in common'}; give "
+            "recordings of one rate that have a channel in common"
+        )
     tests = {name: Equality.of(list(members[name][0].values())) for name in shared}
     p_values = _holm({name: test.p_value for name, test in tests.items()})
     axes = {}
@@ -249,13 +252,15 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
         fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
     )
     found = {}
+    most = [label for label, fit in fits.items() if is_like(fit, usual)]
+    others = most[0] if len(most) == 1 else "the others"
     for label, fit in fits.items():
-        if is_like(fit, usual):
+        if label in most:
             continue
         own, common = 1.0 / fit.wv.dt, 1.0 / usual.wv.dt
-        code, text = "units-differ", f"in {fit.wv.unit}, the others in {usual.wv.unit}"
+        code, text = "units-differ", f"in {fit.wv.unit}, {others} in {usual.wv.unit}"
         if fit.wv.unit == usual.wv.unit:
-            code, text = "rates-differ", f"at {own:.6g} Hz, the others at {common:.6g} Hz"
+            code, text = "rates-differ", f"at {own:.6g} Hz, {others} at {common:.6g} Hz"
         values = {"rate": own, "usual": common}
         found[label] = Notice(code, "warning", "", text, values, "not compared level by level")
     return found

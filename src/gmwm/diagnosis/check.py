@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from gmwm._core import checks
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.runs import shared
 from gmwm._core.typing import BoolArray, FloatArray, Progress
@@ -46,8 +45,7 @@ from gmwm.diagnosis.samples import (
 )
 from gmwm.diagnosis.spectral import line_notices, peaks, resonance_notice
 from gmwm.diagnosis.still import vibration_notice
-from gmwm.errors import InputError
-from gmwm.readers import Channel, Recording
+from gmwm.readers import Channel, Recording, require_recording
 
 _SEVERE = ("warning", "bad")
 
@@ -91,11 +89,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     >>> found.masked(rec)["gyro_x"].is_complete
     False
     """
-    if not isinstance(recording, Recording):
-        raise InputError(
-            f"{checks.shown(recording)} is not a recording: give what gmwm.read returns, or "
-            "make one with Recording.from_arrays"
-        )
+    require_recording(recording)
     parts = recording.by_rate()
     if len(parts) > 1:
         return _together(recording, [health(part, progress=progress) for part in parts])
@@ -254,7 +248,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
-        rounding_notice(name, unit, step, errors.level),
+        rounding_notice(name, unit, step, errors.level, noise),
         variance_notice(name, unit, dt, errors, usable, step, is_heavy=tails is not None),
         drift_notice(name, unit, dt, quiet),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
@@ -51,7 +52,27 @@ def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
     return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
 
 
-def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice | None:
+def is_coarse(values: FloatArray, step: float) -> bool:
+    """Whether the step is more than three times the noise, by how few samples leave two levels.
+
+    Noise about the middle of a step switches between the two levels beside it: its scatter is half
+    a step or more however small it is, and shows nothing. Beyond these two lie, of Gaussian noise
+    of a third of a step, ``2 Q(3)`` of the samples, and more about any other mean.
+
+    values: (n,), samples, none missing; their mean may wander, but little within a block.
+    """
+    size = min(tuning.BLOCK_OF_LEVELS, values.size)
+    blocks = values[: values.size // size * size].reshape(-1, size)
+    places = (blocks - blocks[:, :1]) / step
+    # Multiples of a step but for rounding: half a step of room on either side.
+    below = np.floor(np.mean(places, axis=1, keepdims=True))
+    beyond = np.count_nonzero((places < below - 0.5) | (places > below + 1.5))
+    return bool(beyond < 2.0 * norm.sf(tuning.COARSE) * places.size)
+
+
+def rounding_notice(
+    name: str, unit: str, step: float, scatter: float, samples: FloatArray | None = None
+) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
@@ -62,13 +83,14 @@ def rounding_notice(name: str, unit: str, step: float, scatter: float) -> Notice
     step: u; 0 if there is none.
     scatter: Standard deviation of what cannot be predicted from the samples before, rounding
         included, u.
+    samples: (n,), for `is_coarse`.
     """
     if step == 0.0:
         return None
     noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
     text = f"samples come in steps of {readable(step, unit)}"
-    if noise < step / 3.0:
+    if noise < step / tuning.COARSE or (samples is not None and is_coarse(samples, step)):
         return Notice(
             "rounding",
             "bad",

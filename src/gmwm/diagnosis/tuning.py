@@ -188,6 +188,13 @@ SHORTEST_PART = 32
 
 # -- the step of the samples ----------------------------------------------------------------------
 
+COARSE = 3.0
+"""Standard deviations of the noise from which on a step hides it (Widrow & Kollar 2008, sec. 5)."""
+
+BLOCK_OF_LEVELS = 100
+"""Samples over which the mean is taken for constant: a wander within adds levels, and hides a step
+that is coarse."""
+
 LEVELS_SAMPLED = 65_536
 """Samples in which a lattice shows; more are not looked at."""
 

@@ -23,6 +23,11 @@ from gmwm.readers.names import (
     stated_seconds as stated_seconds,
 )
 from gmwm.readers.reader import read as read
-from gmwm.readers.recording import READING as READING, Channel as Channel, Recording as Recording
+from gmwm.readers.recording import (
+    READING as READING,
+    Channel as Channel,
+    Recording as Recording,
+    require_recording as require_recording,
+)
 from gmwm.readers.table import label as label
 from gmwm.readers.text_file import content_size as content_size

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT, factor, quantity_of
@@ -17,12 +17,15 @@ _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
 
 
 def channel_units(
-    table: Table, roles: Roles, units: Mapping[str, str], lacks_rate: bool = False
+    table: Table,
+    roles: Roles,
+    units: Mapping[str, str],
+    unknown_rate: Callable[[], InputError | None],
 ) -> tuple[dict[str, str], tuple[Notice, ...]]:
     """Find the unit of every channel.
 
     units: What the user gave, by sensor or by channel; the latter goes first.
-    lacks_rate: Whether the sampling rate is missing too, which is then asked for at once.
+    unknown_rate: What is wrong with the sampling rate, which is then asked for at once.
     Returns: units, by channel; notices, where they come from, if not from the user alone.
     Raises InputError if a unit is missing, unknown, or not one of what the channel measures; or the
         rate is missing.
@@ -46,8 +49,10 @@ def channel_units(
             from_header[channel] = unit
         elif in_header is not None and not _same(in_header, given):
             overruled[channel] = f"{in_header}, not {given}"
-    if missing or lacks_rate:
-        raise _incomplete(table.source, missing, lacks_rate)
+    # Time stamps are looked at after the units, unless these are to be asked for anyway.
+    rate = unknown_rate() if missing or roles.time is None else None
+    if missing or rate is not None:
+        raise _incomplete(table.source, missing, rate)
     return found, tuple(_notices(from_header, overruled))
 
 
@@ -87,26 +92,30 @@ def _same(unit: str, other: str) -> bool:
         return False
 
 
-def _incomplete(source: str, missing: Mapping[str, str | None], lacks_rate: bool) -> InputError:
+def _incomplete(
+    source: str, missing: Mapping[str, str | None], rate: InputError | None
+) -> InputError:
     """Whatever the file and the user leave out, asked for in one sentence."""
-    problems, codes, mends = [], [], []
+    if rate is not None and not missing:
+        return rate
     # One channel of each sensor stands for the others: they are mended together.
     first: dict[str, str] = {}
     for channel, sensor in missing.items():
         first.setdefault(sensor or channel, channel)
-    if lacks_rate:
-        problems.append("has no time column and no rate was given")
-        codes.append("rate")
-        mends.append("rate=100")
-    if first:
-        problems.append(f"does not give the unit of {' and '.join(first.values())}")
-        codes += [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in first]
-        examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in first]
-        mends.append(f"units={{{', '.join(examples)}}}")
-    it = "it in Hz" if lacks_rate and not first else "it" if len(codes) == 1 else "them"
-    text = f"{source} {', and it '.join(problems)}"
-    mend = f"give {it}, e.g. {', '.join(mends)}"
-    return InputError(text, " ".join(dict.fromkeys(codes)), mend)
+    text = f"does not give the unit of {' and '.join(first.values())}"
+    codes = [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in first]
+    examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in first]
+    mend = f"units={{{', '.join(examples)}}}"
+    if rate is None:
+        it = "it" if len(codes) == 1 else "them"
+        return InputError(
+            f"{source} {text}", " ".join(dict.fromkeys(codes)), f"give {it}, e.g. {mend}"
+        )
+    # What is advised of a time column ends the advice of the command line.
+    codes.insert(len(codes) if rate.code == "time-unit" else 0, rate.code)
+    mend = f"give them, e.g. rate={rate.values['rate']:.6g}, {mend}"
+    codes = list(dict.fromkeys(codes))
+    return InputError(f"{rate.problem}, and it {text}", " ".join(codes), mend, rate.values)
 
 
 def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[Notice]:

@@ -27,6 +27,7 @@ from gmwm.readers.clock import (
     is_time_of_day,
     seconds_of_day,
     without_summer_time,
+    without_unit,
 )
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
@@ -156,8 +157,9 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
-    lacks_rate = roles.time is None and stated is None
-    unit_of, unit_notices = channel_units(table, roles, given.units, lacks_rate)
+    unit_of, unit_notices = channel_units(
+        table, roles, given.units, lambda: _unknown_rate(table, roles.time, stated)
+    )
 
     arrays, auxiliary, unreadable = _load(table, roles)
     if not before:  # later parts may hold no samples at all
@@ -220,6 +222,19 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
             "the rate to use that of the file"
         )
     return rate
+
+
+def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:
+    """What is to be asked for if the rate is not known: it, or the unit of the time stamps."""
+    if stated is not None:
+        return None
+    if time is None:
+        problem = f"{table.source} has no time column and no rate was given"
+        return InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
+    if meaning(table.names[time]).seconds is not None:
+        return None
+    step = float(np.median(np.diff(table.load([time])[time])))
+    return without_unit(table.source, label(table.names, time), step)
 
 
 def _load(

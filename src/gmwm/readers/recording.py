@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -377,3 +379,15 @@ def _notice_of_gaps(channels: Sequence[Channel], missing: int, gaps: int, longes
     values = {"missing": missing, "gaps": gaps, "longest": longest}
     each = "each " if len(channels) > 1 else ""
     return Notice("missing-samples", "note", names, f"{each}{text}", values)
+
+
+def require_recording(given: Any) -> None:
+    """Raise InputError for anything but a recording."""
+    if isinstance(given, str | os.PathLike):
+        path = checks.shown(os.fspath(given))
+        raise InputError(f"{path} is a path: read it first, gmwm.read({path}, rate=..., units=...)")
+    if not isinstance(given, Recording):
+        raise InputError(
+            f"{checks.shown(given)} is not a recording: give what gmwm.read returns, or make one "
+            "with Recording.from_arrays"
+        )

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from gmwm._core import checks
 from gmwm._core.notices import Notice
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit
 from gmwm.errors import InputError
@@ -26,6 +27,16 @@ class Given:
     units: Mapping[str, str]
     channels: Mapping[str, Reference] | Collection[str] | None
     time: Reference | Literal[False] | None
+
+    def __post_init__(self) -> None:
+        units = self.units
+        if not isinstance(units, Mapping) or not all(
+            isinstance(each, str) for each in units.values()
+        ):
+            raise InputError(
+                f"units = {checks.shown(units)}: give that of each sensor, e.g. "
+                'units={"gyro": "deg/s", "accel": "g"}'
+            )
 
 
 @dataclass(frozen=True)

@@ -149,7 +149,7 @@ def slow_terms(fit: Fit) -> list[dict[str, str]]:
         sign = "< " if item.key in bounds else ""
         value = bounds.get(item.key, item.value or 0.0)
         text = quantity_text(value, size.unit, fit)
-        tail = f", {duration_text(times[0])}" if times and not sign else ""
+        tail = f", {short(times[0])} s" if times and not sign else ""
         word = "ramp" if term.is_drift else "walk" if term.is_walk else "GM"
         shown.append({key: f"{word} {sign}{each}{tail}" for key, each in text.items()})
     return shown

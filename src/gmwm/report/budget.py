@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import Any
 
-from gmwm.budget import (
+from gmwm.calibration import Calibration
+from gmwm.error_budget import (
     FIELD_UNITS,
     HORIZONTAL,
     QUANTITIES,
@@ -16,7 +17,6 @@ from gmwm.budget import (
     per_si,
     short,
 )
-from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from gmwm._core.text import readable
+from gmwm._core.units import SI_UNIT
 from gmwm.ins.field import Comparison, Navigated, outage_pictures
 from gmwm.report.page import write_page
 from gmwm.report.text import duration_text, model_text
@@ -31,7 +33,11 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
         models=[
-            (axis, model_text(model), sensors.bias_sd[axis])
+            (
+                axis,
+                model_text(model, kind := axis.partition("_")[0]),
+                readable(sensors.bias_sd[axis], SI_UNIT[kind]),
+            )
             for axis, model in sensors.models.items()
         ],
     )

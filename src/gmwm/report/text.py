@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.process import Model
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
@@ -38,9 +37,19 @@ def short(value: float) -> str:
     return f"{float(text):,.0f}" if abs(value) >= 1000.0 else text
 
 
-def model_text(model: Model) -> str:
-    """A model as Python writes it, with four significant digits."""
-    return re.sub(r"(?<==)[-+.\de]+", lambda found: f"{float(found[0]):.4g}", repr(model))
+def model_text(model: Model, quantity: str) -> str:
+    """A model's terms with their parameters, in the first unit of the field where there is one."""
+    terms: dict[int, list[str]] = {}
+    for item in model.parameters:
+        unit, value = item.parameter.unit, float(item.value or 0.0)
+        found = field_units(unit, quantity)
+        shown, scale = (
+            (found[0].unit, found[0].per_si) if found else (si_parameter_unit(unit, quantity), 1.0)
+        )
+        text = f"{item.parameter.name} {value * scale:.4g} {shown}".rstrip()
+        terms.setdefault(item.term, []).append(text)
+    labels = model.term_labels()
+    return "; ".join(f"{labels[i]} {', '.join(texts)}" for i, texts in terms.items())
 
 
 def needed(seconds: float | None, duration: float) -> str:

@@ -50,7 +50,13 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
         models=[
-            (name, [(axis, model_text(model)) for axis, model in each.models.items()])
+            (
+                name,
+                [
+                    (axis, model_text(model, axis.partition("_")[0]))
+                    for axis, model in each.models.items()
+                ],
+            )
             for name, each in experiment.filters.items()
         ],
     )

@@ -232,6 +232,6 @@ def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
     Raises InputError if either is not usable.
     """
     if dt is None:
-        raise InputError("give the sampling interval of the array: wavelet_variance(x, dt=0.01)")
+        raise InputError("an array has no sampling interval: give it in seconds, e.g. dt=0.01")
     interval = checks.sampling_interval(dt)
     return Channel("", checks.real_numbers(data, "the series"), interval)

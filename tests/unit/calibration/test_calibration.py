@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,6 +152,29 @@ def test_all_channels_dead():
     )
     with pytest.raises(InputError, match=r"^dead\.csv: every channel is constant.*: check the"):
         gmwm.calibrate(rec)
+
+
+@pytest.mark.parametrize("given", ["own.csv", ["own.csv"], Path("own.csv")])
+def test_a_path_is_to_be_read_first(given):
+    for entrance in (gmwm.calibrate, *(() if isinstance(given, list) else (gmwm.health,))):
+        with pytest.raises(
+            InputError, match=r"^'own.csv' is a path: read it first, gmwm\.read\('o"
+        ):
+            entrance(given)
+
+
+def test_channels_are_drawn_with_their_models(calibration):
+    import matplotlib.pyplot as plt
+
+    figure = calibration.plot()
+    assert len(figure.axes) == len(calibration)
+    assert [ax.get_title() for ax in figure.axes] == [fit.wv.name for fit in calibration.values()]
+    assert len(calibration.plot(["gyro_x"], units="si").axes) == 1
+    plt.close("all")
+    with pytest.raises(InputError, match="no model of channel 'mag_x'"):
+        calibration.plot(["mag_x"])
+    with pytest.raises(InputError, match="channels names none: give some of gyro_x"):
+        calibration.plot([])
 
 
 def test_too_short_a_recording():

@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from gmwm.cli.hints import HINTS, with_hint
+from gmwm._core.notices import Notice
+from gmwm.cli.hints import HINTS, with_hint, with_option
 from gmwm.cli.main import cli
 from gmwm.errors import InputError
 from places import REPOSITORY
@@ -28,6 +29,18 @@ def test_a_mend_is_said_in_the_words_of_the_command_line():
     error = InputError("the rates differ", "rate-contradicted", "give time=False")
     assert with_hint(error) == f"the rates differ: {HINTS['rate-contradicted']}"
     assert with_hint(InputError("wrong", "unknown-code", "do this")) == "wrong: do this"
+
+
+@pytest.mark.parametrize(
+    ("code", "where", "options"),
+    [("sd-assumed", "position", ["--position-sd"]), ("sd-assumed", "velocity", ["--velocity-sd"]),
+     ("axis-up", "accel_z", ["--channel", "--channel"])],
+)  # fmt: skip
+def test_a_notice_of_navigating_has_its_options(code, where, options):
+    action = with_option(Notice(code, "warning", where, "", {}, "do this")).action
+    assert re.findall(r"--[a-z-]+", action) == options
+    known = {name for p in cli.commands["navigate"].params for name in p.opts}
+    assert known.issuperset(options)
 
 
 @pytest.mark.parametrize("code", HINTS)

@@ -2,6 +2,7 @@
 
 import pytest
 
+import gmwm
 from gmwm.cli.main import _run, cli
 
 
@@ -28,3 +29,13 @@ def test_other_errors_of_the_system_are_not_hidden(monkeypatch):
     monkeypatch.setattr(cli, "main", ends_with(SystemError("broken")))
     with pytest.raises(SystemError, match="broken"):
         _run()
+
+
+def test_help_and_errors_name_every_term_that_a_model_may_have():
+    from gmwm.cli.options import TERMS, written_models
+    from gmwm.process import CATALOGUE
+
+    known = [type(written_models([term])[""].terms[0]) for term in TERMS.split(", ")]
+    assert known == list(CATALOGUE)
+    with pytest.raises(gmwm.InputError, match=TERMS):
+        written_models(["low-pass noise"])

@@ -78,14 +78,50 @@ def test_a_unit_that_is_not_known(timed, unit):
 
 
 @pytest.mark.parametrize(
-    "step", [1.0, 5.0, 250.0, 2500.0, 5e6, 0.01 / 86400.0, 0.1 / 86400.0, 0.01 / 3600.0]
+    ("step", "rate", "unit"),
+    [
+        (1.0, 1000.0, "ms"),
+        (5.0, 200.0, "ms"),
+        (250.0, 4000.0, "us"),
+        (2500.0, 400.0, "us"),
+        (5e6, 200.0, "ns"),
+        (0.01 / 86400.0, 100.0, "days"),
+        (0.01 / 3600.0, 100.0, "h"),
+    ],
 )
-def test_stamps_without_a_unit_that_no_imu_has_in_seconds(timed, step):
+def test_stamps_without_a_unit_that_no_imu_has_in_seconds(timed, step, rate, unit):
     path = timed(12.0 + step * np.arange(80))
     with pytest.raises(InputError) as caught:
         read(path, units=UNITS)
     assert caught.value.code == "time-unit"
-    assert "e.g. time_s or time_ms, or give the sampling rate" in str(caught.value)
+    assert f"name the column 't [{unit}]', or give the sampling rate, rate=" in str(caught.value)
+    assert caught.value.values["rate"] == pytest.approx(rate, rel=1e-4)
+    assert read(path, rate=rate, units=UNITS).rate == rate
+
+
+def test_a_unit_of_time_is_asked_for_with_the_others_and_what_is_advised_helps(timed):
+    path = timed(20_000.0 * np.arange(80))
+    with pytest.raises(InputError) as caught:
+        read(path)
+    message = str(caught.value)
+    assert "steps of 20000 without a unit, 50 Hz if they are microseconds, and it does" in message
+    assert 'e.g. rate=50, units={"gyro": "deg/s"' in message
+    assert "50 Hz if they are microseconds, not the 100 Hz stated" in problem(path, rate=100)
+    assert read(path, rate=50, units=UNITS).rate == 50.0
+
+
+@pytest.mark.parametrize("units", ["deg/h", {"gyro": 3.0}, [("gyro", "deg/s")]])
+def test_units_are_those_of_sensors(timed, units):
+    with pytest.raises(
+        InputError, match=r'^units = .*: give that of each sensor, e.g. units={"gyro"'
+    ):
+        read(timed(0.01 * np.arange(80)), units=units)
+
+
+def test_a_unit_of_time_that_nothing_is_like(timed):
+    assert problem(timed(3e12 * np.arange(80))).endswith(
+        "without a unit: name the column by its unit, or give the sampling rate, rate=100"
+    )
 
 
 @pytest.mark.parametrize("unit", [60.0, 3600.0, 86400.0])

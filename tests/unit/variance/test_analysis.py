@@ -143,3 +143,11 @@ def test_a_series_that_changes_within_its_gaps_only_has_no_noise():
 
     with pytest.raises(gmwm.InputError, match="changes only where samples are missing"):
         gmwm.wavelet_variance(x, dt=0.01)
+
+
+@pytest.mark.parametrize("entrance", [gmwm.wavelet_variance, lambda x: gmwm.fit(TRUTH.opened(), x)])
+def test_an_array_needs_a_sampling_interval_wherever_it_goes_in(entrance):
+    with pytest.raises(
+        gmwm.InputError, match=r"^an array has no .*: give it in seconds, e\.g\. dt="
+    ):
+        entrance(np.ones(100))

@@ -92,7 +92,10 @@ class Comparison:
 
     @property
     def verdict(self) -> Notice:
-        """Which model to take: ``better`` by errors, ``more-honest`` by scores, or ``tie``."""
+        """Which model to take: ``better`` by errors, ``more-honest`` by scores, or ``tie``.
+
+        Of those that it names, the ones whose own predictions the errors contradict.
+        """
         names = list(self.outcomes)
         share = len(names) * (len(names) - 1) / 2.0
 
@@ -104,8 +107,17 @@ class Comparison:
             return "more-honest" if honest and pair.score < 0.0 else ""
 
         unbeaten = [a for a in names if not any(beats(b, a) for b in names if b != a)]
+        wrong = {name: nees for name in unbeaten or names
+                 if not (nees := self.outcomes[name].nees).within}  # fmt: skip
         values: dict[str, Any] = {"models": ", ".join(unbeaten), "resolved": self.resolved,
-                                  "length needed": self.length_needed}  # fmt: skip
+                                  "length needed": self.length_needed,
+                                  "contradicted": ", ".join(wrong)}  # fmt: skip
+        but = "; ".join(
+            f"{name} believes its errors to be {'smaller' if nees.value > 1.0 else 'larger'} than "
+            f"they are, NEES {nees.value:.3g}"
+            for name, nees in wrong.items()
+        )
+        but = f", but {but}" if wrong else ""
         if len(unbeaten) == 1:
             best = unbeaten[0]
             codes = {beats(best, b) for b in names if b != best}
@@ -115,9 +127,9 @@ class Comparison:
                     "its errors after the outages are smaller" if code == "better" else
                     "errors are as large, but it predicts them better"
                 )  # fmt: skip
-                return Notice(code, "good", best, f"Take {best}: {why}.", values)
+                return Notice(code, "good", best, f"Take {best}: {why}{but}.", values)
         shown = " and ".join(unbeaten or names)
-        text = f"A tie: {shown} are as good as each other as far as this log shows. "
+        text = f"A tie: errors of {shown} are equally large as far as this log shows{but}. "
         if self.resolved > tuning.WORTH:
             text += "Errors that differ by 10 % would have been found."
         else:
@@ -256,7 +268,8 @@ def compare(
     """
     if len(sensors) < 2:
         raise InputError("a comparison needs two sensor models or more: give each a name")
-    replays = {name: _replay(measured, models) for name, models in sensors.items()}
+    models = {name: SensorModels.of(each) for name, each in sensors.items()}
+    replays = {name: _replay(measured, each) for name, each in models.items()}
     epochs = min(replay.imu.n for replay in replays.values())
     duration = epochs * measured.imu.dt
     length = _length(outages)
@@ -278,11 +291,13 @@ def compare(
         (a, b): paired(outcomes[a], outcomes[b], scale)
         for a in outcomes for b in outcomes if a != b
     }  # fmt: skip
-    return Comparison(measured.title, every, outcomes, pairs, duration, measured.notices)
+    notices = [replace(each, source=name) for name, own in models.items() for each in own.notices]
+    return Comparison(measured.title, every, outcomes, pairs, duration,
+                      (*notices, *measured.notices))  # fmt: skip
 
 
-def _replay(measured: Measured, source: Any) -> Replay:
-    models, usual = SensorModels.of(source), measured.sensors.bias_sd
+def _replay(measured: Measured, models: SensorModels) -> Replay:
+    usual = measured.sensors.bias_sd
     bias = {axis: each or usual[axis] for axis, each in models.bias_sd.items()}
     own = replace(measured, sensors=replace(models, bias_sd=bias))
     alignment = align(

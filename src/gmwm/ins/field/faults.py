@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -151,15 +152,23 @@ _MOTION = {
 }
 
 
-def fault_notice(fault: Explanation, start: float = 0.0) -> Notice:
+def fault_notice(fault: Explanation, start: float, assumed: Mapping[str, Notice]) -> Notice:
     """A fault as a notice: ``values`` holds what was estimated, SI, and standard errors.
 
-    A step lies between times of a clock that shows ``start`` where the filter starts, s.
+    start: What the clock on which a step is dated shows where the filter starts, s.
+    assumed: Kind of fixes -> that their standard deviations were assumed, which is no fault of
+        the log.
     """
-    values = {**fault.values, **{f"{name} error": each for name, each in fault.errors.items()}}
+    values: dict[str, Any] = {**fault.values}
+    values |= {f"{name} error": each for name, each in fault.errors.items()}
     values |= {name: values[name] + start for name in ("after", "before") if name in values}
     text, action = _WORDS[fault.code](replace(fault, values=values))
-    return Notice(fault.code, _severity(fault), fault.where, text, values, action)
+    severity = _severity(fault)
+    if fault.code == "fix-noise" and fault.where in assumed:
+        severity = "note" if severity == "warning" else "warning"
+        text, action = _assumed_sd(fault.values["factor"], assumed[fault.where])
+        values["assumed"] = True
+    return Notice(fault.code, severity, fault.where, text, values, action)
 
 
 def resolution_notice(faults: Faults) -> Notice:
@@ -284,6 +293,19 @@ def _fix_noise(fault: Explanation) -> tuple[str, str]:
     return (
         f"the fixes are {factor:.2g} times their standard deviations",
         f"multiply those by {factor:.2g}",
+    )
+
+
+def _assumed_sd(factor: float, assumed: Notice) -> tuple[str, str]:
+    shown, right = (
+        ",".join(f"{scale * assumed.values[name]:.2g}" for name in ("north", "east", "down"))
+        for scale in (1.0, factor)
+    )
+    unit = "m/s" if assumed.where == "velocity" else "m"
+    return (
+        f"the errors of the fixes are {factor:.2g} times the standard deviations assumed here, "
+        f"{shown.replace(',', ', ')} {unit}",
+        f"{assumed.action} {right}",
     )
 
 

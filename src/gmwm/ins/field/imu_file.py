@@ -123,7 +123,12 @@ def read_imu_log(
     notices = (*clock.notices, *filled)
     if mean[2] > 0.0:
         text = "its mean is positive: the axis points up, and roll is near 180 deg"
-        notices = (*notices, Notice("axis-up", "warning", "accel_z", text))
+        # A right-handed triad whose z axis points up has its y axis to the left.
+        action = (
+            "if it is mounted upside down, fine; else turn gyro_z and accel_z round, and gyro_y "
+            "and accel_y too if y points left"
+        )
+        notices = (*notices, Notice("axis-up", "warning", "accel_z", text, {}, action))
     return ImuLog(imu, clock.start, record.source, (*record.notices, *notices))
 
 

@@ -174,14 +174,19 @@ class Measured:
             cut = (*cut, seen)
         for kind, own, usual in (("position", found.position_sd, spec.position_sd),
                                  ("velocity", found.velocity_sd, spec.velocity_sd)):  # fmt: skip
-            if own is None and any(each.kind == kind for each in aiding.fixes):
+            name = f"{kind}_sd"
+            if own is not None and name in spec.given:
+                text = "the fixes have standard deviations of their own: those given are not used"
+                assumed = (*assumed, Notice("sd-not-used", "warning", kind, text))
+            if own is None and name not in spec.given and aiding.of(kind) is not None:
                 sd, unit = ", ".join(f"{each:g}" for each in usual), _UNITS[kind]
                 text = (
-                    f"{kind} fixes are taken to have standard deviations of {sd} {unit} (north, "
-                    "east, down)"
+                    f"the fixes have no standard deviations: {sd} {unit} to the north, east and "
+                    "down are assumed"
                 )
                 values = dict(zip(("north", "east", "down"), usual, strict=True))
-                assumed = (*assumed, Notice("sd-assumed", "note", "", text, values))
+                action = f"give {name}"
+                assumed = (*assumed, Notice("sd-assumed", "note", kind, text, values, action))
         return cls(
             imu=log.imu,
             aiding=aiding,

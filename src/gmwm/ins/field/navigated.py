@@ -12,7 +12,7 @@ import numpy as np
 
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, worst_first
 from gmwm._core.text import bullets, made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -126,7 +126,8 @@ class Navigated:
     def fault_notices(self) -> tuple[Notice, ...]:
         """Faults that were found, by code and values; what this motion would show of others."""
         start = float(self.clock(np.zeros(1))[0])
-        return tuple(fault_notice(each, start) for each in self.faults.found)
+        assumed = {each.where: each for each in self.measured.notices if each.code == "sd-assumed"}
+        return tuple(fault_notice(each, start, assumed) for each in self.faults.found)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -219,12 +220,14 @@ class Navigated:
                 "expects, and white.",
             )  # fmt: skip
         if largest > tuning.LOST:
+            up = [each.action for each in self.measured.notices if each.code == "axis-up"]
+            first = f"accel_z, which points up ({up[0]}), then at " if up else ""
             return Notice(
                 "lost", "bad", "",
                 f"The filter is lost: innovations are {largest:.2g} times as large as it expects, "
-                "and the accuracy that it predicts is not to be believed; look first at the "
-                "heading that it started with, then at the units of the sensors and the clock of "
-                "the fixes.",
+                "and the accuracy that it predicts is not to be believed; look first at "
+                f"{first}the heading that it started with, then at the units of the sensors and "
+                "the clock of the fixes.",
                 sizes,
             )  # fmt: skip
         if sizes:
@@ -247,9 +250,13 @@ class Navigated:
 
     def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
         first, found = faults[0], self.faults
-        text = "The filter's model does not fit these data: " + "; ".join(
-            f"{fault}" for fault in faults
-        )
+        severity = worst_first(list(faults))[0].severity
+        if found.explained and all(each.values.get("assumed") for each in faults):
+            text = "Only the standard deviations assumed for the fixes do not fit these data: "
+        else:
+            text = "The filter's model does not fit these data: "
+            severity = "bad" if severity == "bad" else "warning"
+        text += "; ".join(f"{fault}" for fault in faults)
         if found.alternatives:
             text += f"; nearly as probable: {', '.join(found.alternatives)}"
         text += (
@@ -258,7 +265,7 @@ class Navigated:
             else ". That does not explain all: something else is wrong too."
         )
         values = {**first.values, "explained": found.explained, "faults": len(faults)}
-        return Notice(first.code, first.severity, first.where, text, values)
+        return Notice(first.code, severity, first.where, text, values)
 
     def _cause(self, sizes: dict[str, float]) -> tuple[str, str]:
         """What innovations of these sizes may come from: code and text."""
@@ -302,8 +309,12 @@ class Navigated:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Of the files, of the start, and of fixes that were rejected."""
-        return (*self.measured.notices, *self.alignment.notices, *self.rejections)
+        """Of the files, the sensor models, the start, and of fixes that were rejected."""
+        measured = self.measured
+        return (
+            *measured.sensors.notices, *measured.notices, *self.alignment.notices,
+            *self.rejections,
+        )  # fmt: skip
 
     @property
     def accuracy(self) -> list[str]:
@@ -314,7 +325,8 @@ class Navigated:
             sentences.append(f"The filter diverged at {at:.10g} s and was stopped")
         elif self.solution.time.size:
             sd = self.solution.sd[-1]
-            caveat = "" if self.fits else " (if its model were right, which it is not)"
+            is_right = self.fits or self.verdict.severity == "note"
+            caveat = "" if is_right else " (were its model right, which it is not)"
             sentences.append(
                 f"Predicted accuracy at the end, 1 sigma{caveat}: horizontal "
                 f"{np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "

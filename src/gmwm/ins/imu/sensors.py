@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
@@ -30,10 +31,13 @@ class SensorModels:
         Axis of `AXES` -> model with given parameters, rad/s and m/s^2.
     bias_sd : dict
         Axis -> standard deviation of a constant bias, in the axis' unit; zero for none.
+    not_valid : tuple of str
+        Axes whose models come from fits that are not valid.
     """
 
     models: dict[str, Model]
     bias_sd: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
+    not_valid: tuple[str, ...] = field(default=(), repr=False)
 
     @classmethod
     def of(
@@ -57,8 +61,13 @@ class SensorModels:
             If an axis has no model, a parameter is open, or a name is unknown.
         """
         if isinstance(source, SensorModels):
-            return source if bias_sd is None else cls(source.models, _by_axis(bias_sd, "bias_sd"))
+            return (
+                source if bias_sd is None else
+                replace(source, bias_sd=_by_axis(bias_sd, "bias_sd"))
+            )  # fmt: skip
+        not_valid: tuple[str, ...] = ()
         if isinstance(source, Calibration):
+            not_valid = tuple(axis for axis in AXES if axis in source and not source[axis].valid)
             given: Mapping[str, Any] = {name: fit.model for name, fit in source.fits.items()}
             given = {name: model for name, model in given.items() if name in AXES}
         elif isinstance(source, Mapping):
@@ -73,7 +82,19 @@ class SensorModels:
         if missing:
             raise InputError(f"sensor models: {missing[0]} has none: give one to each axis")
         ordered = {axis: models[axis] for axis in AXES}
-        return cls(ordered, _by_axis(bias_sd or {}, "bias_sd"))
+        return cls(ordered, _by_axis(bias_sd or {}, "bias_sd"), not_valid)
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """That models come from fits that are not valid."""
+        if not self.not_valid:
+            return ()
+        fit, are, them = ("fits", "are", "them") if self.not_valid[1:] else ("fit", "is", "it")
+        text = f"the {fit} {are} not valid, nor is a filter that believes {them}"
+        action = "read the notices of the calibration first"
+        return (
+            Notice("fit-not-valid", "warning", ", ".join(self.not_valid), text, {}, action),
+        )  # fmt: skip
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.

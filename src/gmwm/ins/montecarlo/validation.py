@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +97,12 @@ class Validation:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What to know of the runs: too few of them, filters that diverged."""
+        """What to know of the filters' models and the runs: too few, filters that diverged."""
+        models = (
+            replace(each, source=name)
+            for name, own in self.experiment.filters.items()
+            for each in own.notices
+        )
         found = {name: self.study[name] for name in self.names if self.study[name].diverged}
         diverged = (
             Notice(
@@ -107,7 +112,7 @@ class Validation:
             )
             for name, runs in found.items()
         )  # fmt: skip
-        return (*self.study.notices, *diverged)
+        return (*models, *self.study.notices, *diverged)
 
     def spreads(self, name: str) -> list[dict[str, Spread]]:
         """Errors of a filter before the first fix after each outage."""

@@ -7,3 +7,4 @@ from gmwm.readers.clock.civil_time import (
 )
 from gmwm.readers.clock.jumps import Jumps as Jumps
 from gmwm.readers.clock.stamps import Clock as Clock, Timing as Timing, agree as agree
+from gmwm.readers.clock.unit_of_time import without_unit as without_unit

@@ -15,16 +15,8 @@ from gmwm.readers import tuning
 from gmwm.readers.clock.beat import without_beat
 from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, find_shifts, jumps_of
 from gmwm.readers.clock.uneven import Followed, followed
+from gmwm.readers.clock.unit_of_time import UNITS, without_unit
 
-_UNITS = {
-    86400.0: "days",
-    3600.0: "hours",
-    60.0: "minutes",
-    1.0: "seconds",
-    1e-3: "milliseconds",
-    1e-6: "microseconds",
-    1e-9: "nanoseconds",
-}
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
@@ -155,13 +147,15 @@ class Clock:
         self._check_jumps(jumps)
         rate = 1.0 / (step * seconds)
         if expected is not None and not agree(rate, expected):
+            if guessed and (error := without_unit(self.source, self.column, step, expected)):
+                raise error
             raise InputError(
                 f"{self.place}: its stamps give {rate:.6g} Hz, not the {expected:.6g} Hz stated",
                 "rate-contradicted",
                 "leave out the rate to use that of the stamps, or give time=False to ignore them",
             )
         text = (
-            f"time stamps (column {self.column}, {_UNITS.get(seconds, self.own_unit)}"
+            f"time stamps (column {self.column}, {UNITS.get(seconds, self.own_unit)}"
             f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
             f"vary by {jitter * step * seconds:.3g} s rms ({jitter:.2%} of a step)"
         )
@@ -387,14 +381,10 @@ class Clock:
             return 1.0 / expected / step, True
         if expected is not None:
             return min(
-                _UNITS, key=lambda unit: abs(math.log(step * unit) + math.log(expected))
+                UNITS, key=lambda unit: abs(math.log(step * unit) + math.log(expected))
             ), True
-        if not tuning.LEAST_STEP <= step < tuning.LARGEST_STEP:
-            raise InputError(
-                f"{self.place}: steps of {step:.6g} without a unit: name the column by its unit, "
-                "e.g. time_s or time_ms, or give the sampling rate, rate=100",
-                "time-unit",
-            )
+        if error := without_unit(self.source, self.column, step):
+            raise error
         return 1.0, True
 
 

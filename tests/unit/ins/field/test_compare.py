@@ -14,6 +14,7 @@ from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.geometry import ned_difference
+from gmwm.ins.montecarlo import Ratio
 from gmwm.study.emulated_logs import emulated_log, sensors
 
 
@@ -76,6 +77,30 @@ def test_an_overconfident_model_with_the_same_errors_is_less_honest(drive):
     found = compare(drive[0], {"right": sensors(), "sure": sensors(slow=0.3)})
     assert found.outcomes["sure"].nees.value > found.outcomes["right"].nees.value
     assert found.pairs["right", "sure"].score < 0.0
+
+
+def test_a_tie_names_the_models_whose_own_prediction_is_contradicted(drive):
+    """Errors that are as large, of which one model predicts half: it was "as good as the other"."""
+    found = compare(drive[0], {"right": sensors(), "sure": sensors()})
+    honest = Ratio(1.0, 0.8, 1.2, 1.0)
+    outcomes = {
+        "right": replace(found.outcomes["right"], nees=honest),
+        "sure": replace(found.outcomes["sure"], nees=replace(honest, value=1.64)),
+    }
+    verdict = replace(found, outcomes=outcomes).verdict
+    assert (verdict.code, verdict.values["contradicted"]) == ("tie", "sure")
+    assert "but sure believes its errors to be smaller than they are, NEES 1.64." in verdict.text
+    assert "right believes" not in verdict.text
+    outcomes["right"] = replace(outcomes["right"], nees=replace(honest, value=0.5))
+    assert "right believes its errors to be larger than they are, NEES 0.5; sure" in (
+        replace(found, outcomes=outcomes).verdict.text
+    )
+    assert (
+        "believes"
+        not in replace(
+            found, outcomes={name: replace(each, nees=honest) for name, each in outcomes.items()}
+        ).verdict.text
+    )
 
 
 def test_equal_models_are_a_tie(drive):

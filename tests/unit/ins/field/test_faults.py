@@ -124,7 +124,7 @@ def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
         errors["down"] = down
     values = {"forward": 1.0, "right": 0.3, "down": -1.8}
     fault = Explanation("lever-arm", "", lambda r: r, replay, 20.0, 8.0, values, errors)
-    assert fault_notice(fault).action.startswith(advice)
+    assert fault_notice(fault, 0.0, {}).action.startswith(advice)
 
 
 def test_coloured_fixes():

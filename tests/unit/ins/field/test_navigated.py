@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from gmwm import Calibration, Channel, WhiteNoise, fit
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
@@ -16,6 +18,7 @@ from gmwm.ins.field.navigated import Navigated
 from gmwm.ins.field.replay import innovation_sizes
 from gmwm.ins.filter.aiding import KINDS
 from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.imu import AXES
 from gmwm.ins.spec.sensor_terms import sensor_models
 
 RATE, START = 25.0, 1000.0
@@ -34,7 +37,8 @@ def table(path, header, columns):
         np.savetxt(stream, np.column_stack(columns), "%.12g", ",", header=header, comments="")
 
 
-def drive(folder, seed=0, trajectory=None, velocity=True, deviations=True, hole=(100.0, 120.0)):
+def drive(folder, seed=0, trajectory=None, velocity=(0.1, 0.1, 0.15), deviations=True,
+          hole=(100.0, 120.0)):  # fmt: skip
     """Write imu.csv and fixes.csv of a drive; returns the true trajectory."""
     rng = np.random.default_rng(seed)
     truth = trajectory or car_drive(duration=160.0, dt=1.0 / RATE)
@@ -44,9 +48,7 @@ def drive(folder, seed=0, trajectory=None, velocity=True, deviations=True, hole=
     imu = ideal.with_errors(errors[:, :3], errors[:, 3:])
     stamps = START + imu.dt * (1.0 + np.arange(imu.n))
     table(folder / "imu.csv", IMU_HEADER, [stamps, imu.rotation / imu.dt, imu.velocity / imu.dt])
-    aiding = gnss(
-        truth, velocity_sd=(0.1, 0.1, 0.15) if velocity else None, lever_arm=ARM, imu=ideal
-    )
+    aiding = gnss(truth, velocity_sd=velocity, lever_arm=ARM, imu=ideal)
     aiding = aiding.without([Outage(hole[0], hole[1] - hole[0])]).noisy(rng)
     position = aiding.fixes[0]
     names = ["time_s", "latitude_deg", "longitude_deg", "height_m"]
@@ -77,7 +79,7 @@ def standardised(found, truth):
     return found.solution.errors(part) / found.solution.sd
 
 
-@pytest.mark.parametrize("velocity", [True, False])
+@pytest.mark.parametrize("velocity", [(0.1, 0.1, 0.15), None])
 def test_a_drive_comes_back_within_its_own_standard_deviations(tmp_path, velocity):
     squares, fits = [], 0
     for seed in range(4):
@@ -173,6 +175,45 @@ def test_outliers_are_told_apart_from_a_wrong_model(tmp_path):
     assert at in (START + 40.0, START + 60.0, START + 90.0)
 
 
+def test_standard_deviations_that_were_assumed_are_not_blamed_on_the_log(tmp_path):
+    """Velocities of 0.08 m/s, whose file says nothing of it."""
+    drive(tmp_path, velocity=(0.08, 0.08, 0.12))
+    measured = Measured.of(content(), tmp_path)
+    (assumed,) = (each for each in measured.notices if each.code == "sd-assumed")
+    assert (assumed.where, assumed.values["down"]) == ("velocity", 0.15)
+    found = Navigated.of(measured)
+    verdict = found.verdict
+    assert (verdict.code, verdict.where, verdict.severity) == ("fix-noise", "velocity", "note")
+    assert verdict.values["assumed"]
+    assert verdict.values["factor"] == pytest.approx(0.8, rel=0.1)
+    assert "standard deviations assumed here, 0.1, 0.1, 0.15 m/s" in verdict.text
+    assert "give velocity_sd 0.0" in verdict.text
+    assert "which it is not" not in str(found)
+    # What was given is the user's own: it is wrong, and used only where the file has none.
+    given = Measured.of(content(velocity_sd=[0.1, 0.1, 0.15], position_sd=3.0), tmp_path)
+    codes = {(each.code, each.where) for each in given.notices}
+    assert ("sd-not-used", "position") in codes
+    assert ("sd-assumed", "velocity") not in codes
+    assert Navigated.of(given).verdict.severity == "warning"
+    # Far from what was assumed is more than a note.
+    drive(tmp_path, velocity=(0.02, 0.02, 0.03))
+    assert Navigated.of(Measured.of(content(), tmp_path)).verdict.severity == "warning"
+
+
+def test_a_z_axis_that_points_up_is_the_first_thing_to_look_at_when_the_filter_is_lost(tmp_path):
+    drive(tmp_path, trajectory=car_drive(duration=80.0, dt=1.0 / RATE), hole=(50.0, 60.0))
+    path = tmp_path / "imu.csv"
+    rows = np.genfromtxt(path, delimiter=",", skip_header=1)
+    rows[:, [2, 3, 5, 6]] *= -1.0  # forward, left, up
+    table(path, IMU_HEADER, [rows])
+    bad = {"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}
+    found = Navigated.of(Measured.of(content(**bad), tmp_path))
+    (up,) = (each for each in found.notices if each.code == "axis-up")
+    assert "turn gyro_z and accel_z round" in up.action
+    assert found.verdict.code == "lost"
+    assert f"look first at accel_z, which points up ({up.action}), then at" in found.verdict.text
+
+
 @pytest.fixture
 def run(run):
     return partial(run, "navigate")
@@ -201,6 +242,11 @@ def test_the_command_writes_the_solution_and_a_report(run):
     page = Path("out/report.html").read_text()
     assert "do not contradict the filter&#39;s model" in page
     assert "<script" not in page
+    assert (
+        "gyro_x: white noise N 0.3333 deg/sqrt(h); Gauss-Markov sigma 20 deg/h, tau 100 s; "
+        "bias at switch-on 0.1 deg/s"
+    ) in page
+    assert "levelled on 20.2 s at rest, from 0 s on; the gyros" in page
 
 
 def test_the_command_without_a_file(run):
@@ -208,9 +254,41 @@ def test_the_command_without_a_file(run):
     calibrated = yaml.safe_dump(content(imu="imu.csv"))
     Path("run.yaml").write_text(calibrated)
     by_options = run("run.yaml", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--heading",
-                     57.3, "--lever-arm", "1,0.3,-1", "--gyro-bias", "0.1 deg/s")  # fmt: skip
+                     57.3, "--lever-arm", "1,0.3,-1", "--gyro-bias", "0.1 deg/s",
+                     "--velocity-sd", "0.1,0.1,0.15", "--position-sd", "2")  # fmt: skip
     assert by_options[0] == 0
     assert "heading as given: 57.30 deg" in by_options[1]
+    assert "are assumed" not in by_options[1]
+    assert "position: the fixes have standard deviations of their own" in by_options[1]
+    assert run("run.yaml", "--velocity-sd", "0.1,1")[2].startswith(
+        "gmwm: --velocity-sd 0.1,1: write one number, or NORTH,EAST,DOWN"
+    )
+
+
+def test_models_that_are_not_valid_are_named_wherever_they_are_used(run):
+    """What `gmwm bound` reports; a filter used them without a word."""
+    drive(Path(), trajectory=car_drive(duration=310.0, dt=1.0 / RATE))
+    fits, bad = {}, Notice("misfit", "bad", "", "the model does not fit")
+    for i, axis in enumerate(AXES):
+        values = 1e-3 * np.random.default_rng(i).standard_normal(2000)
+        fits[axis] = fit(WhiteNoise(), Channel(axis, values, 0.01, axis.partition("_")[0]))
+        fits[axis] = replace(fits[axis], notices=(bad,) if axis in ("gyro_x", "accel_z") else ())
+    Calibration(fits, {}, "test", 100.0, 2000).save("cal.json")
+    Path("run.yaml").write_text(yaml.safe_dump(content(sensors="cal.json")))
+    told = "gyro_x, accel_z: the fits are not valid, nor is a filter that believes them"
+    printed = " ".join(run("run.yaml", "-o", "out")[1].split())
+    assert told in printed
+    assert "to the north, east and down are assumed (give --velocity-sd)" in printed
+    assert told in Path("out/report.html").read_text()
+    compared = content(compare={"bad": "cal.json", "good": SENSORS})
+    del compared["sensors"]
+    Path("run.yaml").write_text(yaml.safe_dump(compared))
+    printed = " ".join(run("run.yaml", "-o", "both")[1].split())
+    assert f"bad: {told}" in printed
+    assert "(give --velocity-sd)" in printed
+    page = Path("both/comparison.html").read_text()
+    assert f"bad: {told}" in page
+    assert f"good: {told}" not in page
 
 
 BAD = {

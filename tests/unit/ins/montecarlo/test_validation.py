@@ -1,4 +1,6 @@
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,6 +21,15 @@ def test_the_table_fits_a_terminal(outages, names, runs, scale, made_up):
     text = str(made_up(dict.fromkeys(names, scale), outages, runs))
     assert max(map(len, text.splitlines())) <= 80
     assert "nan" not in re.sub(r"band nan .. nan|p = nan", "", text)
+
+
+def test_a_filter_whose_models_are_not_valid_is_named(made_up):
+    found = made_up(runs=2)
+    models = replace(found.experiment.filters["bold"], not_valid=("gyro_x",))
+    filters = found.experiment.filters | {"bold": models}
+    experiment = SimpleNamespace(**(vars(found.experiment) | {"filters": filters}))
+    (notice,) = (n for n in replace(found, experiment=experiment).notices if n.source)
+    assert (notice.source, notice.where, notice.code) == ("bold", "gyro_x", "fit-not-valid")
 
 
 def test_filters_are_starred_if_and_only_if_they_misjudge_themselves(made_up):

@@ -114,11 +114,13 @@ def align(
     earth = C.T @ np.array([RATE * np.cos(lat), 0.0, -RATE * np.sin(lat)])
     known_sd = float(np.hypot(gyro_sd, RATE * np.hypot(yaw_sd, tilt_sd))) if still else None
     start = first * imu.dt
-    motion = "at rest; the gyros' mean there is subtracted" if still else "in steady motion"
+    motion, mean_off = (
+        ("at rest", "; the gyros' mean there is subtracted") if still else ("in steady motion", "")
+    )
     notices = (
         Notice(
             "levelled", "note", "",
-            f"levelled by {length:.3g} s, {start:.6g} s after the start, {motion}",
+            f"levelled on {length:.3g} s {motion}, from {start:.6g} s on{mean_off}",
             {"length": length, "start": start, "at rest": still},
         ),
         Notice(

@@ -1,6 +1,6 @@
 """Error growth of unaided navigation, in closed form."""
 
-from gmwm.budget.budget import (
+from gmwm.error_budget.budget import (
     FIELD_UNITS as FIELD_UNITS,
     HORIZONTAL as HORIZONTAL,
     QUANTITIES as QUANTITIES,
@@ -11,4 +11,4 @@ from gmwm.budget.budget import (
     root_sum as root_sum,
     short as short,
 )
-from gmwm.budget.coasting import TIMES as TIMES, error_budget as error_budget
+from gmwm.error_budget.coasting import TIMES as TIMES, error_budget as error_budget
