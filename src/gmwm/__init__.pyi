@@ -1,4 +1,9 @@
 from . import ins as ins
+from .budget import (
+    ErrorBudget as ErrorBudget,
+    ErrorRow as ErrorRow,
+    error_budget as error_budget,
+)
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
@@ -13,11 +18,6 @@ from .diagnosis import (
     find_still as find_still,
     health as health,
     health_stream as health_stream,
-)
-from .error_budget import (
-    ErrorBudget as ErrorBudget,
-    ErrorRow as ErrorRow,
-    error_budget as error_budget,
 )
 from .errors import (
     FitWarning as FitWarning,

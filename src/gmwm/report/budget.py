@@ -6,8 +6,7 @@ from collections.abc import Set
 from typing import Any
 
 from gmwm._core.text import brief
-from gmwm.calibration import Calibration
-from gmwm.error_budget import (
+from gmwm.budget import (
     FIELD_UNITS,
     HORIZONTAL,
     QUANTITIES,
@@ -17,6 +16,7 @@ from gmwm.error_budget import (
     error_budget,
     per_si,
 )
+from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 

@@ -195,7 +195,8 @@ class Goodness:
             self.tau, self.data, self.model, self.misfit, self.residual, self.allowed, self.dof
         )  # fmt: skip
         for tau, data, model, misfit, residual, allowed, dof in zip(*columns, strict=True):
-            share = f"{100.0 * misfit:+,.{2 if abs(misfit) < 10.0 else 0}f} %"
+            form = "+.2f" if abs(misfit) < 10.0 else "+,.0f" if abs(misfit) < 1e3 else "+.2g"
+            share = f"{100.0 * misfit:{form}} %"
             lines.append(
                 f"{tau:>10.5g} {data:>14.4g} {model:>14.4g} {share:>9} {residual:>+9.2f} "
                 f"{allowed:>+8.2f} {dof:>8.3g}"

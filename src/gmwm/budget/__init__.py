@@ -1,6 +1,6 @@
 """Error growth of unaided navigation, in closed form."""
 
-from gmwm.error_budget.budget import (
+from gmwm.budget.budget import (
     FIELD_UNITS as FIELD_UNITS,
     HORIZONTAL as HORIZONTAL,
     QUANTITIES as QUANTITIES,
@@ -10,4 +10,4 @@ from gmwm.error_budget.budget import (
     per_si as per_si,
     root_sum as root_sum,
 )
-from gmwm.error_budget.coasting import TIMES as TIMES, error_budget as error_budget
+from gmwm.budget.coasting import TIMES as TIMES, error_budget as error_budget

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from gmwm._core.units import factor
-from gmwm.error_budget.budget import HORIZONTAL, QUANTITIES, ErrorBudget, ErrorRow, axis
-from gmwm.error_budget.integrals import integral_rms
+from gmwm.budget.budget import HORIZONTAL, QUANTITIES, ErrorBudget, ErrorRow, axis
+from gmwm.budget.integrals import integral_rms
 from gmwm.errors import InputError
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, as_model
@@ -88,7 +88,7 @@ def error_budget(
     Titterton & Weston, *Strapdown Inertial Navigation Technology*, 2nd ed. 2004, ch. 12; Groves,
     *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed. 2013,
     sec. 5.7. White noise N gives an angle N t^(1/2), as an accelerometer's a position
-    N t^(3/2)/3^(1/2), as a gyro's g N t^(5/2)/20^(1/2). See `gmwm.error_budget.integrals`.
+    N t^(3/2)/3^(1/2), as a gyro's g N t^(5/2)/20^(1/2). See `gmwm.budget.integrals`.
     """
     channels = _channels(source)
     known = {name: item for name, item in channels.items() if _quantity(name, item) is not None}

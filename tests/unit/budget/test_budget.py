@@ -377,8 +377,3 @@ def test_the_rows_of_both_axes_together_are_named_by_what_they_are(budget):
     assert blocks["attitude"].split()[0] == "tilt"
     for quantity in ("velocity", "position"):
         assert blocks[quantity].strip().startswith("horizontal, radial")
-
-
-def test_the_room_does_not_take_a_name_for_a_function():
-    with pytest.raises(AttributeError):
-        gmwm.budget  # noqa: B018 - that it is not there is what is tested

@@ -1,6 +1,6 @@
 """The error budget: how fast attitude, velocity and position are lost without aiding.
 
-What it holds is computed by `gmwm.error_budget.coasting`.
+What it holds is computed by `gmwm.budget.coasting`.
 """
 
 from __future__ import annotations
