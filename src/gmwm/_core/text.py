@@ -13,7 +13,7 @@ from gmwm._core.units import factor
 WIDTH = 80
 
 _UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}
-_LARGE = 1000.0
+_LARGE, _HUGE = 1000.0, 1e6
 
 
 class Printed:
@@ -44,6 +44,12 @@ def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) ->
             break
     plus = "+" if sign else ""
     return f"{shown:{plus}.{digits}g} {name}".rstrip()
+
+
+def brief(value: float, digits: int = 2) -> str:
+    """Some significant digits, without an exponent where a person writes none: ``430``."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if "e+" in text and abs(value) < _HUGE else text
 
 
 def bullets(items: Iterable[object]) -> list[str]:

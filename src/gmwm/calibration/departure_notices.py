@@ -9,7 +9,7 @@ import numpy as np
 
 from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm.calibration import tuning
 from gmwm.calibration.departures import WIDE, Departure
 from gmwm.estimate import Fit
@@ -55,8 +55,8 @@ def _taken_notices(
     if lost[most] ** -2 < 1.0 - tuning.HARMFUL_SHARE:
         values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
         text = (
-            f"with what was taken off, the record has {values['ratio']:.2g} times the deviation at "
-            f"tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
+            f"with what was taken off, the record has {brief(values['ratio'])} times the deviation "
+            f"at tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
         )
         action = "find its cause, or let a slow term of the model describe it"
         notices.append(Notice("departures-removed", "warning", "", text, values, action))
@@ -135,8 +135,8 @@ def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Not
         action = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"
     else:
         severity = "warning" if harmful else "note"
-        text = f"{what}, or slow noise: this record does not distinguish them"
-        action = "a longer record does"
+        text = f"{what}, or slow noise: this record cannot distinguish them"
+        action = "a longer record can"
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}

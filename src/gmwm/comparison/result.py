@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, bullets, made_by, wrapped
+from gmwm._core.text import Printed, brief, bullets, made_by, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -46,7 +46,7 @@ _NAMES = {"short": "short times", "R": "drift"}
 
 def percent(share: float) -> str:
     """A relative difference; a factor from one on."""
-    return f"{100.0 * share:.2g} %" if share < 0.995 else f"a factor of {1.0 + share:.2g}"
+    return f"{brief(100.0 * share)} %" if share < 0.995 else f"a factor of {brief(1.0 + share)}"
 
 
 def _reason(notice: Notice) -> str:
@@ -129,7 +129,7 @@ class AxisComparison:
             text = f"agree (p = {self.p_value:.2g}{tail})"
         else:
             parts = [
-                f"{_NAMES.get(d.part, d.part)} by {percent(d.extent)} ({d.sigma:.2g} sigma)"
+                f"{_NAMES.get(d.part, d.part)} by {percent(d.extent)} ({brief(d.sigma)} sigma)"
                 for d in self.main
             ] or [f"shape (p = {self.p_value:.2g})"]
             words = "differ in" if self.state == "differ" else "differ by less than 10 %:"

@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -75,7 +75,7 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
             "add a RateRamp to the model, or leave out the warm-up",
         )
     text = (
-        f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {ratio:.2g} times "
+        f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {brief(ratio)} times "
         "what the fast noise leaves"
     )
     action = "estimated as random walk or slow Gauss-Markov process"
@@ -113,8 +113,8 @@ def variance_notice(
     low, high = (readable(values[each], unit) for each in ("quiet", "loud"))
     text = (
         f"the noise is not steady: {low} in the quiet and {high} in the loud tenth of parts of "
-        f"{values['part']:.3g} s, so that its mean is {100.0 * values['excess']:.2g} % above that "
-        "of the quiet quarter"
+        f"{values['part']:.3g} s, so that its mean is {brief(100.0 * values['excess'])} % above "
+        "that of the quiet quarter"
     )
     action = "use a recording, or a part, without what vibrates"
     if found is not None:
@@ -161,16 +161,16 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
         text = (
-            f"the noise is {100.0 * abs(growth):.2g} % {'larger' if growth > 0.0 else 'smaller'} "
-            "in the second half than in the first"
+            f"the noise is {brief(100.0 * abs(growth))} % "
+            f"{'larger' if growth > 0.0 else 'smaller'} in the second half than in the first"
         )
         action = "the model is an average: use the part that is like the use"
         return Notice("variance", severity, name, text, numbers, action)
     if is_loud:
         start = loudest * errors.values.size // tuning.TENTHS * dt
         text = (
-            f"the noise is {100.0 * jump:.2g} % larger than usual in the tenth of the record that "
-            f"begins at {start:.4g} s"
+            f"the noise is {brief(100.0 * jump)} % larger than usual in the tenth of the record "
+            f"that begins at {start:.4g} s"
         )
         action = "look for people or machines then, and leave it out if it is none of the sensor"
         return Notice("variance", "warning", name, text, numbers, action)

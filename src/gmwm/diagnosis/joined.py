@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import SEVERITIES, Notice, Severity, worst_first
+from gmwm._core.text import brief
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
@@ -109,7 +110,7 @@ def _streamed(stretches: int, length: float) -> Notice:
     text = (
         f"read in {stretches} stretches of {length:.4g} s: drift, tilt, motion and temperature "
         "from one to the next were not looked for, and lines are found from about "
-        f"{np.sqrt(stretches):.2g} times the amplitude on"
+        f"{brief(np.sqrt(stretches))} times the amplitude on"
     )
     return Notice("streamed", "note", "", text, {"stretches": stretches})
 
@@ -187,7 +188,7 @@ def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:
         return None
     text = (
         f"the noise is {ratio:.3g} times as large in the loudest stretch as in the quietest, so "
-        f"that its mean is {100.0 * excess:.2g} % above that of the quiet quarter"
+        f"that its mean is {brief(100.0 * excess)} % above that of the quiet quarter"
     )
     values = {"ratio": ratio, "excess": excess}
     severity: Severity = "bad" if excess > tuning.UNSTEADY else "warning"

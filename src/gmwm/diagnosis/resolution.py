@@ -6,7 +6,7 @@ import numpy as np
 
 from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 
@@ -100,7 +100,7 @@ def rounding_notice(
             "the noise below the step cannot be estimated; use a finer range",
         )
     ratio = step / noise
-    text = f"{text}, {ratio:.2g} times the white noise of {readable(noise, unit)}"
+    text = f"{text}, {brief(ratio)} times the white noise of {readable(noise, unit)}"
     if ratio > 1.0:
         return Notice(
             "rounding",
@@ -112,5 +112,5 @@ def rounding_notice(
         )
     severity: Severity = "note" if ratio > 0.5 else "good"
     share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
-    action = f"counted as white noise: {100.0 * share:.2g} % of it"
+    action = f"counted as white noise: {brief(100.0 * share)} % of it"
     return Notice("rounding", severity, name, text, values, action)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gmwm._core.distributions import binom
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -311,7 +311,7 @@ def repeated_value_notice(
     text = (
         f"{count:,} samples ({share:.2g} of all) are "
         f"{readable(float(levels[most]), unit, digits=5)}, which comes "
-        f"{counts[most] / np.max(near):.2g} times as often as the values next to it"
+        f"{brief(counts[most] / np.max(near))} times as often as the values next to it"
     )
     return Notice(
         "value-repeated",

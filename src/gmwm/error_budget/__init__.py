@@ -9,6 +9,5 @@ from gmwm.error_budget.budget import (
     axis as axis,
     per_si as per_si,
     root_sum as root_sum,
-    short as short,
 )
 from gmwm.error_budget.coasting import TIMES as TIMES, error_budget as error_budget

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gmwm._core.text import bullets
+from gmwm._core.text import brief, bullets
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor
 from gmwm.errors import InputError
@@ -269,17 +269,11 @@ def per_si(quantity: str) -> float:
 
 
 def _row(quantity: str, values: FloatArray) -> str:
-    return _cells([short(value) for value in values * per_si(quantity)])
+    return _cells([brief(value, 3) for value in values * per_si(quantity)])
 
 
 def _cells(texts: Sequence[str]) -> str:
     return "".join(f"{text:>10}" for text in texts)
-
-
-def short(value: float) -> str:
-    """Three significant digits in at most nine characters, e.g. ``0.0123``, ``45,600``."""
-    text = f"{value:.3g}"
-    return f"{float(text):,.0f}" if 1e3 <= abs(value) < 1e6 else text
 
 
 def _json(row: dict[str, Any]) -> dict[str, Any]:

@@ -53,7 +53,8 @@ def channel_units(
     rate = unknown_rate() if missing or roles.time is None else None
     if missing or rate is not None:
         raise _incomplete(table.source, missing, rate)
-    return found, tuple(_notices(from_header, overruled))
+    origin = getattr(table, "message_type", "the names of the columns")
+    return found, tuple(_notices(origin, from_header, overruled))
 
 
 def _sensor(channel: str, column: str) -> str | None:
@@ -118,7 +119,9 @@ def _incomplete(
     return InputError(f"{rate.problem}, and it {text}", " ".join(codes), mend, rate.values)
 
 
-def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> list[Notice]:
+def _notices(
+    origin: str, from_header: Mapping[str, str], overruled: Mapping[str, str]
+) -> list[Notice]:
     notices = []
     if from_header:
         by_unit = {
@@ -126,10 +129,10 @@ def _notices(from_header: Mapping[str, str], overruled: Mapping[str, str]) -> li
             for unit in dict.fromkeys(from_header.values())
         }
         parts = "; ".join(f"{names} in {unit}" for unit, names in by_unit.items())
-        text = f"units from the names of the columns: {parts}"
+        text = f"units from {origin}: {parts}"
         notices.append(Notice("units-from-names", "note", "", text, from_header))
     if overruled:
         parts = "; ".join(f"{name} in {text}" for name, text in overruled.items())
-        text = f"the names of the columns contradict the units given: {parts}"
+        text = f"the units given contradict {origin}: {parts}"
         notices.append(Notice("units-contradicted", "warning", "", text, overruled))
     return notices

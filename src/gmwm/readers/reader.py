@@ -42,7 +42,7 @@ from gmwm.readers.names import meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
 from gmwm.readers.sentinels import without_sentinels
-from gmwm.readers.table import Table, label
+from gmwm.readers.table import Table, column_of
 
 
 def read(
@@ -234,7 +234,7 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
     if meaning(table.names[time]).seconds is not None:
         return None
     step = float(np.median(np.diff(table.load([time])[time])))
-    return without_unit(table.source, label(table.names, time), step)
+    return without_unit(table.source, column_of(table, time), step)
 
 
 def _load(
@@ -298,7 +298,7 @@ def _timing(
     name, n = table.names[time], arrays[time].size
     clock = Clock(
         source=table.source,
-        column=label(table.names, time),
+        column=column_of(table, time),
         stamps=arrays[time],
         seconds=meaning(name).seconds,
         own_unit=meaning(name).stated,

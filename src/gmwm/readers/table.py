@@ -59,6 +59,12 @@ def label(names: Sequence[str], index: int) -> str:
     return f"{index} (counted from 0)"
 
 
+def column_of(table: Table, index: int) -> str:
+    """How messages call a column, or the stamps of messages that have no columns of their own."""
+    stamps: str = getattr(table, "stamps", "")
+    return stamps or f"column {label(table.names, index)}"
+
+
 def usable(values: FloatArray) -> bool:
     """Whether every value is missing (NaN) or finite and of sane magnitude."""
     return not np.any(np.abs(values) >= LARGEST)

@@ -85,6 +85,9 @@ RATES_AGREE = 0.01
 """Relative difference of two rates that are meant to be the same: sensors' clocks are off by less
 than one per cent, and stated rates are rounded."""
 
+JITTER_SHOWN = 5e-5
+"""Of steps, in sampling intervals: less is the rounding of stamps, and 0.00 % in two decimals."""
+
 MOST_OFF_GRID = 0.01
 """Of the rows, that come a fraction of a step late: more, and the steps are not those of the
 sensor. A logger that restarts does so a few times an hour."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.text import brief
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.estimate import Fit
@@ -110,7 +111,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:
-        share = f"{100.0 * abs(at.worst[0]):.2g} %"
+        share = f"{brief(100.0 * abs(at.worst[0]))} %"
         fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
     return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
@@ -241,7 +242,7 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
         need = calibration.duration * (known[worst] / _AIM) ** 2
         # A curve that ends before the horizon is known there by the model alone.
         covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
-        share = f"{100.0 * known[worst]:.2g} % (1 sigma, {worst})"
+        share = f"{brief(100.0 * known[worst])} % (1 sigma, {worst})"
         if need <= calibration.duration and covered:
             parts.append(
                 f"long enough for {horizon:g} s outages: every curve is known there to {share}"

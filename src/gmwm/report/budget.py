@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import Any
 
+from gmwm._core.text import brief
 from gmwm.calibration import Calibration
 from gmwm.error_budget import (
     FIELD_UNITS,
@@ -15,7 +16,6 @@ from gmwm.error_budget import (
     axis,
     error_budget,
     per_si,
-    short,
 )
 from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
@@ -77,7 +77,7 @@ def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
                     "name": _name(of, quantity),
                     "quantity": quantity,
                     "unit": FIELD_UNITS[quantity],
-                    "values": [short(value) for value in values * per_si(quantity)],
+                    "values": [brief(value, 3) for value in values * per_si(quantity)],
                     "mostly": mostly if share > 0.0 else "",
                     "invalid": bool(invalid & {of, *budget.curves(of, quantity)}),
                 }
@@ -103,7 +103,7 @@ def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
             "component": row.component,
             "quantity": row.quantity,
             "unit": FIELD_UNITS[row.quantity],
-            "values": [short(value * per_si(row.quantity)) for value in row.values],
+            "values": [brief(value * per_si(row.quantity), 3) for value in row.values],
             "invalid": row.channel in invalid,
             "minor": row.quantity != ends[row.channel]
             or bool(row.values[-1] ** 2 < _MINOR * most[row.channel]),
@@ -122,7 +122,7 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
     def lost(budget: ErrorBudget) -> str:
         total = budget.total()
         return " and ".join(
-            f"{short(total[quantity][at] * per_si(quantity))} {FIELD_UNITS[quantity]} of {name}"
+            f"{brief(total[quantity][at] * per_si(quantity), 3)} {FIELD_UNITS[quantity]} of {name}"
             for quantity, name in (("attitude", "tilt"), ("position", "horizontal position"))
             if quantity in total
         )

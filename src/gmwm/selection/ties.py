@@ -68,8 +68,8 @@ def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
         walk = times[longest].named() if longest > 0.0 else "a walk too slow to be resolved"
     return Notice(
         "ramp-or-walk", "note", "",
-        f"a rate ramp of {ramp} or slow noise ({walk}): this record sees it once and does not tell "
-        "them apart, the model has no ramp",
+        f"a rate ramp of {ramp} or slow noise ({walk}): this record cannot tell them apart, "
+        "so the model has no ramp",
         {
             "slope": slope.value,
             "slope_error": float(np.sqrt(slope.variance)),

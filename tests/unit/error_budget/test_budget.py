@@ -24,7 +24,7 @@ from gmwm import (
     WhiteNoise,
     error_budget,
 )
-from gmwm.error_budget.budget import short
+from gmwm._core.text import brief
 from gmwm.process import CATALOGUE
 
 G = 9.80665
@@ -249,12 +249,19 @@ def test_one_term_needs_no_total():
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (0.012345, "0.0123"), (999.4, "999"), (999.6, "1e+03"), (1234.5, "1,230"),
+    [(0.0, "0"), (0.012345, "0.0123"), (999.4, "999"), (999.6, "1,000"), (1234.5, "1,230"),
      (45678.9, "45,700"), (999_900.0, "1,000,000"), (3.2e7, "3.2e+07"), (1.2e-7, "1.2e-07")],
 )  # fmt: skip
 def test_short_numbers(value, text):
-    assert short(value) == text
-    assert len(short(value)) <= 9
+    assert brief(value, 3) == text
+    assert len(brief(value, 3)) <= 9
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(434.0, "430"), (99.4, "99"), (99.6, "100"), (1e9, "1e+09")]
+)
+def test_two_digits_have_no_exponent_where_a_person_writes_none(value, text):
+    assert brief(value) == text
 
 
 def test_to_dict_is_json_and_complete(budget):

@@ -206,8 +206,13 @@ def test_jitter_is_noted(timed):
     jitter = np.random.default_rng(0).uniform(-0.0005, 0.0005, 80)
     recording = read(timed(0.01 * np.arange(80) + jitter, "time_s"), units=UNITS)
     steps = np.diff(0.01 * np.arange(80) + jitter)
-    assert f"vary by {np.std(steps):.3g} s rms" in texts(recording)[0]
-    assert "% of a step" in texts(recording)[0]
+    text = f"vary by {1e6 * np.std(steps):.3g} us rms ({1e4 * np.std(steps):.2f} % of a step)"
+    assert text in texts(recording)[0]
+
+
+def test_jitter_that_is_rounding_is_not_mentioned(timed):
+    (text, *_) = texts(read(timed(0.01 * np.arange(80), "time_s"), units=UNITS))
+    assert text == "time stamps (column 'time_s', seconds) give 100 Hz"
 
 
 def test_a_jump_is_no_jitter(timed):

@@ -9,7 +9,7 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.distributions import fisher
 from gmwm._core.notices import Notice
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.spectral.spectrum import POWER_INFLATION, Spectrum
@@ -84,7 +84,7 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
         amplitude = readable(main.amplitude, unit)
         text = (
             f"a periodic line at {main.frequency:.4g} Hz, amplitude {amplitude}, "
-            f"{main.ratio:.3g} times its surroundings"
+            f"{brief(main.ratio, 3)} times its surroundings"
         )
         if harmonics:
             at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)

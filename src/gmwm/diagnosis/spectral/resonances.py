@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.spectral.spectrum import Bands, Spectrum
@@ -83,7 +83,7 @@ def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
     """Say where it is, how damped and how high."""
     text = (
         f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
-        f"{bump.ratio:.2g} times its surroundings, {readable(bump.sigma, unit)} rms"
+        f"{brief(bump.ratio)} times its surroundings, {readable(bump.sigma, unit)} rms"
     )
     action = "gmwm calibrate adds a Resonance to the model where it is needed"
     numbers = {

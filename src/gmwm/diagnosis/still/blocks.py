@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.text import brief
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.motion import is_moved_with, remembered
@@ -67,7 +68,7 @@ def vibration_notice(recording: Recording) -> Notice | None:
     listed = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest))
     more = f" and {len(stretches) - _LISTED} more" if len(stretches) > _LISTED else ""
     text = (
-        f"it vibrates for {total:.4g} s: samples scatter up to {ratio:.2g} times more than at "
+        f"it vibrates for {total:.4g} s: samples scatter up to {brief(ratio)} times more than at "
         f"rest from {listed}{more}"
     )
     values = {"stretches": len(stretches), "total": total, "ratio": ratio}

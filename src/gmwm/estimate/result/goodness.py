@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.text import wrapped
+from gmwm._core.text import brief, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
@@ -181,7 +181,7 @@ class Goodness:
         if worst is None:
             return ""
         return (
-            f"largest misfit {100.0 * abs(worst[0]):.2g} % of the deviation at tau = "
+            f"largest misfit {brief(100.0 * abs(worst[0]))} % of the deviation at tau = "
             f"{worst[1]:.3g} s (levels of more than {tuning.WELL_KNOWN_DOF:g} degrees of freedom)"
         )
 
@@ -195,7 +195,7 @@ class Goodness:
             self.tau, self.data, self.model, self.misfit, self.residual, self.allowed, self.dof
         )  # fmt: skip
         for tau, data, model, misfit, residual, allowed, dof in zip(*columns, strict=True):
-            share = f"{100.0 * misfit:+.2f} %" if abs(misfit) < 10.0 else f"{100.0 * misfit:+.2g} %"
+            share = f"{100.0 * misfit:+,.{2 if abs(misfit) < 10.0 else 0}f} %"
             lines.append(
                 f"{tau:>10.5g} {data:>14.4g} {model:>14.4g} {share:>9} {residual:>+9.2f} "
                 f"{allowed:>+8.2f} {dof:>8.3g}"

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units
 from gmwm.estimate import tuning
@@ -61,7 +62,7 @@ def missed_level_notices(goodness: Goodness) -> list[Notice]:
     return [
         Notice(
             "level-missed", "bad", "",
-            f"at tau = {tau:.3g} s the data lie {abs(residual):.2g} standard errors {side} the "
+            f"at tau = {tau:.3g} s the data lie {brief(abs(residual))} standard errors {side} the "
             "model: it lacks a term there, or the recording has a fault",
             {"tau": tau, "residual": residual, "p_value": goodness.largest_p},
         )
@@ -211,13 +212,13 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
         return []
     misfit, tau, residual = beyond
     values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
-    share = f"{100.0 * abs(misfit):.2g} %"
+    share = f"{brief(100.0 * abs(misfit))} %"
     if goodness.is_poor:
         side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
         text = f"the data lie {share} {side} the model's Allan deviation"
         if failed or goodness.largest_p < tuning.POOR_P:
             text = f"predictions over {tau:.3g} s are too {scale}: there {text}, by "
-            text += f"{abs(residual):.2g} standard errors"
+            text += f"{brief(abs(residual))} standard errors"
             return [Notice("misfit", "bad", "", text, values)]
         chance = f"{100.0 * goodness.largest_p:.0f} % of right models are missed as clearly"
         text = f"at tau = {tau:.3g} s {text}, which is no more than chance: {chance} somewhere"

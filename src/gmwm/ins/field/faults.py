@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import brief
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
     LEVEL,
@@ -271,7 +272,7 @@ def _signs(fault: Explanation) -> tuple[str, str]:
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
-    share = f"{100.0 * fault.values['fraction']:.2g} %"
+    share = f"{brief(100.0 * fault.values['fraction'])} %"
     return (
         f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
         "leave them out",
@@ -291,7 +292,7 @@ def _coloured(fault: Explanation) -> tuple[str, str]:
 def _fix_noise(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"the fixes are {factor:.2g} times their standard deviations",
+        f"the fixes are {brief(factor)} times their standard deviations",
         f"multiply those by {factor:.2g}",
     )
 
@@ -311,7 +312,7 @@ def _assumed_sd(factor: float, assumed: Notice) -> tuple[str, str]:
 
 def _white(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
-    text = f"white noise is {factor:.2g} times the model's"
+    text = f"white noise is {brief(factor)} times the model's"
     if factor > tuning.NOT_NOISE:
         return text, "vibration adds to it, but look first at units, axes and stamps"
     return (
@@ -324,7 +325,7 @@ def _white(fault: Explanation) -> tuple[str, str]:
 def _slow(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
     return (
-        f"slow errors and biases are {factor:.2g} times the model's",
+        f"slow errors and biases are {brief(factor)} times the model's",
         "the sensor model or the bias is wrong: calibrate again, or give the bias",
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import bullets, made_by, wrapped
+from gmwm._core.text import brief, bullets, made_by, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -224,8 +224,8 @@ class Navigated:
             first = f"accel_z, which points up ({up[0]}), then at " if up else ""
             return Notice(
                 "lost", "bad", "",
-                f"The filter is lost: innovations are {largest:.2g} times as large as it expects, "
-                "and the accuracy that it predicts is not to be believed; look first at "
+                f"The filter is lost: innovations are {brief(largest)} times as large as it "
+                "expects, and the accuracy that it predicts is not to be believed; look first at "
                 f"{first}the heading that it started with, then at the units of the sensors and "
                 "the clock of the fixes.",
                 sizes,
@@ -233,7 +233,7 @@ class Navigated:
         if sizes:
             cause, why = self._cause(sizes)
             shown = " and ".join(
-                f"{size:.2g} times as large{'' if kind == 'all' else f' in {kind}'}"
+                f"{brief(size)} times as large{'' if kind == 'all' else f' in {kind}'}"
                 for kind, size in sizes.items()
             )
             return Notice(

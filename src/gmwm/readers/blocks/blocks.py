@@ -42,6 +42,9 @@ class _Segment:
     rate = property(lambda self: self.whole.rate)
     notices = property(lambda self: self.whole.notices)
 
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.whole, name)
+
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         return {column: self.arrays[column] for column in columns}
 

@@ -17,6 +17,7 @@ from gmwm.readers.clock.jumps import Change, Jumps, find_change, find_jumps, fin
 from gmwm.readers.clock.uneven import Followed, followed
 from gmwm.readers.clock.unit_of_time import UNITS, without_unit
 
+_SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 
@@ -46,7 +47,7 @@ class Timing:
 class Clock:
     """Time stamps of a recording.
 
-    source, column: File and column, for messages.
+    source, column: File and column, for messages, ``"column 't'"``.
     stamps: (n,), in a unit of ``seconds``.
     seconds: The unit, if it is known.
     own_unit: The unit as the header states it.
@@ -66,7 +67,7 @@ class Clock:
     @property
     def place(self) -> str:
         """File and column, at the beginning of messages."""
-        return f"{self.source}, column {self.column}"
+        return f"{self.source}, {self.column}"
 
     def timing(self, expected: float | None = None) -> Timing:
         """Sampling rate over the whole recording, and the jumps.
@@ -155,10 +156,14 @@ class Clock:
                 "leave out the rate to use that of the stamps, or give time=False to ignore them",
             )
         text = (
-            f"time stamps (column {self.column}, {UNITS.get(seconds, self.own_unit)}"
-            f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz; their steps "
-            f"vary by {jitter * step * seconds:.3g} s rms ({jitter:.2%} of a step)"
+            f"time stamps ({self.column}, {UNITS.get(seconds, self.own_unit)}"
+            f"{', inferred from the steps' if guessed else ''}) give {rate:.6g} Hz"
         )
+        if jitter >= tuning.JITTER_SHOWN:
+            far, unit = jitter * step * seconds, "s"
+            if far < _SHORTEST_SHOWN:
+                far, unit = 1e6 * far, "us"
+            text += f"; their steps vary by {far:.3g} {unit} rms ({100.0 * jitter:.2f} % of a step)"
         values = {"rate": rate, "unit": seconds, "jitter": jitter}
         notice = Notice("time-stamps", "note", "", text, values)
         notices = [notice, *self._notices_of_jumps(jumps, seconds)]

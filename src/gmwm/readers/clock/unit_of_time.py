@@ -26,7 +26,7 @@ def without_unit(
 ) -> InputError | None:
     """What stamps without a unit may be, if that is not known: seconds of a sensor are.
 
-    source, column: For the message.
+    source, column: For the message, ``"column 't'"``.
     step: That is usual.
     expected: Rate that is stated but fits no unit, Hz.
     """
@@ -40,8 +40,8 @@ def without_unit(
     )
     each = [f"{rates[unit]:.6g} Hz if they are {UNITS[unit]}" for unit in likely]
     each += [] if expected is None else [f"not the {expected:.6g} Hz stated"]
-    text = ", ".join([f"{source}, column {column}: steps of {step:.6g} without a unit", *each])
-    name = column.strip("'\"") if column[:1] in "'\"" else "time"
+    text = ", ".join([f"{source}, {column}: steps of {step:.6g} without a unit", *each])
+    name = column[8:-1] if column.endswith(("'", '"')) else "time"
     rate, called = (
         (rates[likely[0]], repr(f"{name} [{_SHORT[likely[0]]}]"))
         if likely

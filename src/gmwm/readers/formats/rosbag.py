@@ -13,7 +13,7 @@ from functools import cached_property, partial
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -94,6 +94,12 @@ class BagTable(MessageTable):
     message: Message
     log: bool
     origin: int
+    message_type: ClassVar[str] = "sensor_msgs/Imu"
+
+    @property
+    def stamps(self) -> str:
+        """What the time stamps are, for messages."""
+        return "times of recording" if self.log else "header stamps"
 
     @property
     def source(self) -> str:

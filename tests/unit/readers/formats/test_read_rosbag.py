@@ -25,6 +25,7 @@ from bags import (
     write1,
     write2,
 )
+from gmwm.readers import read_blocks
 from gmwm.readers.names import CANONICAL
 
 X = at_rest()
@@ -48,6 +49,17 @@ def refusal(path, **arguments):
 @pytest.fixture
 def bag1(tmp_path):
     return write1(tmp_path / "static.bag", {"/imu": imu_topic(ROS1, X)})
+
+
+@pytest.mark.parametrize(
+    ("clock", "stamps"), [("header", "header stamps"), ("log", "times of rec")]
+)
+def test_notices_speak_of_messages_and_not_of_columns(bag1, clock, stamps):
+    notices = {each.code: each.text for each in gmwm.read(bag1, clock=clock).notices}
+    assert notices["time-stamps"].startswith(f"time stamps ({stamps}")
+    assert notices["units-from-names"].startswith("units from sensor_msgs/Imu: gyro_x, ")
+    (block,) = read_blocks(bag1, clock=clock)
+    assert {each.code: each.text for each in block.notices}.items() >= notices.items()
 
 
 # -- every way a bag is stored --------------------------------------------------------------------
