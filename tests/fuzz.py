@@ -721,7 +721,7 @@ def run(
             start, outcome, held = time.process_time(), "refused", _peak(begin=True)
             try:
                 outcome = "used" if attempt(name, seed, case, Path(folder)) is None else "refused"
-            except Exception as error:
+            except Exception as error:  # whatever is no InputError is what is looked for
                 outcome = "failed"
                 where = traceback.extract_tb(error.__traceback__)[-1]
                 which = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"

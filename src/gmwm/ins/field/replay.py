@@ -68,6 +68,11 @@ class Replay:
         return self.solution(self.imu.n * self.imu.dt).innovations
 
     @cached_property
+    def track(self) -> Solution:
+        """The solution where fixes are moved along it."""
+        return self.solution(tuning.TRACK_STEP)
+
+    @cached_property
     def standard(self) -> FloatArray:
         """Innovations in their expected standard deviations, (E, 3)."""
         return self.innovations.standard
@@ -114,7 +119,7 @@ class Replay:
         By the velocity of the filter, and by what the accelerometers measure in a second: less
         averages no noise, and the filter's own change of velocity has the noise of the fix in it.
         """
-        track, dt = self.solution(tuning.TRACK_STEP), self.imu.dt
+        track, dt = self.track, self.imu.dt
         total = np.cumsum(np.vstack([np.zeros(3), self.imu.velocity]), axis=0)
         reach = 0.5 * max(abs(seconds), tuning.TRACK_STEP)
         fixes = []
