@@ -155,15 +155,21 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
     return result
 
 
-@compiled()
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
-    """Cumulative sum of ``values - mean``, starting with 0; what pieces add is compensated.
+    """Cumulative sum of ``values - mean``, starting with 0; missing samples (NaN) add nothing."""
+    result = np.empty(values.size + 1)  # numpy asks for large pages, compiled code does not
+    _accumulate(values, mean, result)
+    return result
 
-    Missing samples (NaN) add nothing. Within a piece of 256 samples the sum begins anew, in four of
-    them at a time, since each addition waits for the one before.
+
+@compiled()
+def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
+    """What pieces of 256 samples add is compensated.
+
+    Within a piece the sum begins anew, in four of them at a time, since each addition waits for the
+    one before.
     """
     n = values.size
-    result = np.empty(n + 1)
     result[0] = 0.0
     total, lost = 0.0, 0.0
     whole = n // (4 * _PIECE) * (4 * _PIECE)
@@ -195,7 +201,6 @@ def cumulative(values: FloatArray, mean: float) -> FloatArray:
         lost = (following - total) - y
         total = following
         result[i + 1] = total
-    return result
 
 
 @compiled(fastmath={"reassoc", "contract", "nsz"})
