@@ -203,7 +203,32 @@ def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
         result[i + 1] = total
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=_ANY_ORDER)
+def slope(values: FloatArray, parts: NDArray[np.int64]) -> float:
+    """Of the least-squares lines of one slope through the samples of the parts, per sample.
+
+    values: (n,), NaN where missing.
+    parts: (P,), first sample of each part.
+    """
+    product, square = 0.0, 0.0
+    for part in range(parts.size):
+        start = parts[part]
+        own = values[start : parts[part + 1] if part + 1 < parts.size else values.size]
+        count, total = 0, 0.0
+        for i in range(own.size):
+            there = own[i] == own[i]  # NaN is not
+            count += there
+            total += i if there else 0.0
+        centre = total / max(count, 1)
+        for i in range(own.size):
+            there = own[i] == own[i]
+            place = i - centre if there else 0.0
+            product += place * (own[i] if there else 0.0)
+            square += place * place
+    return product / square if square > 0.0 else 0.0
+
+
+@compiled(fastmath=_ANY_ORDER)
 def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     """Number, and sums of the second and fourth powers, of first differences that exist."""
     count, square, fourth = 0, 0.0, 0.0
@@ -217,7 +242,7 @@ def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     return count, square, fourth
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=_ANY_ORDER)
 def survey(values: FloatArray) -> tuple[int, float, float, float]:
     """Number of missing samples; sum, smallest and largest of the others."""
     missing, total = 0, 0.0
