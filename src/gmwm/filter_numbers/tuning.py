@@ -98,8 +98,11 @@ INERTIA = 1e-3
 
 EVENNESS = 20.0
 """Times the squared logarithm of the NEES at the end of an outage, beside the score there: N+K has
-a NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.76 to 1.09 without, and errors that are 2 %
+a NEES of 0.9 to 1.1 after 10, 30 and 60 s then, of 0.82 to 1.17 without, and errors that are 3 %
 larger on the mean: ``python benchmarks/filter_numbers.py balance``."""
+
+INCONSISTENT = 1.2
+"""NEES per degree of freedom, above which reduced numbers are called too optimistic."""
 
 BELOW = 0.98
 """N over that of the error model, below which reduced numbers say so."""
