@@ -22,7 +22,7 @@ from gmwm.calibration.channel import (
     model_of,
     mostly_missing,
 )
-from gmwm.calibration.judgement import judged
+from gmwm.calibration.judgement import judged, with_one_remedy
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -142,10 +142,12 @@ def _calibrated(
         for notice in each.notices
     ]
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
+    found, advice = with_one_remedy(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
+    issues = [*_each_once(issues), *advice]
     return calibration_of(
         judged(found, issues, still=still),
         dead,
-        with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
+        with_outcomes(issues, chosen, offered if model is None else {}),
         source=", ".join(each.source for each in given),
         rate=given[0].rate,
         n=sum(each.n for each in given),
