@@ -20,6 +20,10 @@ JITTER, LARGE_JITTER = 0.1, 0.3
 LARGEST_OF_SENSOR = 1e6
 """rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
 
+SHARED_FREQUENCY = 0.01
+"""Relative difference of the frequencies of one vibration as several sensors show it: resonances
+near 10 Hz of three accelerometers of one unit differ by 0.6 %."""
+
 MOTION_BLOCK, FEWEST_OF_MOTION = 1.0, 16
 """s, and samples at least, of the means in which motion is looked for: handling is slower, fast
 noise averages out."""

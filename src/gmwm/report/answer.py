@@ -11,6 +11,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import brief
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
+from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Triad
 from gmwm.report.health import findings_of_fits
@@ -71,9 +72,10 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
 
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line."""
-    severe = [n for n in calibration.notices if n.severity == "bad"]
+    found = gathered(calibration.notices)
+    severe = [n for n in found if n.severity == "bad"]
     of_fits = findings_of_fits(calibration)
-    warnings = [n for n in (*of_fits, *calibration.notices) if n.severity == "warning"]
+    warnings = [n for n in (*of_fits, *found) if n.severity == "warning"]
     removed = dict.fromkeys(n.where for n in of_fits if n.values.get("removed"))
     invalid = [name for name, fit in calibration.items() if not fit.valid]
     out = [*invalid, *calibration.skipped]
