@@ -41,6 +41,7 @@ from gmwm.diagnosis.samples import (
     abrupt_end_notice,
     dead_notice,
     gap_notices,
+    hole_notice,
     length_notice,
     repeated_value_notice,
     saturation_notice,
@@ -226,7 +227,8 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     found = [
         held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
         saturation_notice(name, unit, present, noise, step)
-        or abrupt_end_notice(name, unit, noise, step, errors.level),
+        or abrupt_end_notice(name, unit, noise, step, errors.level)
+        or hole_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
