@@ -49,10 +49,10 @@ def without_sentinels(
     width = high - low
     # Codes without a meaning are among the usual ones: a quarter of the samples at most.
     narrow = min(tuning.OF_QUARTILES * (third - first), width) if third > first else width
-    away = np.abs(values - middle)
-    far = np.flatnonzero(away > tuning.FAR_OUTSIDE * narrow)
-    if not far.size:
-        return values, []
+    reach = tuning.FAR_OUTSIDE * narrow
+    if np.fmax.reduce(values) - middle <= reach and middle - np.fmin.reduce(values) <= reach:
+        return values, []  # almost always, without arrays as long as the values
+    far = np.flatnonzero(np.abs(values - middle) > reach)
     numbers, which = np.unique(values[far], return_inverse=True)
     chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])
     chosen &= np.abs(numbers - middle) > tuning.FAR_OUTSIDE * width

@@ -25,7 +25,14 @@ from gmwm.variance.gaps.effects import (
     window_count,
 )
 from gmwm.variance.gaps.filling import Filling, levels_apart
-from gmwm.variance.kernels import FINE, coarse_moments, cumulative, fine_moments, haar_coefficients
+from gmwm.variance.kernels import (
+    FINE,
+    coarse_moments,
+    cumulative,
+    fine_moments,
+    haar_coefficients,
+    slope,
+)
 from gmwm.variance.pilot import pilot_psd
 
 _ROW = 1 << FINE
@@ -193,7 +200,7 @@ class Levels:
     @cached_property
     def slope(self) -> float:
         """Of the least-squares line through the samples that exist, per sample."""
-        return _slope(self.values, self.parts)
+        return slope(self.values, self.parts)
 
     # -- what exists -------------------------------------------------------------------------------
 
@@ -323,14 +330,3 @@ class Levels:
             self.values, self.averaging[-1:], self.slope
         )
         return values, integral
-
-
-def _slope(values: FloatArray, parts: IntArray) -> float:
-    """Of the least-squares lines of one slope through the samples of the parts, per sample."""
-    k = np.flatnonzero(~np.isnan(values))
-    part = np.searchsorted(parts, k, "right") - 1
-    count = np.maximum(np.bincount(part), 1)
-    there = values[k]
-    place = k - (np.bincount(part, k) / count)[part]
-    square = float(place @ place)
-    return float(place @ there / square) if square > 0.0 else 0.0

@@ -27,11 +27,8 @@ def standardised(truth, n, runs, seed, *, omega="model", **options):
     "options",
     [
         {"wavelet": "db2"},
-        {"wavelet": "sym4"},
         {"robust": True},
         {"robust": True, "efficiency": 0.9},
-        {"omega": "diagonal"},
-        {"omega": "identity"},
         {"omega": "data", "data_covariance": "octave"},
         {"omega": "data", "data_covariance": "octave", "wavelet": "db2"},
     ],

@@ -83,6 +83,10 @@ class Serialization:
 ROS1, CDR = Serialization(4, False), Serialization(4, True)
 """The stamp follows a counter in ROS 1, the encapsulation header in ROS 2."""
 
+_LITTLE = 0x0100
+_ORDERS = {0x0000: ">", _LITTLE: "<"}
+"""Byte order of plain CDR, by the two bytes of its encapsulation header as a small number."""
+
 
 def decode(
     raw: Sequence[bytes],
@@ -115,43 +119,38 @@ def decode(
     """
     n = len(raw)
     sizes = np.fromiter(map(len, raw), np.int64, n)
-    short = np.flatnonzero(sizes < serialization.text)
-    if short.size:
-        raise _cut_off(where(int(short[0])))
+    if np.min(sizes) < serialization.text:
+        raise _cut_off(where(int(np.argmax(sizes < serialization.text))))
     joined = np.frombuffer(b"".join(raw), np.uint8)
     starts = np.cumsum(sizes) - sizes
-    is_even = bool(np.all(sizes == sizes[0]))  # as a topic is, almost always: no copies
-    text = np.arange(serialization.text)
-    head = joined.reshape(n, -1)[:, : text.size] if is_even else joined[starts[:, None] + text]
-    is_big = np.zeros(n, dtype=bool)
-    if serialization.is_cdr:
-        is_big = head[:, 1] == 0
-        foreign = np.flatnonzero((head[:, 0] != 0) | (head[:, 1] > 1))
-        if foreign.size:
-            row = int(foreign[0])
-            raise InputError(
-                f"{where(row)}: encoding 0x{head[row, :2].tobytes().hex()} is not plain CDR: "
-                "record with a usual RMW, or convert the bag with ros2 bag convert"
-            )
-    length = np.ascontiguousarray(head[:, -4:])
-    frames = length.view("<u4")[:, 0].astype(np.int64)
-    if np.any(is_big):
-        frames[is_big] = length.view(">u4")[is_big, 0]
+    if np.all(sizes == sizes[0]):  # as a topic is, almost always: no copies
+        head = joined.reshape(n, -1)
+    else:
+        head = joined[starts[:, None] + np.arange(serialization.text)]
+    codes = _field(head, 0, "<u2") if serialization.is_cdr else np.full(n, _LITTLE)
+    frames = _field(head, serialization.text - 4, "<u4")
     stamps = np.empty(n, np.int64)
     numbers = [np.empty(n) for _ in wanted]
     left = np.ones(n, dtype=bool)
-    while np.any(left):  # once: a topic has one frame_id, almost always
+    while np.any(left):  # once: a topic has one encoding and one frame_id, almost always
         first = int(np.argmax(left))
-        size, frame = int(sizes[first]), int(frames[first])
-        alike = (sizes == size) & (frames == frame) & (is_big == is_big[first])
-        offset, order = serialization.offset(frame), ">" if is_big[first] else "<"
-        if offset + 8 * message.count > size:
-            raise _cut_off(where(first))
-        rows = slice(None) if np.all(alike) else np.flatnonzero(alike)
-        if isinstance(rows, slice):
+        size, code = int(sizes[first]), int(codes[first])
+        if code not in _ORDERS:
+            raise InputError(
+                f"{where(first)}: encoding 0x{code.to_bytes(2, 'little').hex()} is not plain CDR: "
+                "record with a usual RMW, or convert the bag with ros2 bag convert"
+            )
+        order = _ORDERS[code]
+        alike = (sizes == size) & (codes == code) & (frames == frames[first])
+        if np.all(alike):
+            rows: slice | _Integers = slice(None)
             block = joined.reshape(n, size)
         else:
+            rows = np.flatnonzero(alike)
             block = joined[starts[rows][:, None] + np.arange(size)]
+        offset = serialization.offset(int(_field(block, serialization.text - 4, f"{order}u4")[0]))
+        if offset + 8 * message.count > size:
+            raise _cut_off(where(first))
         # Seconds after 2038 are unsigned in ROS 1, and in ROS 2 as drivers write them.
         seconds = _field(block, serialization.stamp, f"{order}u4").astype(np.int64)
         stamps[rows] = seconds * 10**9 + _field(block, serialization.stamp + 4, f"{order}u4")
