@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.runs import shared
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import (
@@ -164,7 +164,7 @@ def _clock(recording: Recording) -> list[Notice]:
     if jitter is None or jitter < tuning.JITTER:
         return []
     severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
-    text = f"the steps of the time stamps vary by {brief(100.0 * jitter)} % rms"
+    text = f"the steps of the time stamps vary by {per_cent(jitter)} rms"
     action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
     return [Notice("clock", severity, "", text, {"jitter": jitter}, action)]
 
