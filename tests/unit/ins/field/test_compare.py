@@ -23,6 +23,12 @@ def drive():
     return emulated_log(21, duration=500.0, rate=20.0)
 
 
+@pytest.fixture(scope="module")
+def alike(drive):
+    """Two equal models and one that is nearly so."""
+    return compare(drive[0], {"a": sensors(), "b": sensors(), "c": sensors(slow=1.01)})
+
+
 def replay_of(log):
     alignment = align(log.imu, log.aiding, log.sensors)
     return Replay.of(log, alignment), alignment
@@ -103,20 +109,18 @@ def test_a_tie_names_the_models_whose_own_prediction_is_contradicted(drive):
     )
 
 
-def test_equal_models_are_a_tie(drive):
-    found = compare(drive[0], {"a": sensors(), "b": sensors(), "c": sensors(slow=1.01)})
-    assert found.verdict.code == "tie"
-    assert found.pairs["a", "b"].ratio == 1.0
-    assert 0.0 < found.resolved < 1.0
+def test_equal_models_are_a_tie(alike):
+    assert alike.verdict.code == "tie"
+    assert alike.pairs["a", "b"].ratio == 1.0
+    assert 0.0 < alike.resolved < 1.0
 
 
-def test_what_does_not_matter_is_a_tie_however_sure_it_is(drive):
+def test_what_does_not_matter_is_a_tie_however_sure_it_is(alike):
     """A hundred outages, models that are 0.045 apart in score and 1.7 % in error: less than counts.
 
     The level is that at the margin, 0.05 and 2 %, which these are below.
     """
-    found = compare(drive[0], {"a": sensors(), "b": sensors(slow=1.01)})
-    outcome = found.outcomes["a"]
+    outcome = alike.outcomes["a"]
     rng = np.random.default_rng(7)
     named = {"better": 0, "more-honest": 0, "tie": 0}
     for _ in range(150):
@@ -127,18 +131,17 @@ def test_what_does_not_matter_is_a_tie_however_sure_it_is(drive):
         apart = rng.normal(0.045, 0.1, 100)
         b = replace(outcome, error=other, score=score + apart, reference_variance=none)
         pairs = {("a", "b"): paired(a, b, np.ones(3)), ("b", "a"): paired(b, a, np.ones(3))}
-        named[replace(found, outcomes={"a": a, "b": b}, pairs=pairs).verdict.code] += 1
+        named[replace(alike, outcomes={"a": a, "b": b}, pairs=pairs).verdict.code] += 1
     assert named["better"] <= binom.isf(1e-4, 150, tuning.ACCURACY_LEVEL)
     assert named["more-honest"] <= binom.isf(1e-4, 150, tuning.SCORE_LEVEL)
 
 
-def test_intervals_of_few_outages_cover_what_they_claim(drive):
+def test_intervals_of_few_outages_cover_what_they_claim(alike):
     """Outages whose errors differ by a factor of 1.4, 1 sigma, and models that are nearly alike.
 
     By the delta method 91 % were covered.
     """
-    found = compare(drive[0], {"a": sensors(), "b": sensors(slow=1.01)})
-    outcome, none = found.outcomes["a"], np.zeros(3)
+    outcome, none = alike.outcomes["a"], np.zeros(3)
     rng, runs, inside = np.random.default_rng(17), 3000, 0
     for _ in range(runs):
         sd = np.exp(0.35 * rng.standard_normal((8, 3)))

@@ -249,7 +249,7 @@ def test_the_command_writes_the_solution_and_a_report(run):
     assert "levelled on 20.2 s at rest, from 0 s on; the gyros" in page
 
 
-def test_the_command_without_a_file(run):
+def test_the_command_without_a_file(run, no_pages):
     drive(Path())
     calibrated = yaml.safe_dump(content(imu="imu.csv"))
     Path("run.yaml").write_text(calibrated)
