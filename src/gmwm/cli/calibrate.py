@@ -245,6 +245,8 @@ def show(result: Calibration) -> None:
     }
     shown = [each for each in result.notices if (each.where, each.code) not in reasons]
     found = [each for each in worst_first(gathered(shown)) if _is_shown(each)]
+    counted = {each.where for each in found if each.code == "event"}  # with their samples
+    found = [e for e in found if e.code != "events-left-out" or e.where not in counted]
     found = [*(each for each in shown if each.code == LONGEST_PART), *found]
     remarks = [str(with_option(each)) for each in found]
     remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]

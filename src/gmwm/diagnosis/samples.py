@@ -11,7 +11,7 @@ import numpy as np
 from gmwm._core.distributions import binom
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 from gmwm.readers import Channel
@@ -92,18 +92,27 @@ def is_dithered(values: FloatArray, step: float) -> bool:
     values: (n,), samples in their order, none missing.
     step: To which they are rounded, u; 0 if they are not.
     """
-    lengths = run_lengths(values)
-    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
-    steps = np.abs(np.diff(values))[free[1:] & free[:-1]]
-    if steps.size < tuning.LONG_RUN:
+    free = _outside_runs(run_lengths(values))
+    free = free[1:] & free[:-1]
+    count = np.count_nonzero(free)
+    if count < tuning.LONG_RUN:
         return False
-    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > tuning.DITHERED
+    if step == 0.0:
+        return True
+    steps = np.diff(values)
+    far = free & (np.abs(steps, out=steps) > 1.5 * step)
+    return bool(np.count_nonzero(far) > tuning.DITHERED * count)
+
+
+def _outside_runs(lengths: IntArray) -> BoolArray:
+    """Of each sample, whether it is in none of the long runs."""
+    return np.repeat(lengths < tuning.LONG_RUN, lengths)
 
 
 def run_lengths(values: FloatArray) -> IntArray:
     """Lengths of the runs of equal samples, in their order."""
-    changes = np.flatnonzero(np.diff(values) != 0.0) + 1
-    return np.diff(np.concatenate([[0], changes, [values.size]]))
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    return np.diff(changes, prepend=0, append=values.size)
 
 
 def stuck_notice(
@@ -121,8 +130,8 @@ def stuck_notice(
     values: (n,), samples, NaN where missing.
     step: u; 0 if samples are not rounded.
     """
-    present = np.flatnonzero(~np.isnan(values))
-    series = values[present]
+    present = ~np.isnan(values)
+    series = known_of(values)
     if not is_dithered(series, step):
         return None
     lengths = run_lengths(series)
@@ -130,15 +139,15 @@ def stuck_notice(
     stuck = np.flatnonzero(lengths > longest)
     if not stuck.size:
         return None
-    starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
     worst = int(stuck[np.argmax(lengths[stuck])])
     total = int(np.sum(lengths[stuck]))
     share = total / series.size
+    start = int(np.sum(lengths[:worst]))
     numbers = {
         "count": float(stuck.size),
         "longest": float(lengths[worst]),
-        "time": float(present[starts[worst]]) * dt,
-        "value": float(series[starts[worst]]),
+        "time": float(np.flatnonzero(present)[start]) * dt,
+        "value": float(series[start]),
         "samples": float(total),
     }
     value = readable(numbers["value"], unit, digits=5)
@@ -153,13 +162,15 @@ def stuck_notice(
     )
 
 
-def _scale_between(errors: Innovations, present: IntArray, lengths: IntArray) -> float:
+def _scale_between(errors: Innovations, present: BoolArray, lengths: IntArray) -> float:
     """Usual standard deviation of prediction errors outside long runs."""
-    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
-    kept = present[free]
-    kept = kept[errors.known[kept]]
-    sizes = errors.values[kept]
-    return float(np.sqrt(np.median(errors.scale[kept]) * np.std(sizes))) if kept.size else 0.0
+    kept = present.copy()
+    kept[present] = _outside_runs(lengths)
+    kept &= errors.known
+    if not np.any(kept):
+        return 0.0
+    usual = np.median(errors.scale[kept], overwrite_input=True)
+    return float(np.sqrt(usual * np.std(errors.values[kept])))
 
 
 def _longest_by_chance(n: int, step: float, scale: float) -> int:

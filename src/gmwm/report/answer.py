@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
@@ -100,7 +100,8 @@ def verdict(calibration: Calibration) -> dict[str, str]:
 
 
 def _counted(notices: list[Notice], word: str) -> str:
-    where = ", ".join(dict.fromkeys(notice.where for notice in notices if notice.where))
+    places = (place for notice in notices for place in notice.where.split(", ") if place)
+    where = ", ".join(dict.fromkeys(places))
     count = f"{len(notices)} {word}{'s' if len(notices) > 1 else ''}"
     return f"{count} ({where})" if where else count
 
@@ -113,7 +114,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:
-        share = f"{brief(100.0 * abs(at.worst[0]))} %"
+        share = f"{per_cent(abs(at.worst[0]))}"
         fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
     return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
@@ -244,7 +245,7 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
         need = calibration.duration * (known[worst] / _AIM) ** 2
         # A curve that ends before the horizon is known there by the model alone.
         covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
-        share = f"{brief(100.0 * known[worst])} % (1 sigma, {worst})"
+        share = f"{per_cent(known[worst])} (1 sigma, {worst})"
         if need <= calibration.duration and covered:
             parts.append(
                 f"long enough for {horizon:g} s outages: every curve is known there to {share}"

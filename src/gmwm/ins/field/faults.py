@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief
+from gmwm._core.text import brief, per_cent
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
     LEVEL,
@@ -241,7 +241,7 @@ def _drift(fault: Explanation) -> tuple[str, str]:
 
 def _scale(fault: Explanation) -> tuple[str, str]:
     parts = ", ".join(
-        f"{100.0 * fault.values[axis]:.2g} % {axis} ({100.0 * fault.errors[axis]:.1g})"
+        f"{per_cent(fault.values[axis])} {axis} ({per_cent(fault.errors[axis], 1)})"
         for axis in ("x", "y", "z")
     )
     text = f"the scale is wrong by {parts}, standard errors in brackets"
@@ -311,7 +311,7 @@ def _signs(fault: Explanation) -> tuple[str, str]:
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
-    share = f"{brief(100.0 * fault.values['fraction'])} %"
+    share = f"{per_cent(fault.values['fraction'])}"
     return (
         f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
         "leave them out",
