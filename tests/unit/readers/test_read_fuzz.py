@@ -145,7 +145,7 @@ def check(outcome, path):
     assert all(str(notice).isprintable() for notice in outcome.notices)
 
 
-@thorough
+@settings(thorough, max_examples=100)  # those below ask more of files of the same kind
 @given(data=mutated(), compress=st.booleans(), rate=st.sampled_from([None, 100.0]))
 def test_text(folder, data, compress, rate):
     path = folder / ("a.csv.gz" if compress else "a.csv")

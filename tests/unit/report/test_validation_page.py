@@ -29,7 +29,7 @@ def test_the_page_needs_no_network_and_is_the_same_each_time(tmp_path, made_up):
 
 
 def test_sentences_say_who_knows_how_good_it_is(tmp_path, made_up):
-    found = made_up(outages=((20, 10),), runs=400)
+    found = made_up(outages=((20, 10),), runs=150)
     text = text_of(write_validation_report(found, tmp_path / "a.html"))
     assert (
         "At the end of the outage, right shows no contradiction between its position errors and "
