@@ -1,7 +1,9 @@
 """What every test runs under."""
 
+import gc
 import os
 import sys
+from pathlib import Path
 
 # Before numpy is imported: as many workers as cores, each with threads of its own, wait for each
 # other more than they compute.
@@ -20,6 +22,15 @@ sys.dont_write_bytecode = False
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile("fixed")
+
+
+# A fifth of the time went into looking again and again for garbage among all that was imported.
+gc.set_threshold(50_000, 20, 20)
+
+
+def pytest_collection_finish():
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture
@@ -41,3 +52,18 @@ def run(monkeypatch, capsys, tmp_path):
         return code, *capsys.readouterr()
 
     return _run
+
+
+@pytest.fixture
+def no_pages(monkeypatch):
+    """Pages take most of the time of a command: tests that do not look at one go without."""
+    from gmwm.calibration.calibration import Calibration
+    from gmwm.ins.field.navigated import Navigated
+    from gmwm.ins.montecarlo.validation import Validation
+
+    def empty(self, path, *_, **__):
+        Path(path).touch()
+        return path
+
+    for each in (Calibration, Navigated, Validation):
+        monkeypatch.setattr(each, "report", empty)

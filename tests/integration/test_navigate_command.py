@@ -1,6 +1,7 @@
 """``gmwm navigate``: what it prints and writes, and how it refuses what it cannot use."""
 
 import re
+import shutil
 from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
@@ -8,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from click.testing import CliRunner
 
 from gmwm import WhiteNoise
 from gmwm.calibration.calibration import Calibration
+from gmwm.cli.main import cli
 from gmwm.estimate.entrance import fit
 from gmwm.ins.imu.sensors import AXES
 from gmwm.readers.recording import Channel
@@ -57,34 +60,48 @@ def calibration(path, axes=AXES):
     return path
 
 
-def test_a_study_prints_tables_and_writes_a_report(run):
-    code, printed, told = run(written(), "--jobs", 1)
-    assert (code, told) == (0, "")
-    table = Path("gmwm-navigate/validation.txt").read_text()
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory):
+    """What the standard study printed, and its folder, which stays as it is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("studied"))
+        done = CliRunner().invoke(cli, ["navigate", written(), "-o", "a", "--jobs", "1"])
+        assert (done.exit_code, done.stderr) == (0, "")
+        yield done.stdout, Path("a").resolve()
+
+
+def test_a_study_prints_tables_and_writes_a_report(studied):
+    printed, folder = studied
+    table = (folder / "validation.txt").read_text()
     assert printed.startswith(table)
     assert table.startswith("car: 30 s at 20 Hz, 2 runs, seed 0\n")
     for block in ("Errors after 6 s without GNSS, at 24 s", "NEES per", "Innovations", "against"):
         assert block in table
     assert max(map(len, table.splitlines())) <= 80
-    page = Path("gmwm-navigate/validation.html").read_text()
+    page = (folder / "validation.html").read_text()
     assert "<b>big" not in page
     assert "&lt;b&gt;big" in page
 
 
-def test_the_same_seed_gives_the_same_files_and_another_does_not(run):
+def test_the_same_seed_gives_the_same_files(run, studied):
     written()
-    files = [Path("a/validation.txt"), Path("a/validation.html")]
-    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 3)
-    first = [path.read_bytes() for path in files]
-    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 3)
-    assert [path.read_bytes() for path in files] == first
-    run("study.yaml", "-o", "a", "--jobs", 1, "--seed", 4)
-    assert files[0].read_bytes() != first[0]
+    shutil.copytree(studied[1], "a")
+    run("study.yaml", "-o", "a", "--jobs", 1)
+    for path in (Path("a/validation.txt"), Path("a/validation.html")):
+        assert path.stat().st_mtime_ns > (studied[1] / path.name).stat().st_mtime_ns
+        assert path.read_bytes() == (studied[1] / path.name).read_bytes()
 
 
-def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run):
+def test_another_seed_gives_another_table(run, studied, no_pages):
+    run(written(), "-o", "a", "--jobs", 1, "--seed", 4)
+    rows = [(f / "validation.txt").read_text().splitlines()[1:] for f in (Path("a"), studied[1])]
+    assert rows[0] != rows[1]
+
+
+def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, studied, no_pages):
+    first, folder = studied
     written()
-    _, first, _ = run("study.yaml", "-o", "a", "--jobs", 1)
+    shutil.copytree(folder, "a")
     stamps = {path: path.stat().st_mtime_ns for path in Path("a/runs").iterdir()}
     code, again, _ = run("study.yaml", "-o", "a", "--jobs", 1, "--resume")
     assert code == 0
@@ -97,7 +114,7 @@ def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run):
     assert Path("a/validation.txt").read_text() == without_time(first) + "\n"
 
 
-def test_options_go_before_the_file(run):
+def test_options_go_before_the_file(run, no_pages):
     written(runs=50, duration=4000)
     code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 1, "--duration", 20, "--seed", 7,
                            "--outage", "8:4", "--filter", "only=truth", "--trajectory",
@@ -108,7 +125,7 @@ def test_options_go_before_the_file(run):
     assert "big" not in printed
 
 
-def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run):
+def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_pages):
     code, printed, _ = run(written(rate=None), "--rate", 10, "--runs", 1, "--jobs", 1)
     assert code == 0
     assert printed.startswith("car: 30 s at 10 Hz")
@@ -116,7 +133,7 @@ def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run):
     assert (code, "is about reading --imu, and there is none" in told) == (2, True)
 
 
-def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run):
+def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_pages):
     folder = Path("deep/er")
     folder.mkdir(parents=True)
     calibration(folder / "cal.json")
@@ -130,7 +147,7 @@ def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run):
     assert "cal.json: cannot be read" in told
 
 
-def test_a_study_from_options_alone(run):
+def test_a_study_from_options_alone(run, no_pages):
     calibration(Path("cal.json"))
     code, printed, _ = run("--trajectory", "car", "--duration", 15, "--truth", "cal.json",
                            "--filter", "A=truth", "--runs", 1, "--jobs", 1)  # fmt: skip
@@ -138,7 +155,7 @@ def test_a_study_from_options_alone(run):
     assert printed.startswith("car: 15 s at 100 Hz, 1 run, seed 0\n")
 
 
-def test_a_logged_trajectory(run):
+def test_a_logged_trajectory(run, no_pages):
     t = np.arange(0.0, 30.1, 0.1)
     rows = np.stack([t, 46 + 1e-4 * t, 7 + 0 * t, 400 + 0 * t, 0 * t, 0 * t, 0 * t], axis=-1)
     header = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
@@ -348,9 +365,8 @@ class _References(HTMLParser):
         ]
 
 
-def test_the_report_needs_no_network(run):
-    run(written(), "--jobs", 1)
-    text = Path("gmwm-navigate/validation.html").read_text()
+def test_the_report_needs_no_network(studied):
+    text = (studied[1] / "validation.html").read_text()
     page = _References()
     page.feed(text)
     assert all(each.startswith("#") for each in page.found)

@@ -52,6 +52,11 @@ def brief(value: float, digits: int = 2) -> str:
     return f"{float(text):,.0f}" if "e+" in text and abs(value) < _HUGE else text
 
 
+def per_cent(share: float, digits: int = 2) -> str:
+    """A share with its sign: ``118 %``."""
+    return f"{brief(100.0 * share, digits)} %"
+
+
 def bullets(items: Iterable[object]) -> list[str]:
     """Lines of texts or notices, each after a hyphen."""
     return [line for each in items for line in wrapped(str(each), first="- ", indent=2)]

@@ -8,6 +8,7 @@ from gmwm.calibration.departures import (
     departures as departures,
 )
 from gmwm.calibration.entrance import calibrate as calibrate
+from gmwm.calibration.judgement import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage

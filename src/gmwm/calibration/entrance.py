@@ -22,7 +22,7 @@ from gmwm.calibration.channel import (
     model_of,
     mostly_missing,
 )
-from gmwm.calibration.judgement import judged
+from gmwm.calibration.judgement import judged, with_one_remedy
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -130,45 +130,25 @@ def _calibrated(
         name: next((e.extra[name] for e in treated if e.extra.get(name)), ()) for name in alive
     }
     robust = frozenset[str]().union(*(each.robust for each in treated))
-    found: dict[str, ChannelModel | Notice] = {}
-
-    def report(name: str) -> None:
-        if progress is not None:
-            progress(len(found), len(alive), name)
-
-    def begun() -> Iterator[_Channel]:
-        # Each term offered doubles the candidates: those that take longest are not begun last.
-        for name in sorted(alive, key=lambda each: -len(offered[each])):
-            report(name)
-            yield _Channel(
-                name,
-                alive[name],
-                name in robust,
-                models[name],
-                sources[name],
-                offered[name],
-                tuning.REMOVALS if remove_departures else 0,
-            )
-
-    for channel, (one, watch) in shared(_Channel.model_found, begun()):
-        found[channel.name] = one
-        if (running := current()) is not None:
-            for name, elapsed in watch.elapsed.items():
-                running.add(name, elapsed, watch.worked[name])
-    report("")
-    found = {name: found[name] for name in alive}
-    source = ", ".join(each.source for each in given)
+    removals = tuning.REMOVALS if remove_departures else 0
+    channels = [
+        _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
+        for name, parts in alive.items()
+    ]
+    found = _models_found(channels, progress)
     issues = [
         replace(notice, source=each.recording.source) if len(given) > 1 else notice
         for each in treated
         for notice in each.notices
     ]
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
+    found, advice = with_one_remedy(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
+    issues = [*_each_once(issues), *advice]
     return calibration_of(
         judged(found, issues, still=still),
         dead,
-        with_outcomes(_each_once(issues), chosen, offered if model is None else {}),
-        source=source,
+        with_outcomes(issues, chosen, offered if model is None else {}),
+        source=", ".join(each.source for each in given),
         rate=given[0].rate,
         n=sum(each.n for each in given),
         left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
@@ -202,6 +182,31 @@ class _Channel:
                 removals=self.removals,
             )
         return found, watch
+
+
+def _models_found(
+    channels: Sequence[_Channel], progress: Progress | None
+) -> dict[str, ChannelModel | Notice]:
+    """The model of each channel, or why it has none; shared with the processes beside."""
+    found: dict[str, ChannelModel | Notice] = {}
+
+    def report(name: str) -> None:
+        if progress is not None:
+            progress(len(found), len(channels), name)
+
+    def begun() -> Iterator[_Channel]:
+        # Each term offered doubles the candidates: those that take longest are not begun last.
+        for channel in sorted(channels, key=lambda each: -len(each.offered)):
+            report(channel.name)
+            yield channel
+
+    for channel, (one, watch) in shared(_Channel.model_found, begun()):
+        found[channel.name] = one
+        if (running := current()) is not None:
+            for name, elapsed in watch.elapsed.items():
+                running.add(name, elapsed, watch.worked[name])
+    report("")
+    return {channel.name: found[channel.name] for channel in channels}
 
 
 def _recordings(given: Any) -> list[Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from gmwm._core.notices import Notice
 from gmwm.calibration.channel import ChannelModel
@@ -29,6 +30,64 @@ _SPOILING_CHANNEL = frozenset(
     }
 )
 """Codes of issues of a channel that make its fit invalid where they are bad."""
+
+
+LONGEST_PART = "longest-part"
+"""Code of the advice for a recording with several departures from noise."""
+
+
+def with_one_remedy(
+    found: Mapping[str, ChannelModel | Notice], length: float
+) -> tuple[dict[str, ChannelModel | Notice], list[Notice]]:
+    """Models whose departures have one remedy together, where there are several, and that.
+
+    length: Of a single recording, s; 0 for several.
+    """
+    models = [each for each in found.values() if not isinstance(each, Notice)]
+    departed = [n for each in models for n in each.fit.notices if n.code in _CUT and _is_cut(n)]
+    if not length or len(departed) < 2:
+        return {**found}, []
+    spans = sorted(_CUT[each.code](each.values) for each in departed)
+    parts, free = [], 0.0
+    for start, stop in [*spans, (length, length)]:
+        parts.append((start - free, free, start))
+        free = max(free, stop)
+    kept, start, stop = max(parts)
+    removable = all(each.values["removable"] for each in departed)
+    values = {"start": start, "stop": stop, "of": length, "removable": removable}
+    text = (
+        f"the longest part without the {len(departed)} steps and drifts is {kept:,.0f} s of "
+        f"{length:,.0f} s, from {start:.6g} s to {stop:.6g} s"
+    )
+    action = "calibrate that part"
+    if removable:
+        action += ", or take them off, which keeps all (remove_departures=True)"
+
+    def together(notice: Notice) -> Notice:
+        if notice not in departed:
+            return notice
+        values = {**notice.values, "together": True}
+        return replace(notice, values=values, action="as advised for the whole recording")
+
+    alike = {
+        name: each
+        if isinstance(each, Notice)
+        else replace(each, fit=replace(each.fit, notices=tuple(map(together, each.fit.notices))))
+        for name, each in found.items()
+    }
+    return alike, [Notice(LONGEST_PART, "note", "", text, values, action)]
+
+
+_CUT: dict[str, Callable[[Mapping[str, Any]], tuple[float, float]]] = {
+    "step": lambda values: (values["time_lower"], values["time_upper"]),
+    "transient": lambda values: (0.0, 3.0 * values["time_upper"]),
+    "drift-at-start": lambda values: (0.0, values["time_upper"]),
+}
+"""Code of a departure -> what a part without it leaves out, s."""
+
+
+def _is_cut(notice: Notice) -> bool:
+    return bool(notice.severity != "note" and notice.values["evident"])
 
 
 def judged(

@@ -228,6 +228,8 @@ def _recordings(
 
 def show(result: Calibration) -> None:
     from gmwm._core.notices import worst_first
+    from gmwm.calibration import LONGEST_PART
+    from gmwm.diagnosis import gathered
     from gmwm.estimate.result import JointFit
     from gmwm.report import duration_text
 
@@ -242,7 +244,11 @@ def show(result: Calibration) -> None:
         if notice.severity == "bad"
     }
     shown = [each for each in result.notices if (each.where, each.code) not in reasons]
-    remarks = [str(with_option(each)) for each in worst_first(shown) if _is_shown(each)]
+    found = [each for each in worst_first(gathered(shown)) if _is_shown(each)]
+    counted = {each.where for each in found if each.code == "event"}  # with their samples
+    found = [e for e in found if e.code != "events-left-out" or e.where not in counted]
+    found = [*(each for each in shown if each.code == LONGEST_PART), *found]
+    remarks = [str(with_option(each)) for each in found]
     remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):

@@ -59,6 +59,8 @@ def in_options(calibration: Calibration) -> Calibration:
 
 def with_option(notice: Notice) -> Notice:
     """A notice with the options that do what it advises."""
+    from gmwm.calibration import LONGEST_PART
+
     values = notice.values
     if notice.code == "sd-assumed":
         return replace(notice, action=f"give --{notice.where}-sd")
@@ -71,7 +73,12 @@ def with_option(notice: Notice) -> Notice:
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
         return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
-    if notice.severity == "note" or not values.get("evident"):
+    if notice.code == LONGEST_PART:
+        ends = {"start": 0.0, "stop": values["of"]}
+        cut = " ".join(f"--{k} {values[k]:.6g}" for k, end in ends.items() if values[k] != end)
+        action = cut + ", or --remove-departures, which keeps all" * values["removable"]
+        return replace(notice, action=action)
+    if notice.severity == "note" or not values.get("evident") or values.get("together"):
         return notice
     first, last = values["time_lower"], values["time_upper"]
     cut = {

@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, brief, bullets, made_by, wrapped
+from gmwm._core.text import Printed, brief, bullets, made_by, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -46,7 +46,7 @@ _NAMES = {"short": "short times", "R": "drift"}
 
 def percent(share: float) -> str:
     """A relative difference; a factor from one on."""
-    return f"{brief(100.0 * share)} %" if share < 0.995 else f"a factor of {brief(1.0 + share)}"
+    return f"{per_cent(share)}" if share < 0.995 else f"a factor of {brief(1.0 + share)}"
 
 
 def _reason(notice: Notice) -> str:

@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.runs import shared
-from gmwm._core.text import brief
-from gmwm._core.typing import BoolArray, Progress, known_of
+from gmwm._core.text import per_cent
+from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import (
+    Tails,
     contamination,
     contamination_notice,
     heavy_tails,
@@ -40,6 +41,7 @@ from gmwm.diagnosis.samples import (
     abrupt_end_notice,
     dead_notice,
     gap_notices,
+    hole_notice,
     length_notice,
     repeated_value_notice,
     saturation_notice,
@@ -162,7 +164,7 @@ def _clock(recording: Recording) -> list[Notice]:
     if jitter is None or jitter < tuning.JITTER:
         return []
     severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
-    text = f"the steps of the time stamps vary by {brief(100.0 * jitter)} % rms"
+    text = f"the steps of the time stamps vary by {per_cent(jitter)} rms"
     action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
     return [Notice("clock", severity, "", text, {"jitter": jitter}, action)]
 
@@ -199,37 +201,17 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     dead = dead_notice(channel)
     if dead is not None or channel.missing == channel.n:
         return _Examined([dead] if dead else [], ChannelHealth(), None)
-    infinite = int(np.count_nonzero(np.isinf(values)))
-    if infinite:
-        text = f"{infinite:,} infinite samples"
-        repair = "repair them, or set them to NaN for missing"
-        return _Examined(
-            [Notice("infinite", "bad", name, text, action=repair)], ChannelHealth(), None
-        )
-    if not channel.is_of_a_sensor:
-        text = f"varies by {channel.spread:.1g} {unit}, as no sensor does"
-        return _Examined(
-            [Notice("size", "bad", name, text, {"spread": channel.spread}, "check the unit")],
-            ChannelHealth(),
-            None,
-        )
+    unusable = _unusable(channel)
+    if unusable is not None:
+        return _Examined([unusable], ChannelHealth(), None)
     present = known_of(values)
     step = step_size(present)
     errors = innovations(values, step)
     if errors is None:
         text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
-        return _Examined(
-            [Notice("length", "warning", name, text, action="record longer")],
-            ChannelHealth(lsb=step),
-            None,
-        )
-    events = find_events(errors)
-    outliers = contamination(errors, events)
-    tails = heavy_tails(errors) if outliers > 0.0 else None
-    if tails is not None:
-        events, outliers = find_events(errors, tails), 0.0
-    elif outliers > 0.0:
-        events = with_single_outliers(events, errors, values, step)
+        short = Notice("length", "warning", name, text, action="record longer")
+        return _Examined([short], ChannelHealth(lsb=step), None)
+    events, outliers, tails = _events(errors, values, step)
     events = motion.joined(events, dt)
     usable = errors.known.copy()
     quiet = values.copy() if events else values
@@ -245,7 +227,8 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     found = [
         held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
         saturation_notice(name, unit, present, noise, step)
-        or abrupt_end_notice(name, unit, noise, step, errors.level),
+        or abrupt_end_notice(name, unit, noise, step, errors.level)
+        or hole_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
@@ -273,6 +256,35 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         noise=level,
     )
     return _Examined(notices, facts, standardized)
+
+
+def _unusable(channel: Channel) -> Notice | None:
+    """Why there is nothing to examine in a channel, if so."""
+    name, unit = channel.name, channel.unit
+    infinite = int(np.count_nonzero(np.isinf(channel.values)))
+    if infinite:
+        text = f"{infinite:,} infinite samples"
+        return Notice(
+            "infinite", "bad", name, text, action="repair them, or set them to NaN for missing"
+        )
+    if not channel.is_of_a_sensor:
+        text = f"varies by {channel.spread:.1g} {unit}, as no sensor does"
+        return Notice("size", "bad", name, text, {"spread": channel.spread}, "check the unit")
+    return None
+
+
+def _events(
+    errors: Innovations, values: FloatArray, step: float
+) -> tuple[tuple[tuple[int, int], ...], float, Tails | None]:
+    """Shocks and spikes, the share of outliers all over the record, and tails if heavy."""
+    events = find_events(errors)
+    outliers = contamination(errors, events)
+    tails = heavy_tails(errors) if outliers > 0.0 else None
+    if tails is not None:
+        return find_events(errors, tails), 0.0, tails
+    if outliers > 0.0:
+        events = with_single_outliers(events, errors, values, step)
+    return events, outliers, None
 
 
 def _standardized(errors: Innovations, usable: BoolArray) -> npt.NDArray[np.float32] | None:

@@ -23,7 +23,7 @@ from scipy.optimize import brentq, minimize
 
 from gmwm._core.distributions import binom, gennorm, norm, student
 from gmwm._core.notices import Notice
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -61,8 +61,8 @@ def contamination_notice(name: str, share: float) -> Notice | None:
         "outliers",
         "warning",
         name,
-        f"{brief(100.0 * share)} % of the samples are outliers spread over the record, beyond four "
-        f"standard deviations, where noise has {brief(100.0 * _NOISE)} %",
+        f"{per_cent(share)} of the samples are outliers spread over the record, beyond four "
+        f"standard deviations, where noise has {per_cent(_NOISE)}",
         {"share": share},
         "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
     )

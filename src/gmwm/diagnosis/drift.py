@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief, readable
+from gmwm._core.text import brief, per_cent, readable
 from gmwm._core.typing import BoolArray, FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
@@ -113,7 +113,7 @@ def variance_notice(
     low, high = (readable(values[each], unit) for each in ("quiet", "loud"))
     text = (
         f"the noise is not steady: {low} in the quiet and {high} in the loud tenth of parts of "
-        f"{values['part']:.3g} s, so that its mean is {brief(100.0 * values['excess'])} % above "
+        f"{values['part']:.3g} s, so that its mean is {per_cent(values['excess'])} above "
         "that of the quiet quarter"
     )
     action = "use a recording, or a part, without what vibrates"
@@ -161,7 +161,7 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
         text = (
-            f"the noise is {brief(100.0 * abs(growth))} % "
+            f"the noise is {per_cent(abs(growth))} "
             f"{'larger' if growth > 0.0 else 'smaller'} in the second half than in the first"
         )
         action = "the model is an average: use the part that is like the use"
@@ -169,7 +169,7 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
     if is_loud:
         start = loudest * errors.values.size // tuning.TENTHS * dt
         text = (
-            f"the noise is {brief(100.0 * jump)} % larger than usual in the tenth of the record "
+            f"the noise is {per_cent(jump)} larger than usual in the tenth of the record "
             f"that begins at {start:.4g} s"
         )
         action = "look for people or machines then, and leave it out if it is none of the sensor"

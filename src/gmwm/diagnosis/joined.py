@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import SEVERITIES, Notice, Severity, worst_first
-from gmwm._core.text import brief
+from gmwm._core.text import brief, per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
@@ -188,7 +188,7 @@ def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:
         return None
     text = (
         f"the noise is {ratio:.3g} times as large in the loudest stretch as in the quietest, so "
-        f"that its mean is {brief(100.0 * excess)} % above that of the quiet quarter"
+        f"that its mean is {per_cent(excess)} above that of the quiet quarter"
     )
     values = {"ratio": ratio, "excess": excess}
     severity: Severity = "bad" if excess > tuning.UNSTEADY else "warning"

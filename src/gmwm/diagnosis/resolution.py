@@ -6,7 +6,7 @@ import numpy as np
 
 from gmwm._core.distributions import norm
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief, readable
+from gmwm._core.text import brief, per_cent, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 
@@ -112,5 +112,5 @@ def rounding_notice(
         )
     severity: Severity = "note" if ratio > 0.5 else "good"
     share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
-    action = f"counted as white noise: {brief(100.0 * share)} % of it"
+    action = f"counted as white noise: {per_cent(share)} of it"
     return Notice("rounding", severity, name, text, values, action)

@@ -15,6 +15,7 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
 from gmwm._core.text import Printed, wrapped
+from gmwm.diagnosis.gathered import gathered
 from gmwm.errors import InputError, MissingNameError
 from gmwm.readers import Recording
 
@@ -215,8 +216,9 @@ class Health(Document, Printed):
 
     def __str__(self) -> str:
         rows = [f"{self.source or 'recording'}: {self.rate:g} Hz, {self.n:,} samples a channel"]
-        for where in dict.fromkeys(("", *self.channels, *(n.where for n in self.notices))):
-            found = [notice for notice in self.notices if notice.where == where]
+        notices = gathered(self.notices)
+        for where in dict.fromkeys(("", *self.channels, *(n.where for n in notices))):
+            found = [notice for notice in notices if notice.where == where]
             if found:
                 rows += ["", where or "whole recording"]
             for notice in found:

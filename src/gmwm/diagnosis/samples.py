@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -286,6 +287,56 @@ def abrupt_end_notice(
         "or sorted out",
         {"lowest": min(found), "highest": max(found), "density": density},
         "look for what wraps, cuts or takes absolute values between the sensor and the file",
+    )
+
+
+def hole_notice(
+    name: str, unit: str, values: FloatArray, step: float, scatter: float
+) -> Notice | None:
+    """Find steps that never come among others that often do, as where a bit of a word is stuck.
+
+    Noise thins out towards a gap between two of its levels. Beside a hole the numbers of samples do
+    not fall, and the steps on both sides come without a gap: lattices that lie in each other, as
+    of two offsets, have gaps all over.
+
+    name, unit: Of the channel.
+    values: (n,), samples, none missing.
+    step: u; 0 if samples are not rounded.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
+    """
+    lowest = float(np.min(values))
+    if step == 0.0 or step > scatter or np.ptp(values) > tuning.MOST_STEPS * step:
+        return None
+    counts = np.bincount(np.rint((values - lowest) / step).astype(np.intp))
+    there = np.flatnonzero(counts)
+    found = [
+        (int(below), int(above))
+        for below, above in pairwise(there)
+        if above - below > tuning.LEAST_HOLE
+        and all(
+            edge.size == tuning.LEAST_HOLE
+            and np.min(edge) >= tuning.FEWEST_AT_END
+            and 2 * edge[0] >= np.max(edge)
+            for edge in (
+                counts[below - tuning.LEAST_HOLE + 1 : below + 1][::-1],
+                counts[above : above + tuning.LEAST_HOLE],
+            )
+        )
+    ]
+    if not found:
+        return None
+    below, above = max(found, key=lambda pair: pair[1] - pair[0])
+    ends = [lowest + place * step for place in (below, above)]
+    width = ends[1] - ends[0]
+    where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    return Notice(
+        "abrupt-end",
+        "bad" if width > tuning.WIDE_HOLE * scatter else "warning",
+        name,
+        f"no sample lies between {where}, where those beside come often: a bit is stuck, or codes "
+        "of the converter are missing",
+        {"lowest": ends[0], "highest": ends[1], "holes": float(len(found))},
+        "look at the bits of the words between the sensor and the file",
     )
 
 

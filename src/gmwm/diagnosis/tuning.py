@@ -20,6 +20,10 @@ JITTER, LARGE_JITTER = 0.1, 0.3
 LARGEST_OF_SENSOR = 1e6
 """rad/s or m/s^2: beyond the range of any sensor, accelerometers for shocks of 1e5 g included."""
 
+SHARED_FREQUENCY = 0.01
+"""Relative difference of the frequencies of one vibration as several sensors show it: resonances
+near 10 Hz of three accelerometers of one unit differ by 0.6 %."""
+
 MOTION_BLOCK, FEWEST_OF_MOTION = 1.0, 16
 """s, and samples at least, of the means in which motion is looked for: handling is slower, fast
 noise averages out."""
@@ -81,6 +85,11 @@ LONG_RUN = 32
 
 FEWEST_AT_END = 8
 """Samples at the end of the scale from which saturation is looked for."""
+
+LEAST_HOLE, WIDE_HOLE, MOST_STEPS = 3, 0.5, 1e6
+"""Steps that never come, beside as many that do each time, from which they are a hole; its width in
+standard deviations of the noise, above which the channel is not valid (a hole of two of them makes
+N 1.45 times as large, of a half 1.05 times); range in steps, beyond which there is no counting."""
 
 BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step

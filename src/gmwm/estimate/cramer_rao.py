@@ -12,7 +12,7 @@ from gmwm._core import checks
 from gmwm._core.compiled import compiled
 from gmwm._core.documents import Document
 from gmwm._core.frozen import freeze
-from gmwm._core.text import wrapped
+from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import (
@@ -151,8 +151,8 @@ class CramerRao(Document):
             value = float(params[key] or 0.0)
             unit = abs(value) if value else 1.0
             lines.append(
-                f"{key:<14} {value:>11.5g} {100 * best[key] / unit:>10.3g} % "
-                f"{100 * moments[key] / unit:>11.3g} % {moments[key] / best[key]:>7.3f}"
+                f"{key:<14} {value:>11.5g} {per_cent(best[key] / unit, 3):>12} "
+                f"{per_cent(moments[key] / unit, 3):>13} {moments[key] / best[key]:>7.3f}"
             )
         lines += ["", "bounds are standard errors in per cent of the value"]
         return "\n".join(lines)

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -417,7 +417,6 @@ def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     if worst <= tuning.POOR_DEVIATION:
         return []
     text = (
-        f"the sum of the lines misses the Allan deviation by {brief(100.0 * worst)} % at tau = "
-        f"{tau:.3g} s"
+        f"the sum of the lines misses the Allan deviation by {per_cent(worst)} at tau = {tau:.3g} s"
     )
     return [Notice("misfit", "bad", "", text, {"misfit": worst, "tau": tau, "discrepancy": 0.0})]

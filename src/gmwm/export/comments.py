@@ -43,16 +43,21 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
     return [f"{mark} {line}".rstrip() for line in lines]
 
 
-def about(imu: Imu, title: str, convention: str) -> list[str]:
-    """What stands above the numbers: source, convention, values by axis, consistency."""
+def above(imu: Imu, name: str) -> list[str]:
+    """What stands above the numbers: their source, the program, and what they are for."""
     lines = [line for source in imu.sources for line in wrapped(plain(source))]
-    lines += wrapped(f"{title}: {convention}")
-    lines += wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, {_HOW[imu.method]}")
+    lines += wrapped(f"{name}: {imu.form} for {imu.horizon:g} s without aiding; explained below")
     if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
         lines += wrapped(
             f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "
             "below is the higher, of a message that holds both"
         )
+    return [*lines, *(line for caution in imu.cautions for line in wrapped(plain(caution)))]
+
+
+def below(imu: Imu, convention: str) -> list[str]:
+    """What stands below the numbers: convention, values by axis, consistency."""
+    lines = wrapped(f"{convention}; {_HOW[imu.method]}")
     for triad in imu.triads:
         lines += _table(imu, triad)
     if any(triad.shared_nees is not None for triad in imu.triads):

@@ -76,6 +76,7 @@ def imu_of(
         sources=tuple(map(_source, numbers)),
         outlook=_outlook(given) if outlook is None else outlook,
         remarks=_remarks(given, numbers),
+        cautions=_remarks(given, numbers, cautions=True),
         topic=_topic(given),
     )  # fmt: skip
 
@@ -237,16 +238,21 @@ def _outlook(given: Sequence[Any]) -> Outlook:
     return found
 
 
-def _remarks(given: Sequence[Any], numbers: Sequence[SensorNumbers]) -> tuple[str, ...]:
-    """Each notice once, after the channels that it is about."""
+def _remarks(
+    given: Sequence[Any], numbers: Sequence[SensorNumbers], *, cautions: bool = False
+) -> tuple[str, ...]:
+    """Each notice once, after the channels that it is about: of fits that are not valid, or else
+    the others.
+    """
     places: dict[str, list[str]] = {}
     for source, each in zip(given, numbers, strict=True):
         walks = [name for name, fit in source.items() if isinstance(fit, Fit) and _walks(fit)]
-        if walks and "K" not in each.form:
+        if walks and "K" not in each.form and not cautions:
             text = f"a random walk, which {each.form} cannot bound: gmwm.reduce, not gmwm.bound"
             places[text] = walks
         for notice in each.notices:
-            places.setdefault(str(replace(notice, where="")), []).append(notice.where)
+            if (notice.code == "fit-not-valid") is cautions:
+                places.setdefault(str(replace(notice, where="")), []).append(notice.where)
     return tuple(f"{', '.join(where)}: {text}" for text, where in places.items())
 
 

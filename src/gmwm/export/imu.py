@@ -140,6 +140,8 @@ class Imu:
         Quantity -> horizon in s -> N and K for it.
     remarks : tuple of str
         What the numbers leave out.
+    cautions : tuple of str
+        Why the numbers are not to be used as they are.
     topic : str
         On which the samples were sent, where a bag was calibrated; else empty.
     """
@@ -152,6 +154,7 @@ class Imu:
     sources: tuple[str, ...] = ()
     outlook: Outlook = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
     topic: str = ""
 
     def by_axis(self) -> Imu:

@@ -20,10 +20,10 @@ from gmwm.export.target import ImuFile
 
 
 class JsonFile(ImuFile):
-    """A file in JSON: `ImuFile.body` gives the object but for the comments."""
+    """A file in JSON: `ImuFile.body` gives the object but for the comments, which end it."""
 
     def text(self, imu: Imu) -> str:
-        return json_text({"comment": self.comments(imu), **self.body(imu)}) + "\n"
+        return json_text({**self.body(imu), "comment": [*self.above(imu), *self.below(imu)]}) + "\n"
 
 
 def json_text(value: Any, indent: str = "") -> str:

@@ -12,7 +12,7 @@ from gmwm._core import checks
 from gmwm._core.files import written
 from gmwm.errors import InputError
 from gmwm.export import tuning
-from gmwm.export.comments import about, comment, wrapped
+from gmwm.export.comments import above, below, comment, wrapped
 from gmwm.export.found import imu_of
 from gmwm.export.imu import Imu
 from gmwm.filter_numbers import FORMS
@@ -65,9 +65,9 @@ class Target(ABC):
 
 @dataclass(frozen=True)
 class ImuFile(Target):
-    """Numbers of gyros and accelerometers, under comments that say what they are.
+    """Numbers of gyros and accelerometers, between comments that say what they are.
 
-    body: Lines below the comments, of an `Imu`; of files in JSON, the object.
+    body: Lines between the comments, of an `Imu`; of files in JSON, the object.
     shared: Whether the axes of a sensor have one value.
     one_tau: Whether all axes have one correlation time.
     mark: What a comment begins with.
@@ -81,15 +81,19 @@ class ImuFile(Target):
     mark: str = "#"
     head: tuple[str, ...] = ()
 
-    def comments(self, imu: Imu) -> list[str]:
-        """Lines of comment, without the mark."""
-        lines = about(imu, f"{self.title}, {self.file}", f"{self.convention} ({self.source})")
-        return [*lines, *(line for text in self.warnings for line in wrapped(text))]
+    def above(self, imu: Imu) -> list[str]:
+        """Lines of comment above the numbers, without the mark."""
+        name = f"{self.title}, {self.file}"
+        return [*above(imu, name), *(line for text in self.warnings for line in wrapped(text))]
+
+    def below(self, imu: Imu) -> list[str]:
+        """Lines of comment below the numbers, without the mark."""
+        return below(imu, f"{self.convention} ({self.source})")
 
     def text(self, imu: Imu) -> str:
         """The whole file."""
-        comments = comment(self.comments(imu), self.mark)
-        return "\n".join([*self.head, *comments, *self.body(imu)]) + "\n"
+        first, last = (comment(each(imu), self.mark) for each in (self.above, self.below))
+        return "\n".join([*self.head, *first, *self.body(imu), "", *last]) + "\n"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         if form is not None and checks.choice("form", form, FORMS) != self.form:

@@ -87,7 +87,8 @@ def bound(
     start of the walk, whose variance is ``bias_sd^2`` and twice that of the slow terms, as measured
     on many models (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not
     in the model. Quantization noise and resonances above ten over the horizon count by their
-    density at low frequencies, lines not at all, and a ramp R is a constant of standard deviation
+    density at low frequencies (resonances not far above by a part of their peak too), lines not at
+    all, and a ramp R is a constant of standard deviation
     ``|R| horizon``; notices report them.
     """
     checks.choice("form", form, list(KINDS))

@@ -132,6 +132,28 @@ class Chain:
         columns = list(zip(*kept, strict=True))
         return ChainErrors(*(np.array(column) for column in columns))
 
+    def judged(
+        self,
+        truth: Model,
+        believed: Model,
+        dt: float,
+        times: Sequence[float],
+        true_sd: float,
+        believed_sd: float,
+    ) -> list[ChainErrors]:
+        """The same errors; of one integral, then those of what it gains.
+
+        An absolute fix of half a degree hides what it gains in a minute, which is what counts for a
+        dead reckoning, or for a filter that has no fixes of it.
+        """
+        counted = [self]
+        if self.order == 1 and not self.is_relative:
+            counted.append(replace(self, is_gained=True))
+        return [
+            each.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
+            for each in counted
+        ]
+
     def worse(
         self,
         truth: Model,
@@ -141,24 +163,17 @@ class Chain:
         true_sd: float,
         believed_sd: float,
     ) -> ChainErrors:
-        """The same errors; of one integral, those of what it gains where they are the worse.
-
-        An absolute fix of half a degree hides what it gains in a minute, which is what counts for a
-        dead reckoning, or for a filter that has no fixes of it.
-        """
-        whole = self.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
-        if self.order > 1 or self.is_relative:
-            return whole
-        gained = replace(self, is_gained=True).errors(
-            truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd
-        )
-        least = tuning.HIDDEN * np.maximum(whole.nees(), 1.0)[:, None, None]
-        worse = (gained.predicted > 0.0) & (gained.actual > least * gained.predicted)
-        return ChainErrors(
-            whole.time,
-            np.where(worse, gained.predicted, whole.predicted),
-            np.where(worse, gained.actual, whole.actual),
-        )
+        """Those of what an integral gains where they are the worse, of the integrals elsewhere."""
+        whole, *others = self.judged(truth, believed, dt, times, true_sd, believed_sd)
+        for gained in others:
+            least = tuning.HIDDEN * np.maximum(whole.nees(), 1.0)[:, None, None]
+            worse = (gained.predicted > 0.0) & (gained.actual > least * gained.predicted)
+            whole = ChainErrors(
+                whole.time,
+                np.where(worse, gained.predicted, whole.predicted),
+                np.where(worse, gained.actual, whole.actual),
+            )
+        return whole
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
 from gmwm.filter_numbers.bound import about, predicted
 from gmwm.filter_numbers.chain import Chain
-from gmwm.filter_numbers.result import FORMS, FilterNumbers, SensorNumbers
+from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
 from gmwm.process import Model
 
@@ -83,8 +83,9 @@ def reduce(
     integrals at the end of the outages: a proper score, which punishes a covariance that is too
     small as it does one that is too large. To it comes the squared logarithm of the NEES at each of
     them: what one is too optimistic, another shall not make good. The expectation is exact for the
-    truth given, in the filter of `gmwm.filter_numbers.Chain`. `gmwm.ins.reduce` does it in a whole
-    navigation filter on a trajectory.
+    truth given, in the filter of `gmwm.filter_numbers.Chain`; of a heading it is that of the angle
+    gained since the last fix too, as `gmwm.certify` judges both. `gmwm.ins.reduce` does it in a
+    whole navigation filter on a trajectory.
     """
     checks.choice("form", form, FORMS)
     tau = given_tau(form, tau)
@@ -128,6 +129,7 @@ class _Search:
         longest = self.times[-1]
         _, model, sd = self.least(group, tau)
         times = (*self.times, 10.0 * longest)
+        errors = [predicted(axis, self.chain(axis), model, sd, times) for axis in group]
         return [
             FilterNumbers(
                 form=self.form,
@@ -135,15 +137,16 @@ class _Search:
                 horizon=longest,
                 initial_sd=sd,
                 method="reduce",
-                predicted=predicted(axis, self.chain(axis), model, sd, times),
+                predicted=found,
                 notices=(
-                    *Target.of(axis.model, axis.dt, longest, axis.unit).notices,
+                    *_ramps(axis, longest),
+                    *_optimistic(found, longest),
                     *_below(axis, model),
                     *about(axis, None),
                 ),
                 quantity=axis.quantity,
             )
-            for axis in group
+            for axis, found in zip(group, errors, strict=True)
         ]
 
     def correlation_time(self, groups: Sequence[Sequence[Axis]]) -> float:
@@ -173,16 +176,17 @@ class _Search:
             # Finite beyond the farthest too, where a line search may try: it takes differences.
             model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
             errors = [
-                self.chain(axis).errors(
-                    axis.model, model, axis.dt, self.times, true_sd=axis.bias_sd, believed_sd=sd
-                )
+                self.chain(axis).judged(axis.model, model, axis.dt, self.times, axis.bias_sd, sd)
                 for axis in group
             ]
-            score = np.mean([each.score() for each in errors], axis=0)
-            # Of all axes together: one that shares its numbers may well be cautious, another bold.
-            uneven = np.log(np.mean([each.nees() for each in errors], axis=0)) ** 2
-            inertia = tuning.INERTIA * float(logs @ logs)
-            return float(np.sum(score + tuning.EVENNESS * uneven)) + inertia
+            total = tuning.INERTIA * float(logs @ logs)
+            for i in range(max(map(len, errors))):
+                found = [each[i] for each in errors if i < len(each)]
+                score = np.mean([each.score() for each in found], axis=0)
+                # Of all axes together: one that shares its numbers may be cautious, another bold.
+                uneven = np.log(np.mean([each.nees() for each in found], axis=0)) ** 2
+                total += float(np.sum(score + tuning.EVENNESS * uneven))
+            return total
 
         best = minimize(
             cost, np.zeros(len(names)), method="BFGS",
@@ -213,6 +217,28 @@ class _Search:
                 own += target.slow_variance(still)
             variance = max(variance, own)
         return model, float(np.sqrt(variance))
+
+
+def _ramps(axis: Axis, longest: float) -> Iterator[Notice]:
+    """All else that a bound leaves out is part of the truth by which these are judged."""
+    found = Target.of(axis.model, axis.dt, longest, axis.unit).notices
+    return (each for each in found if each.code == "ramp-as-constant")
+
+
+def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...]:
+    """Where a filter with them believes too little, of the times asked for or else beyond."""
+    high = [each for each in found if each.nees > tuning.INCONSISTENT]
+    if not high:
+        return ()
+    worst = max(high, key=lambda each: (each.time <= longest, each.nees))
+    text = f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding"
+    values = {"nees": worst.nees, "time": worst.time}
+    if worst.time > longest:
+        mend = "give that time among the outages if there are such"
+        return (Notice("optimistic", "note", "", f"{text}, for which they are not", values, mend),)
+    text += "; no such numbers are consistent at all times and on all axes that share them"
+    mend = "use gmwm.bound, a form with more terms, or own numbers of each axis"
+    return (Notice("optimistic", "warning", "", text, values, mend),)
 
 
 def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:

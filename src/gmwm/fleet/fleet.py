@@ -19,7 +19,7 @@ from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
 from gmwm._core.runs import results
-from gmwm._core.text import bullets, made_by, wrapped
+from gmwm._core.text import bullets, made_by, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
@@ -121,7 +121,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
             lines += ["", f"{head} {'limit':>9}  unit"]
         for each in shown:
             unit, scale = each.field_unit
-            spread = f"{100.0 * each.sd:.3g} %" if each.sd >= 0.0 else "-"
+            spread = per_cent(each.sd, 3) if each.sd >= 0.0 else "-"
             limit = f"{each.normal_limit * scale:.4g}" if each.sd >= 0.0 else "-"
             lines.append(
                 f"{each.channel:<10} {each.parameter:<9} {each.n:>5} {each.median * scale:>9.4g} "

@@ -148,6 +148,9 @@ STEP_NEAR = 4
 LARGEST_ARM = 5.0
 """m, usual length of a lever arm that was left out: 1 sigma."""
 
+LARGEST_SCALE_ERROR = 0.05
+"""Usual scale error of a sensor, 1 sigma: data sheets of MEMS allow 1 to 3 %."""
+
 HEADINGS = 8
 """Directions that are tried where the filter is lost: 45 deg apart."""
 
@@ -164,7 +167,7 @@ MOST_FAULTS = 4
 ROUNDS, SETTLED_GAIN = 6, 0.05
 """Gauss-Newton steps, and the gain of the log-likelihood below which they end."""
 
-REFINED, TRIALS = 4, 40
+REFINED, TRIALS = 6, 40
 """Explanations that are worked out, by their gain at first sight; runs to fit coloured noise."""
 
 LEAST_WHITE, LONGEST_COLOUR = -4.0, 1e4

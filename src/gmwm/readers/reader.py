@@ -26,6 +26,7 @@ from gmwm.readers.clock import (
     agree,
     is_time_of_day,
     seconds_of_day,
+    timing_of,
     without_summer_time,
     without_unit,
 )
@@ -306,7 +307,7 @@ def _timing(
         same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
         extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
     )
-    timing = clock.timing(stated)
+    timing = timing_of(clock, stated)
     if stated is None:
         return timing.rate, timing, timing.notices
     text = f"the rate stated, {stated:g} Hz, is used"

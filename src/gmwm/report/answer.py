@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
+from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Triad
 from gmwm.report.health import findings_of_fits
@@ -71,9 +72,10 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
 
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line."""
-    severe = [n for n in calibration.notices if n.severity == "bad"]
+    found = gathered(calibration.notices)
+    severe = [n for n in found if n.severity == "bad"]
     of_fits = findings_of_fits(calibration)
-    warnings = [n for n in (*of_fits, *calibration.notices) if n.severity == "warning"]
+    warnings = [n for n in (*of_fits, *found) if n.severity == "warning"]
     removed = dict.fromkeys(n.where for n in of_fits if n.values.get("removed"))
     invalid = [name for name, fit in calibration.items() if not fit.valid]
     out = [*invalid, *calibration.skipped]
@@ -98,7 +100,8 @@ def verdict(calibration: Calibration) -> dict[str, str]:
 
 
 def _counted(notices: list[Notice], word: str) -> str:
-    where = ", ".join(dict.fromkeys(notice.where for notice in notices if notice.where))
+    places = (place for notice in notices for place in notice.where.split(", ") if place)
+    where = ", ".join(dict.fromkeys(places))
     count = f"{len(notices)} {word}{'s' if len(notices) > 1 else ''}"
     return f"{count} ({where})" if where else count
 
@@ -111,7 +114,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:
-        share = f"{brief(100.0 * abs(at.worst[0]))} %"
+        share = f"{per_cent(abs(at.worst[0]))}"
         fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
     return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
@@ -242,7 +245,7 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
         need = calibration.duration * (known[worst] / _AIM) ** 2
         # A curve that ends before the horizon is known there by the model alone.
         covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
-        share = f"{brief(100.0 * known[worst])} % (1 sigma, {worst})"
+        share = f"{per_cent(known[worst])} (1 sigma, {worst})"
         if need <= calibration.duration and covered:
             parts.append(
                 f"long enough for {horizon:g} s outages: every curve is known there to {share}"

@@ -13,7 +13,7 @@ from typing import Any
 from gmwm._core.files import written
 from gmwm._core.notices import worst_first
 from gmwm._core.runs import shared
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
 from gmwm.readers import Channel, Recording
@@ -227,7 +227,7 @@ def _fitness(fit: Fit) -> str:
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value_allowed:.2g}"
     if fit.discrepancy > 0.0:
-        text += f", with a discrepancy of {brief(100.0 * fit.discrepancy)} % of the variance"
+        text += f", with a discrepancy of {per_cent(fit.discrepancy)} of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
@@ -246,7 +246,7 @@ def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str,
     cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
     error = ""
     if estimate.kind == "estimated" and estimate.value and estimate.stderr is not None:
-        error = f"{brief(100.0 * estimate.stderr / abs(estimate.value))} %"
+        error = f"{per_cent(estimate.stderr / abs(estimate.value))}"
     return {
         "key": estimate.key,
         "meaning": estimate.meaning,

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from gmwm._core.notices import Notice, worst_first
-from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration
+from gmwm.calibration import AMBIGUITY, DEPARTURES, LONGEST_PART, Calibration
+from gmwm.diagnosis import gathered
 
 _COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
@@ -18,13 +19,17 @@ def health(calibration: Calibration) -> dict[str, Any]:
     examined = calibration.is_examined
     notices = [
         notice
-        for notice in calibration.notices
-        if notice.code != AMBIGUITY and not (examined and notice.code in _COUNTED_ELSEWHERE)
+        for notice in gathered(calibration.notices)
+        if notice.code not in (AMBIGUITY, LONGEST_PART)
+        and not (examined and notice.code in _COUNTED_ELSEWHERE)
     ]
     found = findings_of_fits(calibration)
     found += [notice for notice in notices if examined and notice.severity != "good"]
     return {
         "examined": examined,
+        "advice": [
+            f"{_begun(n.text)}: {n.action}." for n in calibration.notices if n.code == LONGEST_PART
+        ],
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(found),
         "severe": any(notice.severity == "bad" for notice in found),

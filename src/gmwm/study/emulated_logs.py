@@ -32,10 +32,11 @@ VEHICLES: dict[str, Callable[..., Trajectory]] = {
 
 FAULTS = (
     "coloured", "stamps", "clock step", "lever arm", "off-grid", "one far", "outliers", "mounting",
+    "clock drift", "gyro scale", "accel scale",
 )  # fmt: skip
 """Coloured GNSS; stamps 0.2 s late; stamps a second late from the middle on; lever arm left out;
 fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU turned by 90 deg about its
-vertical axis."""
+vertical axis; the fixes' clock 500 ppm fast; 3 % too much of all gyros, or accelerometers."""
 
 LEVER_ARM = (1.0, 0.3, -1.0)
 _DEGREE_HOUR, _MICRO_G = np.radians(1.0 / 3600.0), 9.80665e-6
@@ -103,13 +104,17 @@ def emulated_log(
     aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
     by = late + (0.2 if "stamps" in faults else 0.0)
     step = 1.0 if "clock step" in faults else 0.0
-    aiding = replace(aiding, fixes=tuple(_later(each, by, step, duration) for each in aiding.fixes))
+    drift = 5e-4 if "clock drift" in faults else 0.0
+    fixes = tuple(_later(each, by, drift, step, duration) for each in aiding.fixes)
+    aiding = replace(aiding, fixes=fixes)
     aiding = _with_outliers(aiding, faults, rng)
     if "lever arm" in faults:
         aiding = replace(aiding, lever_arm=(0.0, 0.0, 0.0))
     if "mounting" in faults:
         turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         imu = Imu(imu.dt, imu.rotation @ turn.T, imu.velocity @ turn.T)
+    gyro, accel = (1.03 if f"{kind} scale" in faults else 1.0 for kind in ("gyro", "accel"))
+    imu = Imu(imu.dt, imu.rotation * gyro, imu.velocity * accel)
     models = believed or truth or sensors()
     return Measured(imu, aiding, models, title=f"{vehicle}, seed {seed}"), fine
 
@@ -124,9 +129,10 @@ def _part(imu: Imu, first: int) -> Imu:
     return Imu(imu.dt, imu.rotation[first:], imu.velocity[first:])
 
 
-def _later(fixes: Fixes, by: float, step: float, duration: float) -> Fixes:
-    """With stamps as much later, and once more from the middle on."""
-    later = replace(fixes, time=fixes.time + by + step * (fixes.time > 0.5 * duration))
+def _later(fixes: Fixes, by: float, drift: float, step: float, duration: float) -> Fixes:
+    """With stamps as much later, more and more by ``drift``, and once more from the middle on."""
+    time = fixes.time
+    later = replace(fixes, time=by + (1.0 + drift) * time + step * (time > 0.5 * duration))
     return later.part(later.time <= duration)
 
 

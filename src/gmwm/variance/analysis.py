@@ -72,7 +72,7 @@ def wavelet_variance(
     variance.
     """
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
-    values, runs = checked_samples(channel)
+    values, runs, mean = checked_samples(channel)
     confidence = checks.share("confidence", confidence, 0.95)
     efficiency = checks.share("efficiency", efficiency, 0.6)
     efficiency = efficiency if checks.truth("robust", robust) else 1.0
@@ -80,7 +80,7 @@ def wavelet_variance(
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
     _check_width(channel, runs, wavelet)
-    values = values - survey(values)[1] / runs.present
+    values = values - mean
     levels = Levels.of(values, runs, wavelet, channel.dt)
     moments = levels.moments()
     driftless = None
@@ -146,8 +146,8 @@ def where_of(channel: Channel) -> str:
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
-def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
-    """The samples of a channel, and which of them exist.
+def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
+    """The samples of a channel, which of them exist, and their mean.
 
     Raises InputError if they are no series of numbers, too few, infinite, constant or of no
         sensor's size, or the sampling interval is none.
@@ -173,7 +173,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs]:
             "can be determined of its noise"
         )
     check_varies(replace(channel, values=np.array([low, high])))
-    return values, runs
+    return values, runs, total / runs.present
 
 
 def check_varies(channel: Channel) -> None:

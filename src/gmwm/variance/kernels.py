@@ -155,15 +155,21 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
     return result
 
 
-@compiled()
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
-    """Cumulative sum of ``values - mean``, starting with 0; what pieces add is compensated.
+    """Cumulative sum of ``values - mean``, starting with 0; missing samples (NaN) add nothing."""
+    result = np.empty(values.size + 1)  # numpy asks for large pages, compiled code does not
+    _accumulate(values, mean, result)
+    return result
 
-    Missing samples (NaN) add nothing. Within a piece of 256 samples the sum begins anew, in four of
-    them at a time, since each addition waits for the one before.
+
+@compiled()
+def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
+    """What pieces of 256 samples add is compensated.
+
+    Within a piece the sum begins anew, in four of them at a time, since each addition waits for the
+    one before.
     """
     n = values.size
-    result = np.empty(n + 1)
     result[0] = 0.0
     total, lost = 0.0, 0.0
     whole = n // (4 * _PIECE) * (4 * _PIECE)
@@ -195,10 +201,34 @@ def cumulative(values: FloatArray, mean: float) -> FloatArray:
         lost = (following - total) - y
         total = following
         result[i + 1] = total
-    return result
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=_ANY_ORDER)
+def slope(values: FloatArray, parts: NDArray[np.int64]) -> float:
+    """Of the least-squares lines of one slope through the samples of the parts, per sample.
+
+    values: (n,), NaN where missing.
+    parts: (P,), first sample of each part.
+    """
+    product, square = 0.0, 0.0
+    for part in range(parts.size):
+        start = parts[part]
+        own = values[start : parts[part + 1] if part + 1 < parts.size else values.size]
+        count, total = 0, 0.0
+        for i in range(own.size):
+            there = own[i] == own[i]  # NaN is not
+            count += there
+            total += i if there else 0.0
+        centre = total / max(count, 1)
+        for i in range(own.size):
+            there = own[i] == own[i]
+            place = i - centre if there else 0.0
+            product += place * (own[i] if there else 0.0)
+            square += place * place
+    return product / square if square > 0.0 else 0.0
+
+
+@compiled(fastmath=_ANY_ORDER)
 def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     """Number, and sums of the second and fourth powers, of first differences that exist."""
     count, square, fourth = 0, 0.0, 0.0
@@ -212,7 +242,7 @@ def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     return count, square, fourth
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=_ANY_ORDER)
 def survey(values: FloatArray) -> tuple[int, float, float, float]:
     """Number of missing samples; sum, smallest and largest of the others."""
     missing, total = 0, 0.0

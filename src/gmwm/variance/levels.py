@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gmwm._core.typing import FloatArray, IntArray, inner
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import wavelet as known_wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
@@ -25,11 +25,17 @@ from gmwm.variance.gaps.effects import (
     window_count,
 )
 from gmwm.variance.gaps.filling import Filling, levels_apart
-from gmwm.variance.kernels import FINE, coarse_moments, cumulative, fine_moments, haar_coefficients
+from gmwm.variance.kernels import (
+    FINE,
+    coarse_moments,
+    cumulative,
+    fine_moments,
+    haar_coefficients,
+    slope,
+)
 from gmwm.variance.pilot import pilot_psd
 
 _ROW = 1 << FINE
-_BLOCK = 1 << 16
 
 
 def haar_moments(
@@ -194,7 +200,7 @@ class Levels:
     @cached_property
     def slope(self) -> float:
         """Of the least-squares line through the samples that exist, per sample."""
-        return _slope(self.values, self.parts)
+        return slope(self.values, self.parts)
 
     # -- what exists -------------------------------------------------------------------------------
 
@@ -324,27 +330,3 @@ class Levels:
             self.values, self.averaging[-1:], self.slope
         )
         return values, integral
-
-
-def _slope(values: FloatArray, parts: IntArray) -> float:
-    """Of the least-squares lines of one slope through the samples of the parts, per sample."""
-    # Some samples at a time: places and parts of all would be several times the series.
-    blocks = range(0, values.size, _BLOCK)
-
-    def there(start: int) -> tuple[IntArray, IntArray]:
-        k = start + np.flatnonzero(~np.isnan(values[start : start + _BLOCK]))
-        return k, np.searchsorted(parts, k, "right") - 1
-
-    count, total = np.zeros(parts.size), np.zeros(parts.size)
-    for start in blocks:
-        k, part = there(start)
-        count += np.bincount(part, minlength=parts.size)
-        total += np.bincount(part, k, parts.size)
-    middle = total / np.maximum(count, 1.0)
-    square = product = 0.0
-    for start in blocks:
-        k, part = there(start)
-        place = k - middle[part]
-        square += inner(place, place)
-        product += inner(place, values[k])
-    return product / square if square > 0.0 else 0.0

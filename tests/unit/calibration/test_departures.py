@@ -1,6 +1,7 @@
 """Steps, transients and slow periods: found, with their sizes, and not in noise."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -81,7 +82,7 @@ def test_other_departures_are_found(kind, curve, time):
     ids=["N+K", "N", "N+10K", "N+GM", "N+2GM"],
 )
 def test_noise_has_none(model):
-    runs = 5
+    runs = 3
     free = gmwm.process.as_model(model).opened()
     count = 0
     for seed in range(runs):
@@ -267,6 +268,27 @@ def test_of_several_recordings_it_is_named_which():
     fit = gmwm.calibrate(both, WhiteNoise() + RandomWalk())["gyro_x"]
     (notice,) = [one for one in fit.notices if one.code == "step"]
     assert notice.source == "b.csv"
+
+
+def test_several_steps_have_one_remedy_for_the_whole_recording():
+    """Each had its own cuts, and nothing named the part that is without any."""
+    late = np.where(0.9 * TIME[-1] < TIME, 1.0, 0.0)
+    channels = {"gyro_x": noise(16) + SAMPLE * STEP, "gyro_y": noise(17) + 2.0 * SAMPLE * late}
+    found = gmwm.calibrate(
+        Recording.from_arrays(channels, 1.0 / DT, {"gyro": "rad/s"}), WhiteNoise() + RandomWalk()
+    )
+    (advice,) = [one for one in found.notices if one.code == "longest-part"]
+    steps = [n for fit in found.values() for n in fit.notices if n.code == "step"]
+    edges = sorted((n.values["time_lower"], n.values["time_upper"]) for n in steps)
+    kept = max(
+        (b[0] - a[1], a[1], b[0]) for a, b in pairwise([(0, 0.0), *edges, (found.duration, 0)])
+    )
+    assert (advice.values["start"], advice.values["stop"]) == pytest.approx(kept[1:])
+    assert {n.action for n in steps} == {"as advised for the whole recording"}
+    action = with_option(advice).action
+    assert action.endswith("or --remove-departures, which keeps all")
+    assert f"--start {kept[1]:.6g}" in action or f"--stop {kept[2]:.6g}" in action
+    assert with_option(steps[0]) == steps[0]
 
 
 def test_a_recording_of_another_kind_is_refused():

@@ -16,6 +16,8 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
+from gmwm._core.notices import Notice
+from gmwm.diagnosis import gathered
 from gmwm.diagnosis.spectral.lines import find_lines, line_notices
 from gmwm.diagnosis.spectral.spectrum import background, bands, spectrum
 from gmwm.diagnosis.tuning import FALSE_ALARM
@@ -207,3 +209,23 @@ def test_health_gives_lines_to_programs(record):
     assert amplitude == pytest.approx(0.01, rel=0.1)
     (notice,) = found.of("accel_x", "line")
     assert "a periodic line at 0.565 Hz, amplitude 1." in notice.text  # mg
+
+
+def test_a_line_of_three_axes_is_reported_once():
+    def line(where, frequency, ratio, **more):
+        values = {"frequency": frequency, "amplitude": 1.0, "ratio": ratio, **more}
+        return Notice("line", "warning", where, f"a line of {where}", values, "find what hums")
+
+    other = Notice("event", "warning", "accel_x", "a shock")
+    weaker = line("accel_z", 50.0, 1.0, count=2.0)
+    found = gathered([
+        line("accel_x", 50.0, 20.0), other, line("accel_x", 50.2, 5.0),
+        line("accel_y", 50.01, 30.0), line("accel_z", 49.99, 9.0), line("gyro_x", 52.0, 9.0),
+        weaker,
+    ])  # fmt: skip
+    assert [each.where for each in found] == [
+        "accel_x, accel_y, accel_z", "accel_x", "accel_x", "gyro_x", "accel_z",
+    ]  # fmt: skip
+    assert found[0].text.startswith("a line of accel_y (in accel_y); 3 channels have it")
+    assert found[0].action == "find what hums"
+    assert found[1] is other and found[-1] is weaker

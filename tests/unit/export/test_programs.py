@@ -135,7 +135,9 @@ def maplab(q):
 
 
 def px4(q):
-    lines = [line.split("\t") for line in file_of("px4").splitlines() if line[0] != "#"]
+    # As QGroundControl reads them: lines of five columns that are no comments.
+    rows = [row.split("\t") for row in file_of("px4").splitlines() if not row.startswith("#")]
+    lines = [row for row in rows if len(row) == 5]
     assert {tuple(line[:2]) for line in lines} == {("1", "1")}
     assert {line[4] for line in lines} == {"9"}  # a 32-bit float, as MAVLink numbers the types
     content = {line[2]: float(line[3]) for line in lines}

@@ -439,6 +439,19 @@ def test_quantization_lines_and_fast_peaks_are_left_out_with_a_notice():
         assert notices[code].severity == "note"
 
 
+def test_a_little_more_horizon_changes_numbers_little():
+    """Where ten over the horizon passes a resonance, N fell to an eighth at once."""
+    resonance, f = Resonance(0.02, 9.5, 0.05), np.array([1e-3, 9.5])
+    foot, peak = resonance.psd(f, DT)
+    horizons = np.geomspace(0.7, 16.0, 34)
+    assert horizons[1] < 1.1 * horizons[0]
+    N = [gmwm.bound(WhiteNoise(1e-3) + resonance, "N+K", float(T)).N for T in horizons]
+    assert N[0] ** 2 == pytest.approx(1e-6 + peak, rel=0.02)
+    assert N[-1] ** 2 == pytest.approx(1e-6 + foot, rel=0.02)
+    ratio = np.divide(N[1:], N[:-1])
+    assert np.all((ratio > 1.0 / 1.16) & (ratio < 1.0 + 1e-6))
+
+
 def test_a_resonance_counts_by_its_low_frequency_density():
     resonance = Resonance(0.02, 15.0, 0.2)
     found, notices = notices_of(resonance)

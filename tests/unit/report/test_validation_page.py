@@ -50,7 +50,6 @@ def test_few_runs_tell_nothing(tmp_path, made_up):
 @pytest.mark.parametrize(
     ("outages", "dead"),
     [
-        ((), ()),
         ((), ("bold",)),
         (((20, 10),), ("right",)),
         (((20, 10),), ("right", "bold", "timid")),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.text import brief, wrapped
+from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
@@ -181,7 +181,7 @@ class Goodness:
         if worst is None:
             return ""
         return (
-            f"largest misfit {brief(100.0 * abs(worst[0]))} % of the deviation at tau = "
+            f"largest misfit {per_cent(abs(worst[0]))} of the deviation at tau = "
             f"{worst[1]:.3g} s (levels of more than {tuning.WELL_KNOWN_DOF:g} degrees of freedom)"
         )
 

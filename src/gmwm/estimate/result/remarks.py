@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import brief
+from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units
 from gmwm.estimate import tuning
@@ -212,7 +212,7 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
         return []
     misfit, tau, residual = beyond
     values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
-    share = f"{brief(100.0 * abs(misfit))} %"
+    share = f"{per_cent(abs(misfit))}"
     if goodness.is_poor:
         side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
         text = f"the data lie {share} {side} the model's Allan deviation"

@@ -9,7 +9,7 @@ first order.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.dominance import Problem, columns_of, limits, solved
 from gmwm.filter_numbers.spectra.target import Target
-from gmwm.process import Model, Process
+from gmwm.process import Model
 
 _STEP = 1e-3  # standard errors
 
@@ -63,7 +63,7 @@ def standard_errors(
     f = np.append(problem.f[touched], np.full(at_limit.size, problem.f[0]))
     is_white = np.append(np.zeros(touched.size, dtype=bool), at_limit == 0)
     rows = np.vstack([columns[touched] * shares, np.eye(len(terms))[at_limit]])
-    largest = [_densities(target.terms, target, f, is_white) for target in problem.targets]
+    largest = [_densities(target, f, is_white) for target in problem.targets]
     owner = np.argmax(largest, axis=0)
     changes = [
         np.where((owner == i)[:, None], _changes(target, estimate, f, is_white), 0.0)
@@ -95,7 +95,8 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
 
     def logarithms(values: FloatArray) -> FloatArray:
         terms = model.with_params(dict(zip(keys, map(float, values), strict=True))).terms
-        return np.log(_densities([terms[i] for i in counted], target, f, is_white))
+        moved = replace(target, terms=tuple([terms[i] for i in counted]))
+        return np.log(_densities(moved, f, is_white))
 
     columns = []
     for column in root.T:
@@ -107,11 +108,12 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
     return np.column_stack(columns) if columns else np.zeros((f.size, 0))
 
 
-def _densities(
-    terms: Sequence[Process], target: Target, f: FloatArray, is_white: BoolArray
-) -> FloatArray:
+def _densities(target: Target, f: FloatArray, is_white: BoolArray) -> FloatArray:
     """Of all terms at frequencies, and of the white ones where only these count."""
     return sum(
-        (np.where(is_white & (not term.is_white), 0.0, term.psd(f, target.dt)) for term in terms),
+        (
+            np.where(is_white & (not term.is_white), 0.0, density)
+            for term, density in target.densities(f)
+        ),
         np.full_like(f, target.foot),
     )

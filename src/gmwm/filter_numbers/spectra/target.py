@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import trapezoid
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
@@ -19,8 +20,10 @@ from gmwm.process import Model, Process, evaluated
 class Target:
     """The part of an error model that is dominated.
 
-    terms: Those that count with their whole spectrum.
-    foot: Low-frequency density of terms that are peaks at high frequencies, u^2/Hz.
+    terms: Those that count with their spectrum.
+    weights: How far each does: one, or less where its peak is fast, by the rest of which its
+        density is that at low frequencies.
+    foot: The sum of these rests, u^2/Hz.
     constant_sd: Of ramps over the horizon, u.
     dt, horizon: Sampling interval and horizon, s.
     lowest: Frequency below which nothing changes, Hz.
@@ -30,6 +33,7 @@ class Target:
     """
 
     terms: tuple[Process, ...]
+    weights: tuple[float, ...]
     foot: float
     constant_sd: float
     dt: float
@@ -49,8 +53,8 @@ class Target:
         fast = min(tuning.FAST / horizon, 0.25 * nyquist)
         floor = 1.0 / (tuning.LOWEST * np.pi * max(10.0 * horizon, tuning.SHORTEST_MEMORY))
         floor = min(floor, 1e-3 * nyquist)
-        band = np.geomspace(floor, nyquist, 400)
         kept: list[Process] = []
+        weights: list[float] = []
         notices: list[Notice] = []
         foot = constant = 0.0
         for label, term in zip(model.term_labels(), model.terms, strict=True):
@@ -64,20 +68,35 @@ class Target:
             elif term.is_line:
                 notices += [_line(label, f, a, fast, unit) for f, a in term.lines()]
             else:
+                band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE)
                 density = evaluated(term.psd, band, dt)
-                high, low = np.max(density[band >= fast]), np.max(density[band < fast])
+                high, low = float(np.max(density)), float(np.max(density[band <= fast]))
+                own = float(density[0])
+                if high <= low:
+                    weight = 1.0
+                elif own <= tuning.NO_FOOT * high:
+                    weight = float(high <= tuning.PEAK * low)
+                    own = 0.0
+                else:
+                    near = (fast / band[int(np.argmax(density))]) ** tuning.FADING
+                    within = tuning.PEAK * (low - own) / (high - own)
+                    weight = float(np.clip(within, near, 1.0))
+                foot += (1.0 - weight) * own
                 if high > tuning.PEAK * low:
-                    foot += float(density[0]) if density[0] > tuning.NO_FOOT * high else 0.0
-                    notices.append(_peak(label, term, band, density, fast))
-                elif high + low > 0.0:
+                    notices.append(_peak(label, band, density, weight, fast))
+                if weight * high > 0.0:
                     kept.append(term)
+                    weights.append(weight)
         lowest, slope = _limit(kept, floor, dt)
         if slope > tuning.STEEPEST:
             raise InputError(
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
                 "than that of a random walk: no form dominates it"
             )
-        target = cls(tuple(kept), foot, constant, dt, horizon, lowest, floor, slope, tuple(notices))
+        target = cls(
+            tuple(kept), tuple(weights), foot, constant, dt, horizon, lowest, floor, slope,
+            tuple(notices),
+        )  # fmt: skip
         if not kept and foot == 0.0:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
@@ -92,11 +111,17 @@ class Target:
 
     def psd(self, f: FloatArray) -> FloatArray:
         """Spectral density, u^2/Hz."""
-        return self.foot + sum((term.psd(f, self.dt) for term in self.terms), np.zeros_like(f))
+        return sum((density for _, density in self.densities(f)), np.full_like(f, self.foot))
+
+    def densities(self, f: FloatArray) -> Iterator[tuple[Process, FloatArray]]:
+        """Of each term that counts, as far as it does."""
+        for term, weight in zip(self.terms, self.weights, strict=True):
+            yield term, weight * term.psd(f, self.dt)
 
     def allan_variance(self, tau: FloatArray) -> FloatArray:
         """At averaging times (s), u^2."""
-        curves = (2.0 * term.haar_variance(tau, self.dt) for term in self.terms)
+        pairs = zip(self.terms, self.weights, strict=True)
+        curves = (2.0 * weight * term.haar_variance(tau, self.dt) for term, weight in pairs)
         return sum(curves, self.foot / tau)
 
     @property
@@ -114,17 +139,10 @@ class Target:
 
     def frequencies(self, points: int) -> FloatArray:
         """From the lowest to 1/(2 dt), some a decade, and more where a resonance is (Hz)."""
-        nyquist = 0.5 / self.dt
-        own = [
-            np.linspace(0.9, 1.1, tuning.PEAK_POINTS) * (term.values[p.name] or 0.0)
-            for term in self.terms
-            for p in term.shape_parameters
-            if p.unit == "Hz"
-        ]
         # Below the lowest there are only limits, which are as good as reached.
         below = self.lowest * np.array([1e-3, 1e-2, 1e-1])
-        f = np.concatenate([below, _grid(self.lowest, nyquist, points), *own])
-        return np.unique(f[f <= nyquist])
+        f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points)
+        return np.unique(np.append(below, f))
 
     def slow_variance(self, stationary: Model) -> float:
         """Variance of what lies above a stationary spectrum and is not a random walk, u^2.
@@ -133,17 +151,26 @@ class Target:
         """
         f = self.frequencies(tuning.CHECKED_POINTS)
         total = self.foot - stationary.psd(f, self.dt)
-        for term in self.terms:
+        for term, density in self.densities(f):
             if term.is_walk:
                 continue
-            density = term.psd(f, self.dt)
-            rises = density[0] > (1.0 + tuning.RISING) * term.psd(2.0 * f[:1], self.dt)[0]
+            first, second = term.psd(f[0] * np.array([1.0, 2.0]), self.dt)
+            rises = first > (1.0 + tuning.RISING) * second
             total += np.where(f >= self.floor, density, 0.0) if rises else density
         return float(2.0 * trapezoid(np.maximum(total, 0.0) * f, np.log(f)))
 
 
-def _grid(low: float, high: float, points: int) -> FloatArray:
-    return np.geomspace(low, high, int(np.ceil(np.log10(high / low) * points)) + 1)
+def _frequencies(terms: Sequence[Process], low: float, high: float, points: int) -> FloatArray:
+    """Some a decade, and more where a resonance is."""
+    own = [
+        np.linspace(0.9, 1.1, tuning.PEAK_POINTS) * (term.values[p.name] or 0.0)
+        for term in terms
+        for p in term.shape_parameters
+        if p.unit == "Hz"
+    ]
+    grid = np.geomspace(low, high, int(np.ceil(np.log10(high / low) * points)) + 1)
+    f = np.unique(np.concatenate([grid, *own]))
+    return f[(f >= low) & (f <= high)]
 
 
 def _limit(terms: list[Process], start: float, dt: float) -> tuple[float, float]:
@@ -192,13 +219,16 @@ def _line(label: str, frequency: float, amplitude: float, fast: float, unit: str
     return Notice("line-left-out", "warning" if slow else "note", "", text, values)
 
 
-def _peak(label: str, term: Process, f: FloatArray, density: FloatArray, fast: float) -> Notice:
+def _peak(label: str, f: FloatArray, density: FloatArray, weight: float, fast: float) -> Notice:
     place = float(f[int(np.argmax(density))])
     high = f >= fast
     variance = 2.0 * float(trapezoid((density * f)[high], np.log(f[high])))
+    also = f" and {brief(100.0 * weight)} % of the peak" if weight > tuning.FADED else ""
     text = (
-        f"the {label} is left out but for its density at low frequencies: it lies above "
+        f"the {label} is left out but for its density at low frequencies{also}: it lies above "
         f"{fast:.3g} Hz and averages out"
     )
-    values = {"density": float(density[0]), "frequency": place, "variance": variance}
+    values = {
+        "density": float(density[0]), "frequency": place, "variance": variance, "share": weight,
+    }  # fmt: skip
     return Notice("fast-peak-left-out", "note", "", text, values)

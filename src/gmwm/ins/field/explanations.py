@@ -21,7 +21,7 @@ from gmwm.ins import tuning
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.filter import KINDS
 
-TESTS = 15
+TESTS = 19
 """Ways in which a log can contradict a filter, or be explained better: each gets its share of the
 probability of a false alarm."""
 
@@ -85,6 +85,7 @@ class Constant:
     """A constant error: how it is allowed for, steps of its derivatives, and what is possible.
 
     smooth: Allows for it too, less exactly, but with the same noise between two fixes.
+    where: With what it is wrong.
     """
 
     code: str
@@ -93,12 +94,29 @@ class Constant:
     step: float
     prior: float
     smooth: Callable[[Replay, FloatArray], Replay] | None = None
+    where: str = ""
 
 
-_CLOCK = Constant(
-    "time-offset", ("time offset",), lambda r, x: r.later(-float(x[0])), 0.05,
-    tuning.LARGEST_OFFSET, lambda r, x: r.along(-float(x[0])),
-)  # fmt: skip
+def _clock(
+    code: str, name: str, course: Callable[[FloatArray], FloatArray], longest: float = 1.0
+) -> Constant:
+    """Stamps that are off by a constant times a course over the filter's time, which grows to
+    ``longest``.
+    """
+    return Constant(
+        code, (name,), lambda r, x: r.later(lambda time: -x[0] * course(time)), 0.05 / longest,
+        tuning.LARGEST_OFFSET / longest, lambda r, x: r.along(lambda time: -x[0] * course(time)),
+    )  # fmt: skip
+
+
+def _scale(kind: str) -> Constant:
+    return Constant(
+        "scale-error", ("x", "y", "z"), lambda r, x: r.with_factors(kind, 1.0 / (1.0 + x)), 0.01,
+        tuning.LARGEST_SCALE_ERROR, where=kind,
+    )  # fmt: skip
+
+
+_CLOCK = _clock("time-offset", "time offset", np.ones_like)
 _ARM = Constant(
     "lever-arm", ("forward", "right", "down"), lambda r, x: r.with_arm_longer(x), 0.5,
     tuning.LARGEST_ARM,
@@ -133,6 +151,20 @@ def constant_errors(base: Replay) -> Iterator[Candidate]:
         )  # fmt: skip
 
 
+def rarer_errors(base: Replay) -> Iterator[Candidate]:
+    """A clock that drifts, from the start of the filter or from an offset on, and scale errors."""
+    drift = _clock("clock-drift", "drift", lambda time: time, base.imu.n * base.imu.dt)
+    for errors in ((drift,), (_CLOCK, drift), (_scale("gyro"),), (_scale("accel"),)):
+        columns = [
+            column for each in errors for column in _columns(
+                base, partial(each.change, base), _steps((each,)), np.zeros(len(each.names))
+            )
+        ]  # fmt: skip
+        gain = _step(base, columns, errors, np.zeros(len(columns)))[2]
+        codes = frozenset(each.code for each in errors)
+        yield Candidate(codes, gain, partial(_fitted, base, base, errors))
+
+
 def clock_step(base: Replay) -> Candidate | None:
     """Stamps that are off by a constant from some fix on: a clock was set, or samples were lost.
 
@@ -146,10 +178,7 @@ def clock_step(base: Replay) -> Candidate | None:
 
     def at(i: int) -> Constant:
         since = 0.5 * float(time[i - 1] + time[i])
-        return replace(
-            _CLOCK, code="clock-step", change=lambda r, x: r.later(-float(x[0]), since),
-            smooth=lambda r, x: r.along(-float(x[0]), since),
-        )  # fmt: skip
+        return _clock("clock-step", "time offset", lambda time: np.where(time >= since, 1.0, 0.0))
 
     def promised(i: int) -> float:
         column = _columns(base, partial(at(i).change, base), _steps((_CLOCK,)), np.zeros(1))
@@ -219,13 +248,13 @@ def wrong_signs(base: Replay) -> Iterator[Candidate]:
     """
     for kind in ("gyro", "accel"):
         ways = list(product((1.0, -1.0), repeat=3))
-        tried = [base.with_signs(kind, signs) for signs in ways]
+        tried = [base.with_factors(kind, signs) for signs in ways]
         likelihoods = np.array([each.log_likelihood for each in tried])
         best = int(np.argmax(likelihoods))
         alike = np.array(ways)[likelihoods >= likelihoods[best] - tuning.AMBIGUOUS]
         shown = np.where(np.all(alike == alike[0], axis=0), alike[0], 0.0)
         values = dict(zip(("x", "y", "z"), shown.tolist(), strict=True))
-        change = partial(Replay.with_signs, kind=kind, signs=ways[best])
+        change = partial(Replay.with_factors, kind=kind, factors=ways[best])
         gain, price = difference(tried[best], base), cost(1, len(ways))
         found = Explanation("axis-signs", kind, change, tried[best], gain, price, values)
         yield Candidate(frozenset({"axis-signs"}), gain, partial(tuple, (found,)))
@@ -236,6 +265,10 @@ def _fitted(
 ) -> tuple[Explanation, ...]:
     """Constant errors by Gauss-Newton, one explanation each; ``start`` is in ``here`` already."""
     origin, parts = here, _parts(errors)
+    # Stamps that are farther off leave no fix near.
+    most = np.concatenate([
+        np.full(len(each.names), each.prior if each.smooth else np.inf) for each in errors
+    ])  # fmt: skip
     theta = np.zeros(parts[-1].stop)
 
     def changed(x: FloatArray) -> Replay:
@@ -248,9 +281,7 @@ def _fitted(
     for _ in range(tuning.ROUNDS):
         columns = _columns(here, changed, _steps(errors), theta)
         move, covariance, promised = _step(here, columns, errors, theta)
-        tried = theta + move
-        if errors[0].names == _CLOCK.names:
-            tried[0] = np.clip(tried[0], -tuning.LARGEST_OFFSET, tuning.LARGEST_OFFSET)
+        tried = np.clip(theta + move, -most, most)
         new = changed(tried)
         if not new.log_likelihood > here.log_likelihood:
             break
@@ -279,7 +310,7 @@ def _fitted(
         def change(replay: Replay, each: Constant = each, x: FloatArray = theta[part]) -> Replay:
             return each.change(replay, x)
 
-        found.append(Explanation(each.code, "", change, here, gain, price, values, spread))
+        found.append(Explanation(each.code, each.where, change, here, gain, price, values, spread))
     return tuple(found)
 
 

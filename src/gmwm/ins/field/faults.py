@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief
+from gmwm._core.text import brief, per_cent
 from gmwm.ins import tuning
 from gmwm.ins.field.explanations import (
     LEVEL,
@@ -19,12 +19,14 @@ from gmwm.ins.field.explanations import (
     constant_errors,
     cost,
     far_heading,
+    rarer_errors,
     wrong_signs,
 )
 from gmwm.ins.field.noises import coloured, fix_noise, outliers, sensor_noise
 from gmwm.ins.field.replay import Replay
+from gmwm.ins.geometry import STANDARD_GRAVITY
 
-_CONSTANT = frozenset({"time-offset", "lever-arm", "heading"})
+_CONSTANT = frozenset({"time-offset", "clock-drift", "lever-arm", "heading"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,8 @@ class Faults:
                 ):  # fmt: skip
                     other = first[-1].codes - {best[0].code}
                     alternatives = tuple(sorted({*alternatives, *other}))
+                if _may_be_a_bias(best[0]):
+                    alternatives = tuple(sorted({*alternatives, "sensor-slow-errors"}))
             found += best
             here = found[-1].replay
         found, here = _cleaned_again(base, found, here)
@@ -100,6 +104,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
         sizes = [here.test(kind).nis.value for kind in here.kinds()]
         if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
             found += [far_heading(here), *wrong_signs(here)]
+        found += rarer_errors(here)
         found += [each for each in (clock_step(here), coloured(here)) if each is not None]
         found += [*fix_noise(here), *sensor_noise(here)]
     return [each for each in found if not each.codes & known]
@@ -140,6 +145,13 @@ def _cleaned_again(
     (again,) = cleaned.refined()
     place = codes.index("outliers")
     return [*others[:place], again, *others[place:]], again.replay
+
+
+def _may_be_a_bias(fault: Explanation) -> bool:
+    """Whether only the vertical shows a scale error: gravity is constant there, as a bias is."""
+    return (fault.code, fault.where) == ("scale-error", "accel") and all(
+        abs(fault.values[axis]) < tuning.SEEN * fault.errors[axis] for axis in ("x", "y")
+    )
 
 
 # -- words ----------------------------------------------------------------------------------------
@@ -218,6 +230,31 @@ def _step(fault: Explanation) -> tuple[str, str]:
     )
 
 
+def _drift(fault: Explanation) -> tuple[str, str]:
+    drift = fault.values["drift"]
+    return (
+        f"the clock of the fixes {'gains' if drift > 0.0 else 'loses'} {abs(1e6 * drift):.3g} ppm "
+        f"on the IMU's (standard error {brief(1e6 * fault.errors['drift'], 1)} ppm)",
+        f"stamp both by one clock, or divide the IMU's rate by {1.0 + drift:.6f}",
+    )
+
+
+def _scale(fault: Explanation) -> tuple[str, str]:
+    parts = ", ".join(
+        f"{per_cent(fault.values[axis])} {axis} ({per_cent(fault.errors[axis], 1)})"
+        for axis in ("x", "y", "z")
+    )
+    text = f"the scale is wrong by {parts}, standard errors in brackets"
+    if _may_be_a_bias(fault):
+        text += (
+            "; this motion does not tell it from a bias of z of "
+            f"{abs(fault.values['z']) * STANDARD_GRAVITY:.2g} m/s^2"
+        )
+    size = {axis: abs(fault.values[axis]) / fault.errors[axis] for axis in ("x", "y", "z")}
+    seen = [axis for axis in size if size[axis] > min(tuning.SEEN, 0.9 * max(size.values()))]
+    return text, f"calibrate the scale of {', '.join(f'{fault.where}_{axis}' for axis in seen)}"
+
+
 def _arm(fault: Explanation) -> tuple[str, str]:
     parts = ", ".join(
         f"{fault.values[name]:.2f} m {name} ({fault.errors[name]:.1g})"
@@ -266,13 +303,15 @@ def _signs(fault: Explanation) -> tuple[str, str]:
         text += f" (this motion does not show that of {', '.join(unseen)})"
     return text, (
         "bring gyros and accelerometers to the same axes forward, right, down: turn "
-        f"{', '.join(turned or unseen)} round"
+        f"{', '.join(turned or unseen)} round, and check every gyro by hand, for a drive does not "
+        "show them all: positive while the right side goes down (x), the front goes up (y), it "
+        "turns right (z)"
     )
 
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
-    share = f"{brief(100.0 * fault.values['fraction'])} %"
+    share = f"{per_cent(fault.values['fraction'])}"
     return (
         f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
         "leave them out",
@@ -333,6 +372,8 @@ def _slow(fault: Explanation) -> tuple[str, str]:
 _WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {
     "time-offset": _time,
     "clock-step": _step,
+    "clock-drift": _drift,
+    "scale-error": _scale,
     "lever-arm": _arm,
     "heading": _heading,
     "axis-signs": _signs,

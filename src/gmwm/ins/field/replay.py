@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,6 +20,9 @@ from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory import NavState
 from gmwm.process import Model, Process
+
+Shift = Callable[[FloatArray], FloatArray]
+"""By how much later the stamps of fixes are, s, of their times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,19 +105,17 @@ class Replay:
 
     # -- other assumptions ------------------------------------------------------------------------
 
-    def later(self, seconds: float, since: float = -np.inf) -> Replay:
-        """Fixes with stamps as much later: all, with the one that made the initial state, or those
-        from a time on.
-        """
+    def later(self, shift: Shift) -> Replay:
+        """Fixes with later stamps, and with them the one that made the initial state."""
         fixes = []
         for each in self.aiding.fixes:
-            time = each.time + np.where(each.time >= since, seconds, 0.0)
+            time = each.time + shift(each.time)
             order = np.argsort(time, kind="stable")
             value, sd = each.value[order], each.sd[order]
             fixes.append(replace(each, time=time[order], value=value, sd=sd))
-        return self._from_then(seconds, since, fixes)
+        return self._from_then(shift, fixes)
 
-    def along(self, seconds: float, since: float = -np.inf) -> Replay:
+    def along(self, shift: Shift) -> Replay:
         """Fixes moved along the track by as much, in place of their stamps.
 
         By the velocity of the filter, and by what the accelerometers measure in a second: less
@@ -121,30 +123,30 @@ class Replay:
         """
         track, dt = self.track, self.imu.dt
         total = np.cumsum(np.vstack([np.zeros(3), self.imu.velocity]), axis=0)
-        reach = 0.5 * max(abs(seconds), tuning.TRACK_STEP)
         fixes = []
         for each in self.aiding.fixes:
+            seconds = shift(each.time)
+            reach = 0.5 * np.maximum(np.abs(seconds), tuning.TRACK_STEP)
             middle = each.time + 0.5 * seconds
             ends = (np.clip(middle + by, 0.0, self.imu.n * dt) for by in (-reach, reach))
             first, last = (np.rint(end / dt).astype(int) for end in ends)
             force = (total[last] - total[first]) / (np.maximum(last - first, 1) * dt)[:, None]
             near = np.clip(np.searchsorted(track.time, middle), 0, track.time.size - 1)
-            change = seconds * np.einsum("eij,ej->ei", track.matrix[near], force)
+            change = seconds[:, None] * np.einsum("eij,ej->ei", track.matrix[near], force)
             change[:, 2] += seconds * gravity_at(np.sin(track.lla[near, 0]), track.lla[near, 2])
             velocity = np.stack(
                 [np.interp(each.time, track.time, one) for one in track.velocity.T], axis=1
             )
             by = {"velocity": change, "standstill": 0.0 * change}.get(
-                each.kind, seconds * (velocity + 0.5 * change)
+                each.kind, seconds[:, None] * (velocity + 0.5 * change)
             )
             if each.kind == "height":
                 by = -by[:, 2:]
-            by = np.where(each.time[:, None] >= since, -by, 0.0)
-            fixes.append(replace(each, value=each.moved(by)))
-        return self._from_then(seconds, since, fixes)
+            fixes.append(replace(each, value=each.moved(-by)))
+        return self._from_then(shift, fixes)
 
-    def _from_then(self, seconds: float, since: float, fixes: list[Fixes]) -> Replay:
-        state = self.state if since > -np.inf else self._where_at(-seconds)
+    def _from_then(self, shift: Shift, fixes: list[Fixes]) -> Replay:
+        state = self._where_at(-float(shift(np.zeros(1))[0]))
         return replace(self, state=state, aiding=replace(self.aiding, fixes=tuple(fixes)))
 
     def _where_at(self, seconds: float) -> NavState:
@@ -175,9 +177,11 @@ class Replay:
             self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
         )
 
-    def with_signs(self, kind: str, signs: tuple[float, ...]) -> Replay:
-        """Axes of a kind of sensors the other way round; levelled by the accelerometers anew."""
-        turn = np.array(signs)
+    def with_factors(self, kind: str, factors: tuple[float, ...] | FloatArray) -> Replay:
+        """What the axes of a kind of sensors measure times factors; levelled by the accelerometers
+        anew.
+        """
+        turn = np.array(factors)
         if kind == "gyro":
             return replace(self, imu=replace(self.imu, rotation=self.imu.rotation * turn))
         x, y, z = -turn * matrix_from_rpy(self.state.rpy)[2]

@@ -6,5 +6,6 @@ from gmwm.readers.clock.civil_time import (
     without_summer_time as without_summer_time,
 )
 from gmwm.readers.clock.jumps import Jumps as Jumps
-from gmwm.readers.clock.stamps import Clock as Clock, Timing as Timing, agree as agree
+from gmwm.readers.clock.stamps import Clock as Clock
+from gmwm.readers.clock.timing import Timing as Timing, agree as agree, timing_of as timing_of
 from gmwm.readers.clock.unit_of_time import without_unit as without_unit

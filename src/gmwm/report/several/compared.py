@@ -193,7 +193,7 @@ def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict
     return {
         "range": " to ".join(dict.fromkeys(ends)) or "none found",
         "covering": sign + text if np.isfinite(covering) else "none",
-        "unit": unit,
+        "unit": unit if np.isfinite(covering) else "",
         "details": ", ".join(details),
         "stated": times,
     }

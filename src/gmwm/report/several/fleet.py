@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.text import brief
+from gmwm._core.text import per_cent
 from gmwm.errors import printable
 from gmwm.fleet import (
     CONFIDENCE,
@@ -182,7 +182,7 @@ def _row(spread: Spread) -> dict[str, Any]:
 def _spread_text(spread: Spread, text: Any) -> str:
     if not np.isfinite(spread.sd):
         return "-"
-    return f"{brief(100.0 * spread.sd)} %" if spread.is_logarithmic else text(spread.sd)
+    return f"{per_cent(spread.sd)}" if spread.is_logarithmic else text(spread.sd)
 
 
 def _outliers(spreads: Sequence[Spread]) -> list[dict[str, str]]:

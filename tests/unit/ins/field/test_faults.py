@@ -75,6 +75,40 @@ def test_a_clock_that_is_set_in_the_middle(vehicle):
     assert fault.values["before"] - fault.values["after"] < (3.0 if vehicle != "car" else 30.0)
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.3])
+def test_a_clock_that_drifts(offset):
+    """A step of the clock was named, or a time offset, which is half of it."""
+    log, _ = emulated_log(224, "helicopter", duration=300.0, rate=10.0, faults=("clock drift",))
+    fixes = tuple(replace(each, time=each.time + offset) for each in log.aiding.fixes)
+    navigated = Navigated.of(replace(log, aiding=replace(log.aiding, fixes=fixes)))
+    notices = {each.code: each for each in navigated.fault_notices}
+    assert set(notices) == {"clock-drift", *(("time-offset",) if offset else ())}
+    within(notices["clock-drift"], "drift", 5e-4)
+    assert navigated.faults.explained
+
+
+@pytest.mark.parametrize(("kind", "vehicle"), [("gyro", "loiter"), ("accel", "car")])
+def test_a_scale_error(kind, vehicle):
+    """White noise of the gyros was blamed, of either."""
+    navigated = found(225, f"{kind} scale", vehicle=vehicle, duration=300.0)
+    (fault,) = navigated.fault_notices
+    assert (fault.code, fault.where) == ("scale-error", kind)
+    for axis in "xyz":
+        within(fault, axis, 0.03)
+    assert not navigated.faults.alternatives
+
+
+def test_a_bias_of_the_vertical_axis_may_be_a_scale_error_and_is_said_to_be_either():
+    believed = sensors()
+    believed = replace(believed, bias_sd={**believed.bias_sd, "accel_z": 0.005})
+    log, _ = emulated_log(226, duration=DURATION, rate=10.0)
+    velocity = log.imu.velocity + np.array([0.0, 0.0, 0.1]) * log.imu.dt
+    log = replace(log, imu=replace(log.imu, velocity=velocity), sensors=believed)
+    navigated = Navigated.of(log)
+    named = {navigated.verdict.code, *navigated.faults.alternatives}
+    assert {"scale-error", "sensor-slow-errors"} <= named
+
+
 def test_two_steps_of_a_clock_that_goes_back():
     """Fixes half a second apart keep their order."""
     log, _ = emulated_log(214, "helicopter", duration=DURATION, rate=10.0)
@@ -200,7 +234,8 @@ def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
     assert (fault.code, fault.where) == ("axis-signs", kind)
     assert tuple(fault.values[axis] for axis in "xyz") == shown
     assert navigated.faults.explained
-    assert fault.action.endswith("turn gyro_z round" if kind == "gyro" else "y, accel_z round")
+    assert ("turn gyro_z round" if kind == "gyro" else "y, accel_z round") in fault.action
+    assert "check every gyro by hand" in fault.action
 
 
 def test_two_faults_together():

@@ -132,7 +132,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_have_the_covariance_of_the_filter(kind):
-    truth = KINDS[kind](duration=300.0, dt=0.02)
+    truth = KINDS[kind](duration=300.0, dt=0.05)
     aiding = aided(kind, truth).without([Outage(180.0, 60.0)])
     ensemble(truth, aiding, 40, before=[240.0]).check()
 

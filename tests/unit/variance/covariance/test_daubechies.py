@@ -1,5 +1,7 @@
 """The covariance of wavelet variances against its definition, simulation and the Haar module."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
@@ -35,10 +37,16 @@ def series_covariance(process, n):
     return toeplitz(process.autocovariance(np.arange(n), 1.0))
 
 
+@lru_cache
+def filters(name, n):
+    """A matrix a level, by which n samples become its coefficients."""
+    columns = [list(coefficients(unit, name)) for unit in np.eye(n)]
+    return [np.stack(level, axis=1) for level in zip(*columns, strict=True)]
+
+
 def brute_force(covariance, name):
     """2 / (M_j M_k) sum_{s,t} cov(W_js, W_kt)^2, the filters written as matrices."""
-    columns = [list(coefficients(unit, name)) for unit in np.eye(len(covariance))]
-    matrices = [np.stack(level, axis=1) for level in zip(*columns, strict=True)]
+    matrices = filters(name, len(covariance))
     left = [matrix @ covariance for matrix in matrices]
     return np.array([[2.0 * np.mean((a @ b.T) ** 2) for b in matrices] for a in left])
 
@@ -53,9 +61,9 @@ def of(process, n, name, **options):
     return wavelet_covariance(process.psd, n, 1.0, name, wavelet(name).levels(n), **options)
 
 
+@pytest.mark.parametrize("process", PROCESSES, ids=repr)  # innermost: they share what is set up
 @pytest.mark.parametrize("n", [64, 130])
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("process", PROCESSES, ids=repr)
 def test_covariance_equals_the_sum_over_all_pairs_of_coefficients(process, name, n):
     expected = brute_force(series_covariance(process, n), name)
     assert distance(of(process, n, name), expected) < 2e-3
@@ -75,17 +83,17 @@ def test_twice_integrated_noise_under_two_vanishing_moments():
 
 
 @pytest.mark.parametrize("name", ["db2", "sym5", "coif2"])
-@pytest.mark.parametrize("process", PROCESSES, ids=repr)
-def test_lags_that_are_multiples_of_a_block_give_the_same_as_all_lags(process, name, monkeypatch):
+def test_lags_that_are_multiples_of_a_block_give_the_same_as_all_lags(name, monkeypatch):
     n = 6000
     try:
+        module._lag_sums.cache_clear()
         monkeypatch.setattr(tuning, "EXACT_SAMPLES", n)
+        exact = [of(process, n, name) for process in PROCESSES]
         module._lag_sums.cache_clear()
-        exact = of(process, n, name)
         monkeypatch.setattr(tuning, "EXACT_SAMPLES", 2048)
-        module._lag_sums.cache_clear()
         assert module._lag_sums(name, n, wavelet(name).levels(n)).grid.block > 1
-        assert distance(of(process, n, name), exact) < 0.01
+        for process, expected in zip(PROCESSES, exact, strict=True):
+            assert distance(of(process, n, name), expected) < 0.01, process
     finally:
         module._lag_sums.cache_clear()
 
@@ -100,8 +108,8 @@ def test_a_level_of_few_coefficients_in_a_long_record_is_one_square(excess):
     assert of(process, n, "db2")[-1, -1] == pytest.approx(2.0 * variance**2, rel=0.02)
 
 
-@pytest.mark.parametrize("n", [50, 3000, 100_000])
 @pytest.mark.parametrize("process", PROCESSES, ids=repr)
+@pytest.mark.parametrize("n", [50, 3000, 100_000])
 def test_haar_is_the_same_as_by_its_own_module(process, n):
     expected = haar_covariance(process.psd, n, 1.0)
     assert distance(of(process, n, "haar"), expected) < 0.02
@@ -131,7 +139,7 @@ def test_covariance_is_that_of_simulated_series(process, name):
     assert np.max(np.abs(found - predicted) / np.outer(scale, scale) / spread) < 4.5
 
 
-@pytest.mark.parametrize("n", [64, 1000, 4099, 100_000, 3_000_000])
+@pytest.mark.parametrize("n", [64, 1000, 4099, 3_000_000])
 @pytest.mark.parametrize("name", ["db2", "db6", "coif5"])
 def test_covariance_is_symmetric_and_positive_definite(name, n):
     model = gmwm.WhiteNoise(1.0) + gmwm.GaussMarkov(0.3, 40.0) + gmwm.RandomWalk(1e-3)
