@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+from pathlib import Path
 
 # Before numpy is imported: as many workers as cores, each with threads of its own, wait for each
 # other more than they compute.
@@ -51,3 +52,18 @@ def run(monkeypatch, capsys, tmp_path):
         return code, *capsys.readouterr()
 
     return _run
+
+
+@pytest.fixture
+def no_pages(monkeypatch):
+    """Pages take most of the time of a command: tests that do not look at one go without."""
+    from gmwm.calibration.calibration import Calibration
+    from gmwm.ins.field.navigated import Navigated
+    from gmwm.ins.montecarlo.validation import Validation
+
+    def empty(self, path, *_, **__):
+        Path(path).touch()
+        return path
+
+    for each in (Calibration, Navigated, Validation):
+        monkeypatch.setattr(each, "report", empty)

@@ -10,7 +10,7 @@ from bags import ROS1, ROS2, at_rest, imu_topic, write1, write2
 X = at_rest(2000)
 
 
-def test_bag_to_kalibr(run, tmp_path):
+def test_bag_to_kalibr(run, no_pages, tmp_path):
     write1(tmp_path / "static.bag", {"/imu": imu_topic(ROS1, X)})
     fixed = ("--model", "N", "--leave", "all", "-q")
     code, out, told = run("calibrate", "static.bag", "--export", "kalibr", "-o", "out", *fixed[:-1])
@@ -32,7 +32,7 @@ def test_a_bag_that_is_a_folder(run, tmp_path):
     assert "sha256 of bag/metadata.yaml" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_accelerometer_alone(run, tmp_path):
+def test_accelerometer_alone(run, no_pages, tmp_path):
     accel = X.copy()
     accel[:, :3] = 0.0
     write1(tmp_path / "a.bag", {"/accel": imu_topic(ROS1, accel)})
@@ -43,7 +43,7 @@ def test_accelerometer_alone(run, tmp_path):
     assert told.count("\n") == 1 and "gyro" in told
 
 
-def test_unit_gate(run, tmp_path):
+def test_unit_gate(run, no_pages, tmp_path):
     write1(tmp_path / "a.bag", {"/livox/imu": imu_topic(ROS1, X / ([1.0] * 3 + [9.80665] * 3))})
     fixed = ("--model", "N", "--leave", "all", "-q")
     code, _, told = run("calibrate", "a.bag", *fixed)

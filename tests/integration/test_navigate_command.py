@@ -16,7 +16,6 @@ from gmwm.calibration.calibration import Calibration
 from gmwm.cli.main import cli
 from gmwm.estimate.entrance import fit
 from gmwm.ins.imu.sensors import AXES
-from gmwm.ins.montecarlo.validation import Validation
 from gmwm.readers.recording import Channel
 from gmwm.variance.analysis import wavelet_variance
 
@@ -71,12 +70,6 @@ def studied(tmp_path_factory):
         yield done.stdout, Path("a").resolve()
 
 
-@pytest.fixture
-def no_page(monkeypatch):
-    """What a page shows is looked at in one study; it takes longer than the runs."""
-    monkeypatch.setattr(Validation, "report", lambda self, path: path)
-
-
 def test_a_study_prints_tables_and_writes_a_report(studied):
     printed, folder = studied
     table = (folder / "validation.txt").read_text()
@@ -99,13 +92,13 @@ def test_the_same_seed_gives_the_same_files(run, studied):
         assert path.read_bytes() == (studied[1] / path.name).read_bytes()
 
 
-def test_another_seed_gives_another_table(run, studied, no_page):
+def test_another_seed_gives_another_table(run, studied, no_pages):
     run(written(), "-o", "a", "--jobs", 1, "--seed", 4)
     rows = [(f / "validation.txt").read_text().splitlines()[1:] for f in (Path("a"), studied[1])]
     assert rows[0] != rows[1]
 
 
-def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, studied, no_page):
+def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, studied, no_pages):
     first, folder = studied
     written()
     shutil.copytree(folder, "a")
@@ -121,7 +114,7 @@ def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, stud
     assert Path("a/validation.txt").read_text() == without_time(first) + "\n"
 
 
-def test_options_go_before_the_file(run, no_page):
+def test_options_go_before_the_file(run, no_pages):
     written(runs=50, duration=4000)
     code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 1, "--duration", 20, "--seed", 7,
                            "--outage", "8:4", "--filter", "only=truth", "--trajectory",
@@ -132,7 +125,7 @@ def test_options_go_before_the_file(run, no_page):
     assert "big" not in printed
 
 
-def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_page):
+def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_pages):
     code, printed, _ = run(written(rate=None), "--rate", 10, "--runs", 1, "--jobs", 1)
     assert code == 0
     assert printed.startswith("car: 30 s at 10 Hz")
@@ -140,7 +133,7 @@ def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_page):
     assert (code, "is about reading --imu, and there is none" in told) == (2, True)
 
 
-def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_page):
+def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_pages):
     folder = Path("deep/er")
     folder.mkdir(parents=True)
     calibration(folder / "cal.json")
@@ -154,7 +147,7 @@ def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, 
     assert "cal.json: cannot be read" in told
 
 
-def test_a_study_from_options_alone(run, no_page):
+def test_a_study_from_options_alone(run, no_pages):
     calibration(Path("cal.json"))
     code, printed, _ = run("--trajectory", "car", "--duration", 15, "--truth", "cal.json",
                            "--filter", "A=truth", "--runs", 1, "--jobs", 1)  # fmt: skip
@@ -162,7 +155,7 @@ def test_a_study_from_options_alone(run, no_page):
     assert printed.startswith("car: 15 s at 100 Hz, 1 run, seed 0\n")
 
 
-def test_a_logged_trajectory(run, no_page):
+def test_a_logged_trajectory(run, no_pages):
     t = np.arange(0.0, 30.1, 0.1)
     rows = np.stack([t, 46 + 1e-4 * t, 7 + 0 * t, 400 + 0 * t, 0 * t, 0 * t, 0 * t], axis=-1)
     header = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"

@@ -104,7 +104,7 @@ def test_names_inject_nothing_into_yaml(tmp_path):
     assert len(path.read_text().splitlines()) == len(path.read_bytes().split(b"\n")) - 1
 
 
-def test_a_file_name_that_is_not_utf8(run, tmp_path):
+def test_a_file_name_that_is_not_utf8(run, tmp_path, no_pages):
     name = os.fsdecode(b"stat\xff\x1b[31mic.csv")
     recording(tmp_path / name)
     done = run("calibrate", name, *OPTIONS, "-o", "out")
@@ -118,7 +118,7 @@ def test_a_file_name_that_is_not_utf8(run, tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_a_terminal_that_lacks_letters(run, tmp_path, encoding):
+def test_a_terminal_that_lacks_letters(run, tmp_path, encoding, no_pages):
     recording(tmp_path / "Größe²Ω.csv", extra="température Ω")
     done = run("calibrate", "Größe²Ω.csv", *OPTIONS, "-o", "out", encoding=encoding)
     assert done.returncode == 0, done.stderr

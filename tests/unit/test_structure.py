@@ -4,10 +4,9 @@ import ast
 import re
 import sys
 from collections import defaultdict
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
-
-import pytest
 
 from places import REPOSITORY
 
@@ -41,8 +40,13 @@ FACES = {
 """Names that the rooms show; a function may have the name of its file."""
 
 
+@cache
 def imports(path):
     """Modules of the package that a file imports when it runs."""
+    return set(_imports(path))
+
+
+def _imports(path):
     tree = ast.parse(path.read_text())
     typing_only = {
         id(node)
@@ -90,7 +94,7 @@ def circles(graph):
 def test_files_import_each_other_in_one_direction_only():
     graph = defaultdict(set)
     for path in FILES:
-        graph[dotted(path)] |= set(imports(path)) - {dotted(path), ""}
+        graph[dotted(path)] |= imports(path) - {dotted(path), ""}
     assert circles(graph) == [NATURAL]
 
 
@@ -101,13 +105,10 @@ def room(name):
     return ".".join(parts[: min(depth, 2 if parts[0] in INNER else 1)])
 
 
-@pytest.mark.parametrize("path", FILES, ids=dotted)
-def test_outsiders_import_faces_only(path):
-    own = room(dotted(path))
-    for name in imports(path):
-        inside = room(name)
-        outside = inside not in ("", "_core", "estimate", "ins") and inside != own
-        assert not outside or name in PACKAGES, f"{dotted(path)} looks into {name}"
+def test_outsiders_import_faces_only():
+    looks = [(dotted(path), name) for path in FILES for name in imports(path) - PACKAGES]
+    free = ("", "_core", *INNER)
+    assert not [(own, name) for own, name in looks if room(name) not in (*free, room(own))]
 
 
 def test_no_folder_is_a_crowd_and_nothing_stands_loose():
@@ -124,10 +125,10 @@ def test_tests_mirror_the_rooms():
     assert folders <= rooms
 
 
-@pytest.mark.parametrize("folder", ["benchmarks", "examples"])
-def test_no_script_stands_in_front_of_a_package(folder):
+def test_no_script_stands_in_front_of_a_package():
     # Python looks beside a script first: numba imports `coverage`, and would find ours.
-    scripts = {path.stem for path in (REPOSITORY / folder).glob("*.py")}
+    folders = (REPOSITORY / "benchmarks", REPOSITORY / "examples")
+    scripts = {path.stem for folder in folders for path in folder.glob("*.py")}
     taken = set(sys.stdlib_module_names) | set(packages_distributions()) | {"coverage"}
 
     assert scripts.isdisjoint(taken)

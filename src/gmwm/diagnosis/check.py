@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.notices import Notice, Severity, worst_first
 from gmwm._core.runs import shared
 from gmwm._core.text import per_cent
-from gmwm._core.typing import BoolArray, FloatArray, Progress
+from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import (
     Tails,
@@ -40,6 +41,7 @@ from gmwm.diagnosis.samples import (
     abrupt_end_notice,
     dead_notice,
     gap_notices,
+    hole_notice,
     length_notice,
     repeated_value_notice,
     saturation_notice,
@@ -58,7 +60,7 @@ class _Examined:
 
     notices: list[Notice]
     facts: ChannelHealth
-    errors: FloatArray | None
+    errors: npt.NDArray[np.float32] | None
 
 
 def health(recording: Recording, *, progress: Progress | None = None) -> Health:
@@ -202,7 +204,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     unusable = _unusable(channel)
     if unusable is not None:
         return _Examined([unusable], ChannelHealth(), None)
-    present = values[~np.isnan(values)]
+    present = known_of(values)
     step = step_size(present)
     errors = innovations(values, step)
     if errors is None:
@@ -212,7 +214,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     events, outliers, tails = _events(errors, values, step)
     events = motion.joined(events, dt)
     usable = errors.known.copy()
-    quiet = values.copy()
+    quiet = values.copy() if events else values
     for start, stop in events:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
@@ -221,11 +223,12 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
         held = 0.0  # most of what is held is held in a few places
     is_even = held > 0.0 and not leaves_runs(values)
-    noise = quiet[~np.isnan(quiet)]
+    noise = known_of(quiet)
     found = [
         held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
         saturation_notice(name, unit, present, noise, step)
-        or abrupt_end_notice(name, unit, noise, step, errors.level),
+        or abrupt_end_notice(name, unit, noise, step, errors.level)
+        or hole_notice(name, unit, noise, step, errors.level),
         repeated_value_notice(name, unit, present, step, errors.level),
         event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
         contamination_notice(name, outliers),
@@ -235,6 +238,9 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         drift_notice(name, unit, dt, quiet),
     ]
     notices = [one for one in found if one is not None]
+    standardized = _standardized(errors, usable)
+    level = errors.level
+    del present, noise, errors  # the spectrum needs as much memory
     lines, bumps = peaks(quiet, dt)
     if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
@@ -247,9 +253,9 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         lsb=step,
         outliers=outliers,
         held=held if chance <= tuning.CHANCE_OF_HELD and not is_even else 0.0,
-        noise=errors.level,
+        noise=level,
     )
-    return _Examined(notices, facts, _standardized(errors, usable))
+    return _Examined(notices, facts, standardized)
 
 
 def _unusable(channel: Channel) -> Notice | None:
@@ -281,11 +287,11 @@ def _events(
     return events, outliers, None
 
 
-def _standardized(errors: Innovations, usable: BoolArray) -> FloatArray | None:
+def _standardized(errors: Innovations, usable: BoolArray) -> npt.NDArray[np.float32] | None:
     if not errors.level > 0.0:
         return None
     result = np.where(errors.scale > 0.0, errors.scale, errors.level)
     np.divide(errors.values, result, out=result)
     np.clip(result, -tuning.CLIP, tuning.CLIP, out=result)
     result[~usable] = 0.0
-    return result
+    return result.astype(np.float32)  # those of all channels are kept

@@ -9,7 +9,7 @@ import numpy as np
 from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
-from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 
@@ -188,7 +188,8 @@ def _unsteadiness(
     16 samples, so that no memory of the sizes of a few samples counts. What the mean squares of
     the parts vary beyond the same of their own is the variance of the noise that changes.
     """
-    size = np.abs(errors.values[usable])
+    size = errors.values[usable]
+    np.abs(size, out=size)
     memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if is_heavy else 1)
     lengths = 4 * memory * 4 ** np.arange(16)
     lengths = lengths[lengths * tuning.FEWEST_STEADY <= size.size]
@@ -196,10 +197,15 @@ def _unsteadiness(
         return None
     bounded = np.minimum(size, tuning.LARGE * errors.level)
     # What is far beyond the noise around it is clipped: a shock is no change of the noise.
-    squares = np.minimum(size, tuning.CLIP * errors.scale[usable]) ** 2
+    squares = errors.scale[usable]
+    squares *= tuning.CLIP
+    np.minimum(size, squares, out=squares)
+    squares *= squares
     squares /= np.mean(squares)
-    square = (bounded - np.mean(bounded)) ** 2
-    kurt = float(np.mean(square**2) / np.mean(square) ** 2) - 3.0
+    square = bounded - np.mean(bounded)
+    square *= square
+    kurt = inner(square, square) / (square.size * float(np.mean(square)) ** 2) - 3.0
+    del square
     by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
     if min(by_chance) <= 0.0:
         return None

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import solve_toeplitz
 
-from gmwm._core.typing import BoolArray, FloatArray, inner
+from gmwm._core.typing import BoolArray, FloatArray, inner, known_of
 from gmwm.diagnosis import tuning
 
 _CLIPPED = 0.99892  # variance of the normal distribution within tuning.CLIP
@@ -55,23 +55,24 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     known = ~np.isnan(differences)
     if np.count_nonzero(known) < tuning.FEWEST_KNOWN:
         return None
-    filled = np.where(known, differences, 0.0)
     floor = step / np.sqrt(12.0)
-    clipped = np.where(known, np.clip(filled, *_limits(filled, known, floor)), 0.0)
-    coefficients = _autoregression(clipped, int(np.count_nonzero(known)))
+    limit = tuning.CLIP * robust_scale(known_of(differences), floor)
+    differences[~known] = 0.0
+    coefficients = _autoregression(np.clip(differences, -limit, limit), int(np.sum(known)))
     order = coefficients.size - 1
-    forward = np.convolve(coefficients, filled)[: n - 1]
-    # Differences of the reversed series have the other sign.
-    backward = np.convolve(coefficients, -filled[::-1])[: n - 1][::-1]
-    has_past = _complete(known, order)
-    has_future = _complete(known[::-1], order)[::-1]
     errors, present = np.zeros(n), np.zeros(n, dtype=bool)
-    errors[:-1], present[:-1] = np.where(has_future, backward, 0.0), has_future
-    errors[1:] = np.where(has_past, forward, errors[1:])
-    present[1:] |= has_past
+    errors[1:] = np.convolve(coefficients, differences)[: n - 1]
+    present[1:] = _complete(known, order)
+    errors[~present] = 0.0
+    rows = np.flatnonzero(_complete(known[::-1], order)[::-1] & ~present[:-1])
+    for k, coefficient in enumerate(coefficients):
+        # Differences of the reversed series have the other sign.
+        errors[rows] -= coefficient * differences[rows + k]
+    present[rows] = True
+    del differences
     if np.count_nonzero(present) < tuning.FEWEST_KNOWN:
         return None
-    scale = np.ones(n) * floor
+    scale = np.full(n, floor)
     scale[present] = running_scale(errors[present], floor)
     on_samples = np.convolve(coefficients, [1.0, -1.0])
     return Innovations(errors, present, scale, 0.5 * step * float(np.sum(np.abs(on_samples))))
@@ -83,19 +84,16 @@ def robust_scale(values: FloatArray, floor: float) -> float:
     The median absolute value starts it; it alone would see the steps of rounded data.
     """
     size = np.abs(values)
-    scale = max(_NORMAL_MAD * float(np.median(size)), floor)
+    scale = max(_NORMAL_MAD * float(np.median(size, overwrite_input=True)), floor)
+    size *= size
     for _ in range(_ROUNDS):
-        inner = size[size <= tuning.CLIP * scale]
-        new = max(float(np.sqrt(np.mean(inner**2) / _CLIPPED)), floor) if inner.size else scale
+        within = size <= (tuning.CLIP * scale) ** 2
+        count = np.count_nonzero(within)
+        new = max(np.sqrt(inner(size, within) / (count * _CLIPPED)), floor) if count else scale
         if abs(new - scale) <= 1e-3 * scale:
             break
         scale = new
     return scale
-
-
-def _limits(differences: FloatArray, known: BoolArray, floor: float) -> tuple[float, float]:
-    scale = robust_scale(differences[known], floor)
-    return -tuning.CLIP * scale, tuning.CLIP * scale
 
 
 def _autoregression(differences: FloatArray, known: int) -> FloatArray:
@@ -112,9 +110,10 @@ def _autoregression(differences: FloatArray, known: int) -> FloatArray:
 
 def _complete(known: BoolArray, order: int) -> BoolArray:
     """Whether a difference and the ``order`` before it are known."""
-    count = np.concatenate([[0], np.cumsum(known)])
-    complete = np.zeros(known.size, dtype=bool)
-    complete[order:] = count[order + 1 :] - count[: known.size - order] == order + 1
+    complete = known.copy()
+    complete[:order] = False
+    for k in range(1, order + 1):
+        complete[k:] &= known[:-k]
     return complete
 
 

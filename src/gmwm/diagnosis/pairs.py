@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice, Severity
@@ -15,7 +16,7 @@ from gmwm.diagnosis.drift import part_means
 from gmwm.readers import Recording
 
 
-def crosstalk_notices(errors: dict[str, FloatArray]) -> list[Notice]:
+def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice]:
     """Find pairs of channels whose prediction errors are correlated.
 
     The correlation of two white series has the variance 1/n, whatever the spectra of the channels

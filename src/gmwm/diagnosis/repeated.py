@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.resolution import step_size
 from gmwm.diagnosis.result import Repetition
@@ -103,15 +103,15 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
     scatter: Standard deviation of what cannot be predicted of a sample, u.
     Returns: zeros if chance, with three standard errors, explains those that repeat.
     """
-    sizes = np.abs(np.diff(values))
-    sizes = sizes[~np.isnan(sizes)]
+    sizes = np.diff(values)
+    sizes = known_of(np.abs(sizes, out=sizes))
     same = int(np.count_nonzero(sizes == 0.0))
     fewest = max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN)
     if same < fewest:
         return 0.0, 0.0
     width = step or tuning.NEAR * scatter
     near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
-    if not is_dithered(values[~np.isnan(values)], step) or not min(one, two):
+    if not is_dithered(known_of(values), step) or not min(one, two):
         return 0.0, 0.0
     if step == 0.0:
         # Steps that slowly change their size, by a correction, are a lattice all the same: of noise

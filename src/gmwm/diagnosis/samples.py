@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from gmwm._core.distributions import binom
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations
 from gmwm.readers import Channel
@@ -91,18 +92,27 @@ def is_dithered(values: FloatArray, step: float) -> bool:
     values: (n,), samples in their order, none missing.
     step: To which they are rounded, u; 0 if they are not.
     """
-    lengths = run_lengths(values)
-    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
-    steps = np.abs(np.diff(values))[free[1:] & free[:-1]]
-    if steps.size < tuning.LONG_RUN:
+    free = _outside_runs(run_lengths(values))
+    free = free[1:] & free[:-1]
+    count = np.count_nonzero(free)
+    if count < tuning.LONG_RUN:
         return False
-    return step == 0.0 or float(np.mean(steps > 1.5 * step)) > tuning.DITHERED
+    if step == 0.0:
+        return True
+    steps = np.diff(values)
+    far = free & (np.abs(steps, out=steps) > 1.5 * step)
+    return bool(np.count_nonzero(far) > tuning.DITHERED * count)
+
+
+def _outside_runs(lengths: IntArray) -> BoolArray:
+    """Of each sample, whether it is in none of the long runs."""
+    return np.repeat(lengths < tuning.LONG_RUN, lengths)
 
 
 def run_lengths(values: FloatArray) -> IntArray:
     """Lengths of the runs of equal samples, in their order."""
-    changes = np.flatnonzero(np.diff(values) != 0.0) + 1
-    return np.diff(np.concatenate([[0], changes, [values.size]]))
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    return np.diff(changes, prepend=0, append=values.size)
 
 
 def stuck_notice(
@@ -120,8 +130,8 @@ def stuck_notice(
     values: (n,), samples, NaN where missing.
     step: u; 0 if samples are not rounded.
     """
-    present = np.flatnonzero(~np.isnan(values))
-    series = values[present]
+    present = ~np.isnan(values)
+    series = known_of(values)
     if not is_dithered(series, step):
         return None
     lengths = run_lengths(series)
@@ -129,15 +139,15 @@ def stuck_notice(
     stuck = np.flatnonzero(lengths > longest)
     if not stuck.size:
         return None
-    starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
     worst = int(stuck[np.argmax(lengths[stuck])])
     total = int(np.sum(lengths[stuck]))
     share = total / series.size
+    start = int(np.sum(lengths[:worst]))
     numbers = {
         "count": float(stuck.size),
         "longest": float(lengths[worst]),
-        "time": float(present[starts[worst]]) * dt,
-        "value": float(series[starts[worst]]),
+        "time": float(np.flatnonzero(present)[start]) * dt,
+        "value": float(series[start]),
         "samples": float(total),
     }
     value = readable(numbers["value"], unit, digits=5)
@@ -152,13 +162,15 @@ def stuck_notice(
     )
 
 
-def _scale_between(errors: Innovations, present: IntArray, lengths: IntArray) -> float:
+def _scale_between(errors: Innovations, present: BoolArray, lengths: IntArray) -> float:
     """Usual standard deviation of prediction errors outside long runs."""
-    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
-    kept = present[free]
-    kept = kept[errors.known[kept]]
-    sizes = errors.values[kept]
-    return float(np.sqrt(np.median(errors.scale[kept]) * np.std(sizes))) if kept.size else 0.0
+    kept = present.copy()
+    kept[present] = _outside_runs(lengths)
+    kept &= errors.known
+    if not np.any(kept):
+        return 0.0
+    usual = np.median(errors.scale[kept], overwrite_input=True)
+    return float(np.sqrt(usual * np.std(errors.values[kept])))
 
 
 def _longest_by_chance(n: int, step: float, scale: float) -> int:
@@ -275,6 +287,56 @@ def abrupt_end_notice(
         "or sorted out",
         {"lowest": min(found), "highest": max(found), "density": density},
         "look for what wraps, cuts or takes absolute values between the sensor and the file",
+    )
+
+
+def hole_notice(
+    name: str, unit: str, values: FloatArray, step: float, scatter: float
+) -> Notice | None:
+    """Find steps that never come among others that often do, as where a bit of a word is stuck.
+
+    Noise thins out towards a gap between two of its levels. Beside a hole the numbers of samples do
+    not fall, and the steps on both sides come without a gap: lattices that lie in each other, as
+    of two offsets, have gaps all over.
+
+    name, unit: Of the channel.
+    values: (n,), samples, none missing.
+    step: u; 0 if samples are not rounded.
+    scatter: Standard deviation of what cannot be predicted of a sample, u.
+    """
+    lowest = float(np.min(values))
+    if step == 0.0 or step > scatter or np.ptp(values) > tuning.MOST_STEPS * step:
+        return None
+    counts = np.bincount(np.rint((values - lowest) / step).astype(np.intp))
+    there = np.flatnonzero(counts)
+    found = [
+        (int(below), int(above))
+        for below, above in pairwise(there)
+        if above - below > tuning.LEAST_HOLE
+        and all(
+            edge.size == tuning.LEAST_HOLE
+            and np.min(edge) >= tuning.FEWEST_AT_END
+            and 2 * edge[0] >= np.max(edge)
+            for edge in (
+                counts[below - tuning.LEAST_HOLE + 1 : below + 1][::-1],
+                counts[above : above + tuning.LEAST_HOLE],
+            )
+        )
+    ]
+    if not found:
+        return None
+    below, above = max(found, key=lambda pair: pair[1] - pair[0])
+    ends = [lowest + place * step for place in (below, above)]
+    width = ends[1] - ends[0]
+    where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    return Notice(
+        "abrupt-end",
+        "bad" if width > tuning.WIDE_HOLE * scatter else "warning",
+        name,
+        f"no sample lies between {where}, where those beside come often: a bit is stuck, or codes "
+        "of the converter are missing",
+        {"lowest": ends[0], "highest": ends[1], "holes": float(len(found))},
+        "look at the bits of the words between the sensor and the file",
     )
 
 

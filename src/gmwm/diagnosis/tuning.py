@@ -86,6 +86,11 @@ LONG_RUN = 32
 FEWEST_AT_END = 8
 """Samples at the end of the scale from which saturation is looked for."""
 
+LEAST_HOLE, WIDE_HOLE, MOST_STEPS = 3, 0.5, 1e6
+"""Steps that never come, beside as many that do each time, from which they are a hole; its width in
+standard deviations of the noise, above which the channel is not valid (a hole of two of them makes
+N 1.45 times as large, of a half 1.05 times); range in steps, beyond which there is no counting."""
+
 BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %

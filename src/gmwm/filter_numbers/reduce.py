@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -139,7 +139,7 @@ class _Search:
                 method="reduce",
                 predicted=found,
                 notices=(
-                    *Target.of(axis.model, axis.dt, longest, axis.unit).notices,
+                    *_ramps(axis, longest),
                     *_optimistic(found, longest),
                     *_below(axis, model),
                     *about(axis, None),
@@ -219,6 +219,12 @@ class _Search:
         return model, float(np.sqrt(variance))
 
 
+def _ramps(axis: Axis, longest: float) -> Iterator[Notice]:
+    """All else that a bound leaves out is part of the truth by which these are judged."""
+    found = Target.of(axis.model, axis.dt, longest, axis.unit).notices
+    return (each for each in found if each.code == "ramp-as-constant")
+
+
 def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...]:
     """Where a filter with them believes too little, of the times asked for or else beyond."""
     high = [each for each in found if each.nees > tuning.INCONSISTENT]
@@ -230,8 +236,8 @@ def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...
     if worst.time > longest:
         mend = "give that time among the outages if there are such"
         return (Notice("optimistic", "note", "", f"{text}, for which they are not", values, mend),)
-    text += "; no numbers of this form are consistent there and elsewhere"
-    mend = "use gmwm.bound, or a form with more terms"
+    text += "; no such numbers are consistent at all times and on all axes that share them"
+    mend = "use gmwm.bound, a form with more terms, or own numbers of each axis"
     return (Notice("optimistic", "warning", "", text, values, mend),)
 
 

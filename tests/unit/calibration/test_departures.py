@@ -82,7 +82,7 @@ def test_other_departures_are_found(kind, curve, time):
     ids=["N+K", "N", "N+10K", "N+GM", "N+2GM"],
 )
 def test_noise_has_none(model):
-    runs = 5
+    runs = 3
     free = gmwm.process.as_model(model).opened()
     count = 0
     for seed in range(runs):

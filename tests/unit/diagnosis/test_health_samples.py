@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.diagnosis.samples import abrupt_end_notice
+from gmwm.diagnosis.samples import abrupt_end_notice, hole_notice
 
 SEEDS = range(60)
 
@@ -141,6 +141,30 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     assert ends(x[x < 1.45]) == ("bad", near(1.45, abs=0.06), near(1.45, abs=0.06))
     # Samples that are sorted out beyond 2.2 deviations make the noise a tenth smaller at most.
     assert ends(x[x < 2.25])[0] == "warning"
+
+
+@pytest.mark.parametrize(("bit", "severity"), [(2, "warning"), (3, "bad"), (4, "bad")])
+@pytest.mark.parametrize("value", [0, 1])
+def test_a_stuck_bit_is_named(bit, severity, value):
+    codes = np.rint((white(100_000, 3) + 0.7) / 0.1).astype(int)
+    stuck = codes | 1 << bit if value else codes & ~(1 << bit)
+    found = hole_notice("gyro_x", "u", 0.1 * stuck, 0.1, 1.0)
+    assert found.severity == severity
+    assert found.values["highest"] - found.values["lowest"] == pytest.approx(0.1 * (2**bit + 1))
+
+
+def test_gaps_between_steps_are_no_stuck_bit():
+    noise = white(100_000, 3)
+    half = np.arange(noise.size) < 50_000
+    cases = [
+        (np.rint(noise / 0.1), 0.1),
+        (np.rint(noise / 0.37) * 5.0 + half, 0.074),  # two lattices
+        (np.rint(np.rint(noise / 0.1) * 1.25), 0.08),  # rounded twice
+        (np.rint((noise + 40.0 * half) / 0.1), 0.1),  # a step
+        (np.rint((noise + 40.0 * (np.arange(noise.size) // 5 % 2)) / 0.1), 0.1),
+    ]
+    for places, step in cases:
+        assert hole_notice("gyro_x", "u", places * step, step, 1.0) is None
 
 
 @pytest.mark.parametrize(("step", "severity"), [(0.1, "bad"), (0.02, "warning"), (0.5, "bad")])

@@ -346,11 +346,11 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     # No stationary process bounds it.
     fits = {name: fit for name, fit in calibration.items() if name.endswith("x")}
     calibration = replace(calibration, fits=fits)
-    text = gmwm.export(calibration, "kfgins", horizon=30.0)
+    text = gmwm.export(calibration, "kfgins", horizon=6.0)
     joined = " ".join(line.lstrip("# ") for line in text.splitlines())
     assert "gyro_x: a random walk, which N+GM cannot bound" in joined
     assert "whose filter has the right errors at the horizon" in joined
-    found = reduce(calibration, "N+GM", [5.0, 15.0, 30.0], tau="shared")
+    found = reduce(calibration, "N+GM", [1.0, 3.0, 6.0], tau="shared")
     content = yaml.safe_load(text)["imunoise"]
     assert np.radians(content["arw"][0]) / 60.0 == pytest.approx(found["gyro_x"].N, rel=1e-5)
     assert content["corrtime"] * 3600.0 == pytest.approx(found["gyro_x"].tau[0], rel=1e-5)

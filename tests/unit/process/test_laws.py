@@ -102,7 +102,7 @@ def test_closed_form_equals_mean_over_simulation(process):
 def test_variance_of_the_estimates_is_as_predicted(process):
     if process.lines() or isinstance(process, gmwm.RateRamp | gmwm.QuantizationNoise):
         pytest.skip("deterministic, or not Gaussian (uniform quantization errors)")
-    n, runs = 512, 400
+    n, runs = 512, 250
     rng = np.random.default_rng(21)
     waves = [wavelet_variance(process.simulate(n, 1.0, rng), 1.0).variance for _ in range(runs)]
     predicted = haar_covariance(process.psd, n, 1.0)

@@ -35,7 +35,7 @@ def standardised(truth, n, runs, seed, *, omega="model", **options):
     ids=str,
 )
 def test_standard_errors_are_those_of_the_estimates(options):
-    found = standardised(TRUTH, 20_000, 20, 7, **options)
+    found = standardised(TRUTH, 10_000, 20, 7, **options)
     # The mean of 20 squares of normal variables is within 0.19 .. 2.6 in all but 1e-4 of cases.
     # Weights from the data are correlated with what they weight, which linearisation leaves out.
     high = 4.4 if options.get("omega") == "data" else 2.6

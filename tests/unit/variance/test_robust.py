@@ -412,7 +412,7 @@ def test_fewer_levels_and_counts_of_a_series_with_gaps():
     "process", [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(1.0), gmwm.GaussMarkov(1.0, 50.0)], ids=repr
 )
 def test_simulated_covariance_of_clean_series(process):
-    runs, n = 1000, 4096
+    runs, n = 500, 4096
     rng = np.random.default_rng(5)
     found = np.array([estimates(process.simulate(n, 1.0, rng), 8)[:, 1] for _ in range(runs)])
     classical = haar_covariance(process.psd, n, 1.0)[:8, :8]

@@ -66,7 +66,7 @@ def test_removing_a_drift_from_the_moments_is_removing_it_from_the_series():
     "process", [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(1.0), gmwm.BiasInstability(1.0)], ids=repr
 )
 def test_intervals_cover(process):
-    runs, n = 200, 1000
+    runs, n = 120, 1000
     rng = np.random.default_rng(12)
     truth = process.haar_variance(2.0 ** np.arange(9), 1.0)
     inside = np.zeros(9)

@@ -278,21 +278,22 @@ def test_offset_scale_and_units_do_not_matter():
 
 
 @pytest.mark.parametrize("method", OF_SAMPLES)
-@pytest.mark.parametrize("slope", [0.1, 10.0])
-def test_a_steep_ramp_does_not_matter_where_the_drift_is_free(method, slope):
+def test_a_steep_ramp_does_not_matter_where_the_drift_is_free(method):
     truth = WhiteNoise(0.2) + RandomWalk(0.01)
     n = 2000
     x = truth.simulate(n, 1.0, seed=3)
     model = truth.opened() + RateRamp()
     plain = gmwm.fit(model, x, dt=1.0, method=method)
-    steep = gmwm.fit(model, x + slope * np.arange(n), dt=1.0, method=method)
-    assert steep.valid, steep.message
-    assert steep.params["R"] - slope == pytest.approx(
-        plain.params["R"], abs=0.01 * plain.stderr["R"]
-    )
-    for key in ("N", "K"):
-        assert steep.params[key] == pytest.approx(plain.params[key], abs=0.02 * plain.stderr[key])
-        assert steep.stderr[key] == pytest.approx(plain.stderr[key], rel=0.02)
+    for slope in (0.1, 10.0):
+        steep = gmwm.fit(model, x + slope * np.arange(n), dt=1.0, method=method)
+        assert steep.valid, steep.message
+        assert steep.params["R"] - slope == pytest.approx(
+            plain.params["R"], abs=0.01 * plain.stderr["R"]
+        )
+        for key in ("N", "K"):
+            error = plain.stderr[key]
+            assert steep.params[key] == pytest.approx(plain.params[key], abs=0.02 * error)
+            assert steep.stderr[key] == pytest.approx(error, rel=0.02)
 
 
 # -- what is given --------------------------------------------------------------------------------

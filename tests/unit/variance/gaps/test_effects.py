@@ -157,8 +157,11 @@ PROCESSES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("process", PROCESSES, ids=repr)
-@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize(
+    ("pattern", "process"),
+    [(each, one) for i, each in enumerate(PATTERNS) for one in PROCESSES[1 - i % 2 :: 2]],
+    ids=str,
+)
 def test_change_is_that_of_the_quadratic_form(process, pattern):
     """The expected mean square of the filled coefficients, from matrices, without sampling."""
     n = 600
@@ -257,7 +260,7 @@ def check_levels(model, lost, n, runs, seed, most):
     assert np.all(ratio < np.log(1.2) + 1.5 * chance * spread), ratio
 
 
-@pytest.mark.parametrize("model", MODELS, ids=repr)
+@pytest.mark.parametrize("model", [MODELS[1], MODELS[4], MODELS[5]], ids=repr)
 def test_levels_of_a_gappy_series_are_those_of_the_complete_one(model):
     check_levels(model, singles(0.01), 17_000, 40, 1, 0.3)
 
