@@ -853,11 +853,11 @@ def test_demo_finds_the_white_noise_of_every_axis(demo):
     for sensor, truth, unit in (("gyro", 0.2, "deg/sqrt(h)"), ("accel", 80.0, "ug/sqrt(Hz)")):
         for axis in "xyz":
             row = next(line for line in lines if line.startswith(f"{sensor}_{axis} "))
-            bound = re.search(r" N +(\S+) +(\S+)   below (\S+)", row)
+            bound = re.search(r" N +(\S+) +(\S+)  below (\S+)", row)
             if bound:
                 assert float(bound[3]) > truth
                 continue
-            match = re.search(r" N +(\S+) +(\S+)   (\S+) \.\. (\S+) +(\S+)", row)
+            match = re.search(r" N +(\S+) +(\S+)  (\S+) \.\. (\S+) +(\S+)", row)
             assert match, row
             shown, estimate, low, high = map(float, match.groups()[:4])
             assert match[5] == unit

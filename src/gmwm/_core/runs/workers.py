@@ -206,6 +206,8 @@ def _quietly_closing(found: Done[T, R]) -> Iterator[Done[T, R]]:
 def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]:
     from joblib import Parallel, delayed, parallel_config
 
+    # One that has grown ends after its item, and another begins: nothing for who waits.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     with parallel_config("loky", inner_max_num_threads=1):
         pool = Parallel(
             n_jobs=jobs, pre_dispatch=f"{_WAITING} * n_jobs", return_as="generator_unordered"

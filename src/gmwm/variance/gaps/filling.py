@@ -127,7 +127,8 @@ def levels_apart(
     longest: Averaging time that the spectrum is known for, samples.
     """
     first, last = gaps.edges.T
-    there = np.concatenate([[0], np.cumsum(~np.isnan(values))])
+    there = np.zeros(values.size + 1, dtype=np.int64)
+    np.cumsum(~np.isnan(values), out=there[1:])
     sums = cumulative(values, 0.0)
 
     def ratio(width: IntArray, deviation: FloatArray) -> FloatArray:
