@@ -136,8 +136,14 @@ FARTHEST = 12.0
 REGION_DRAWS = 300
 """Models drawn from a region, from which the searches for the largest densities start."""
 
-REGION_POINTS = 3
+REGION_POINTS = 8
 """Frequencies a decade at which the largest density is searched."""
+
+REGION_POINTS_OF_PEAK = 16
+"""Such frequencies within the width of the narrowest resonance of a region."""
+
+REGION_STEP = 1e-6
+"""Of the way to the end of a parameter, for the slope of a density."""
 
 REGION_SEED = 1
 """Of those draws: the same region has the same numbers."""

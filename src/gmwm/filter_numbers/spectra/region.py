@@ -13,7 +13,7 @@ from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.target import Target
-from gmwm.process import Model
+from gmwm.process import Model, Process
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +69,30 @@ class ParameterRegion:
             root=vectors * np.sqrt(np.maximum(values, 0.0)),
         )
 
+    def value(self, i: int, along: float) -> float:
+        """A parameter some way to its upper end, or if negative, to its lower one."""
+        centre = float(self.model.params[self.keys[i]] or 0.0)
+        end = float(self.upper[i] if along > 0.0 else self.lower[i])
+        if centre > 0.0 and end > 0.0:
+            return centre * (end / centre) ** abs(along)
+        return centre + (end - centre) * abs(along)
+
     def model_at(self, point: FloatArray) -> Model:
         """The model at a point of the unit ball."""
-        values = {}
-        for i, (key, along) in enumerate(zip(self.keys, self.root @ point, strict=True)):
-            centre = float(self.model.params[key] or 0.0)
-            end = self.upper[i] if along > 0.0 else self.lower[i]
-            if centre > 0.0 and end > 0.0:
-                values[key] = centre * float(end / centre) ** abs(along)
-            else:
-                values[key] = centre + (end - centre) * abs(along)
-        return self.model.with_params(values)
+        ways = enumerate((self.root @ point).tolist())
+        return self.model.with_params({self.keys[i]: self.value(i, along) for i, along in ways})
+
+    @property
+    def points_of_peak(self) -> int:
+        """Frequencies near a resonance that see the peaks of all models; the usual number at most.
+
+        The peak of damping ratio d at f is 2 d f wide, and is sought from 0.9 f to 1.1 f.
+        """
+        ratios = {p.key for p in self.model.parameters if p.parameter.name == "damping"}
+        low = [end for key, end in zip(self.keys, self.lower, strict=True) if key in ratios]
+        width = 2.0 * min(low, default=1.0)
+        points = 0.2 * tuning.REGION_POINTS_OF_PEAK / max(width, np.finfo(float).tiny)
+        return int(np.ceil(min(points, tuning.PEAK_POINTS - 1.0))) + 1
 
     def draws(self, number: int, rng: np.random.Generator) -> FloatArray:
         """Points of the ball, (number, p): half of them on its surface."""
@@ -87,6 +100,59 @@ class ParameterRegion:
         points /= np.linalg.norm(points, axis=1, keepdims=True)
         points[::2] *= rng.random((len(points[::2]), 1)) ** (1.0 / max(len(self.keys), 1))
         return points
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """Density of the models of a region, and how it grows along each parameter.
+
+    Only what a parameter changes is made anew, not the model.
+
+    terms: Those that count.
+    free: Of each, the parameters of the region that it has: their numbers and names.
+    """
+
+    region: ParameterRegion
+    terms: list[Process]
+    free: list[list[tuple[int, str]]]
+    dt: float
+
+    @classmethod
+    def of(cls, region: ParameterRegion, dt: float) -> _Spectrum:
+        model = region.model
+        counted = [i for i, t in enumerate(model.terms) if not (t.is_line or t.is_drift)]
+        found = {p.key: (p.term, p.parameter.name) for p in model.parameters}
+        own = [(i, *found[key]) for i, key in enumerate(region.keys)]
+        free = [[(i, name) for i, term, name in own if term == each] for each in counted]
+        return cls(region, [model.terms[i] for i in counted], free, dt)
+
+    def _at(self, along: FloatArray) -> list[Process]:
+        return [
+            term.with_values(**{name: self.region.value(i, float(along[i])) for i, name in free})
+            for term, free in zip(self.terms, self.free, strict=True)
+        ]
+
+    def density(self, point: FloatArray, f: FloatArray) -> FloatArray:
+        terms = self._at(self.region.root @ point)
+        return np.sum([term.psd(f, self.dt) for term in terms], axis=0)
+
+    def least(self, point: FloatArray, f: FloatArray) -> tuple[float, FloatArray]:
+        """Minus the logarithm of the density at one frequency, and its gradient, in the ball."""
+        outside = max(1.0, float(np.linalg.norm(point)))
+        inside = point / outside
+        along = self.region.root @ inside
+        slopes, total = np.zeros(along.size), 0.0
+        for term, free in zip(self._at(along), self.free, strict=True):
+            own = float(term.psd(f, self.dt)[0])
+            total += own
+            for i, name in free:
+                further = self.region.value(i, float(along[i]) + tuning.REGION_STEP)
+                changed = term.with_values(**{name: further}).psd(f, self.dt)[0]
+                slopes[i] = (float(changed) - own) / tuning.REGION_STEP
+        gradient = -(self.region.root.T @ slopes) / total
+        if outside > 1.0:
+            gradient = (gradient - inside * (inside @ gradient)) / outside
+        return -float(np.log(total)), gradient
 
 
 def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]:
@@ -101,29 +167,23 @@ def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]
     dt = target.dt
     if not region.keys:
         return (Target.of(region.model, dt, target.horizon),)
-    counted = [i for i, term in enumerate(fit.model.terms) if not (term.is_line or term.is_drift)]
-
-    def density(point: FloatArray, f: FloatArray) -> FloatArray:
-        terms = region.model_at(point).terms
-        return np.sum([terms[i].psd(f, dt) for i in counted], axis=0)
-
-    def least(point: FloatArray, f: FloatArray) -> float:
-        inside = point / max(1.0, float(np.linalg.norm(point)))
-        return -float(np.log(density(inside, f)[0]))
-
+    spectrum = _Spectrum.of(region, dt)
     # Slower processes than the estimate change at lower frequencies.
-    f = target.frequencies(tuning.REGION_POINTS)
+    f = target.frequencies(tuning.REGION_POINTS, region.points_of_peak)
     f = np.append(f[0] * np.array([0.01, 0.1]), f)
     points = list(region.draws(tuning.REGION_DRAWS, np.random.default_rng(tuning.REGION_SEED)))
-    densities = np.array([density(point, f) for point in points])
+    densities = [spectrum.density(point, f) for point in points]
     for k in range(f.size):
+        start = points[int(np.argmax([each[k] for each in densities]))]
         best = minimize(
-            least, points[int(np.argmax(densities[:, k]))], args=(f[k : k + 1],), method="SLSQP",
+            spectrum.least, start, args=(f[k : k + 1],), jac=True, method="SLSQP",
             options={"maxiter": 40, "ftol": 1e-6},
-            constraints={"type": "ineq", "fun": lambda p: 1.0 - float(p @ p)},
+            constraints={
+                "type": "ineq", "fun": lambda p: 1.0 - float(p @ p), "jac": lambda p: -2.0 * p,
+            },
         ).x  # fmt: skip
         points.append(best / max(1.0, float(np.linalg.norm(best))))
-    fine = np.geomspace(f[0], f[-1], 20 * f.size)
-    densities = np.array([density(point, fine) for point in points])
-    largest = np.unique(np.argmax(densities, axis=0))
+        densities.append(spectrum.density(points[-1], f))
+    fine = np.append(f[:2], target.frequencies(10 * tuning.REGION_POINTS))
+    largest = np.unique(np.argmax([spectrum.density(point, fine) for point in points], axis=0))
     return tuple(Target.of(region.model_at(points[i]), dt, target.horizon) for i in largest)

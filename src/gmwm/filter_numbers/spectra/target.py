@@ -68,7 +68,7 @@ class Target:
             elif term.is_line:
                 notices += [_line(label, f, a, fast, unit) for f, a in term.lines()]
             else:
-                band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE)
+                band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
                 high, low = float(np.max(density)), float(np.max(density[band <= fast]))
                 own = float(density[0])
@@ -137,11 +137,11 @@ class Target:
             return 0.0
         return float((2.0 * np.pi * self.lowest) ** 2 * self.psd(np.array([self.lowest]))[0])
 
-    def frequencies(self, points: int) -> FloatArray:
+    def frequencies(self, points: int, of_peak: int = tuning.PEAK_POINTS) -> FloatArray:
         """From the lowest to 1/(2 dt), some a decade, and more where a resonance is (Hz)."""
         # Below the lowest there are only limits, which are as good as reached.
         below = self.lowest * np.array([1e-3, 1e-2, 1e-1])
-        f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points)
+        f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points, of_peak)
         return np.unique(np.append(below, f))
 
     def slow_variance(self, stationary: Model) -> float:
@@ -160,10 +160,12 @@ class Target:
         return float(2.0 * trapezoid(np.maximum(total, 0.0) * f, np.log(f)))
 
 
-def _frequencies(terms: Sequence[Process], low: float, high: float, points: int) -> FloatArray:
+def _frequencies(
+    terms: Sequence[Process], low: float, high: float, points: int, of_peak: int
+) -> FloatArray:
     """Some a decade, and more where a resonance is."""
     own = [
-        np.linspace(0.9, 1.1, tuning.PEAK_POINTS) * (term.values[p.name] or 0.0)
+        np.linspace(0.9, 1.1, of_peak) * (term.values[p.name] or 0.0)
         for term in terms
         for p in term.shape_parameters
         if p.unit == "Hz"
