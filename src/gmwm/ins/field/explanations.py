@@ -292,13 +292,15 @@ def _fitted(
         return ()
     # Of two errors each has to earn its own: what one alone explains names no other.
     price = sum(cost(len(each.names)) for each in errors)
-    gain = difference(here, base)
+    # What no sensor has is no explanation, however little the data say against it.
+    unusual = 0.5 * float(_prior(errors) @ theta**2)
+    gain = difference(here, base) - unusual
     if errors[0].smooth is not None and np.isfinite(base.log_likelihood):
         regular, without = _smoothly(base, errors, theta)
         if len(errors) == 1:  # beside the antenna, what is less exact would tell them apart
             covariance = without
         # The stamps' own gain is the exact one; it counts if it is no matter of other noise.
-        gain = gain if regular > price else min(gain, regular)
+        gain = gain if regular > price + unusual else min(gain, regular - unusual)
     deviations = np.sqrt(np.diag(covariance))
     if start != 0.0:
         theta[0] = (theta[0] + start + np.pi) % (2.0 * np.pi) - np.pi
@@ -334,6 +336,11 @@ def _steps(errors: tuple[Constant, ...]) -> FloatArray:
     return np.concatenate([np.full(len(each.names), each.step) for each in errors])
 
 
+def _prior(errors: tuple[Constant, ...]) -> FloatArray:
+    """Inverse variances."""
+    return np.concatenate([np.full(len(each.names), each.prior**-2) for each in errors])
+
+
 def _parts(errors: tuple[Constant, ...]) -> list[slice]:
     ends = np.cumsum([len(each.names) for each in errors]).tolist()
     return [slice(end - len(each.names), end) for each, end in zip(errors, ends, strict=True)]
@@ -353,7 +360,7 @@ def _step(
     here: Replay, columns: list[FloatArray], errors: tuple[Constant, ...], theta: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
     """Gauss-Newton: the move, the covariance after it, and the gain that it promises."""
-    prior = np.concatenate([np.full(len(each.names), each.prior**-2) for each in errors])
+    prior = _prior(errors)
     J = np.stack([each.ravel() for each in columns], axis=1)
     z = here.standard.ravel()
     seen = np.isfinite(z) & np.all(np.isfinite(J), axis=1)
