@@ -259,7 +259,8 @@ def test_right_models_are_not_blamed():
 )  # fmt: skip
 def test_right_models_of_noisy_sensors_are_not_blamed(seed, vehicle, options):
     """No rest was found in their noise, stamps moved to other noise were 0.07 s late, and a scale
-    that the motion does not show was wrong by 16 %."""
+    that the motion does not show was wrong by 16 %.
+    """
     navigated = found(seed, vehicle=vehicle, truth=sensors(gyro=30.0, accel=100.0), **options)
     assert navigated.verdict.code == "consistent"
     if vehicle != "loiter":
