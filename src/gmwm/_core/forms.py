@@ -73,10 +73,13 @@ def covariance(matrix: Sequence[Sequence[float]], size: int, name: str = "covari
     bound = np.outer(scale, scale)
     if np.any(np.diag(array) < 0.0) or np.any((bound == 0.0) & (array != 0.0)):
         raise ValueError(f"{name} has a variance that is not positive")
-    correlation = array / np.where(bound > 0.0, bound, 1.0)
-    if np.any(np.abs(correlation - correlation.T) > _ASYMMETRY):
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlation = array / np.where(bound > 0.0, bound, 1.0)
+        asymmetry = np.abs(correlation - correlation.T)
+    if np.any(asymmetry > _ASYMMETRY):
         raise ValueError(f"{name} is not symmetric")
-    if size and np.min(np.linalg.eigvalsh(correlation)) < _NEGATIVE:
+    too_large = not np.all(np.isfinite(correlation))
+    if too_large or (size and np.min(np.linalg.eigvalsh(correlation)) < _NEGATIVE):
         raise ValueError(f"{name} is not positive semi-definite")
 
 

@@ -304,8 +304,10 @@ def hole_notice(
     step: u; 0 if samples are not rounded.
     scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
+    if not values.size or step == 0.0 or step > scatter:
+        return None
     lowest = float(np.min(values))
-    if step == 0.0 or step > scatter or np.ptp(values) > tuning.MOST_STEPS * step:
+    if np.ptp(values) > tuning.MOST_STEPS * step:
         return None
     counts = np.bincount(np.rint((values - lowest) / step).astype(np.intp))
     there = np.flatnonzero(counts)

@@ -42,7 +42,7 @@ def without_sentinels(
     if not some.size:
         return values, []
     # The range is that of samples: codes among them would make it as wide as themselves.
-    usual = some[(np.abs(some) <= largest) & ~np.isin(some, _ODD)]
+    usual = some[(np.abs(some) <= largest) & np.isfinite(some) & ~np.isin(some, _ODD)]
     if not usual.size:
         return values, []
     low, first, middle, third, high = np.quantile(usual, [0.05, 0.25, 0.5, 0.75, 0.95])
@@ -50,8 +50,9 @@ def without_sentinels(
     # Codes without a meaning are among the usual ones: a quarter of the samples at most.
     narrow = min(tuning.OF_QUARTILES * (third - first), width) if third > first else width
     reach = tuning.FAR_OUTSIDE * narrow
-    if np.fmax.reduce(values) - middle <= reach and middle - np.fmin.reduce(values) <= reach:
-        return values, []  # almost always, without arrays as long as the values
+    # Almost always, and without arrays as long as the values.
+    if np.fmax.reduce(values) <= middle + reach and np.fmin.reduce(values) >= middle - reach:
+        return values, []
     far = np.flatnonzero(np.abs(values - middle) > reach)
     numbers, which = np.unique(values[far], return_inverse=True)
     chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])

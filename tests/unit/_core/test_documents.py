@@ -46,6 +46,7 @@ CASES = [
     ("calibration", GYRO + "covariance", [[1.0, 0.0], [0.0, -1.0]], "not positive"),
     ("calibration", GYRO + "covariance", [[1.0, 0.5], [0.0, 1.0]], "not symmetric"),
     ("calibration", GYRO + "covariance", [[1.0, 2.0], [2.0, 1.0]], "not positive semi-definite"),
+    ("calibration", GYRO + "covariance", [[1e-320, 1e300], [1e300, 1.0]], "not positive semi-def"),
     ("calibration", GYRO + "covariance", [[1.0]], "covariance is not 2 x 2"),
     ("calibration", GYRO + "keys", ["N", "N"], "each once"),
     ("calibration", GYRO + "upper_bounds", {"N": -1.0}, "upper_bounds.N = -1.0"),

@@ -153,6 +153,10 @@ def test_a_stuck_bit_is_named(bit, severity, value):
     assert found.values["highest"] - found.values["lowest"] == pytest.approx(0.1 * (2**bit + 1))
 
 
+def test_no_sample_has_no_stuck_bit():
+    assert hole_notice("gyro_x", "u", np.zeros(0), 0.1, 1.0) is None
+
+
 def test_gaps_between_steps_are_no_stuck_bit():
     noise = white(100_000, 3)
     half = np.arange(noise.size) < 50_000

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.linalg import cho_factor, cho_solve, solve, solve_toeplitz, toeplitz
+from scipy.linalg import cho_factor, cho_solve, lstsq, solve, solve_toeplitz, toeplitz
 
 from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
@@ -66,6 +66,11 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     weights = _solve(column, first, np.ones(first.size))
     information = float(np.sum(weights))
     step = wv.block * wv.dt
+    if not information > 0.0:
+        raise InputError(
+            f"{wv.name or 'the series'} has means over {step:.3g} s that rounding alone tells "
+            "apart, which leaves no drift to estimate: take a model without RateRamp"
+        )
     variance = _growth(wv) / information / step**2
     return Slope(float(weights @ difference) / information / step, variance)
 
@@ -161,11 +166,15 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
 def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> FloatArray:
     """Solve for the covariance of differences of neighbouring blocks, at these places of all.
 
-    ``column`` is the autocovariance of all differences.
+    ``column`` is the autocovariance of all differences. What noise hardly has in some directions is
+    solved for in the others.
     """
-    if first.size == column.size:
-        return np.asarray(solve_toeplitz(column, right))
-    return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
+    try:
+        if first.size == column.size:
+            return np.asarray(solve_toeplitz(column, right))
+        return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
+    except np.linalg.LinAlgError:
+        return np.asarray(lstsq(toeplitz(column)[np.ix_(first, first)], right)[0])
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:

@@ -79,7 +79,8 @@ class FrameTable:
             is_stamp = pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME
             if is_time or is_stamp:
                 return _from_first(values, column, first)
-            found = np.array(values.cast(pa.float64(), safe=False).to_numpy(), dtype=float)
+            with np.errstate(invalid="ignore"):  # half floats may hold NaN that signal
+                found = values.cast(pa.float64(), safe=False).to_numpy() + 0.0
         check_usable(place, found, self.where)
         return found
 

@@ -6,7 +6,7 @@ from scipy.linalg import toeplitz
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.problem import slope_dof, slope_p_value
+from gmwm.estimate.problem import gls_slope, slope_dof, slope_p_value
 from gmwm.process import as_model
 
 
@@ -71,3 +71,11 @@ def test_degrees_of_freedom_are_those_of_generalised_least_squares(estimated):
     model = WhiteNoise(truth["N"]) + GaussMarkov(sigma=truth["sigma"], tau=20.0)
     found = slope_dof(model, [estimated], np.array([[error**2]]), n, 1.0)
     assert found == pytest.approx(2.0 / (gradient * error) ** 2, rel=0.03)
+
+
+def test_noise_without_slow_parts_leaves_no_slope():
+    """It divided by zero, or the covariance of the blocks was singular."""
+    square = gmwm.wavelet_variance(np.tile([1.0, -1.0], 2048), 1.0)
+    with pytest.raises(gmwm.InputError, match="leaves no drift to estimate"):
+        gls_slope(square, lambda f, dt: np.zeros_like(f))
+    assert np.isfinite(gls_slope(square, WhiteNoise(1.0).psd).variance)

@@ -207,3 +207,12 @@ def test_without_the_library(tmp_path, monkeypatch):
         file["gyro"] = X[:, :3]
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     assert refusal(path) == "a.h5 needs h5py, which is not installed: pip install 'gmwm[hdf5]'"
+
+
+def test_missing_half_floats_of_any_pattern_are_missing():
+    """A NaN that signals was a warning wherever it was reckoned with."""
+    codes = np.random.default_rng(4).normal(size=2000).astype(np.float16).view(np.uint16)
+    codes[7] = 0x7D00
+    table = pa.table({"gyro_x": pa.array(codes.view(np.float16))})
+    rec = gmwm.read(table, rate=100.0, units={"gyro": "rad/s"})
+    assert np.flatnonzero(np.isnan(rec["gyro_x"].values)).tolist() == [7]
