@@ -34,6 +34,9 @@ FOUND = [
     ("odd", 1, 12),  # a ramp without any noise
     ("document", 1, 3381),  # a variance of 1e308
     ("odd", 0, 136),  # half of the record without any error of prediction
+    ("odd", 11, 7),  # noise without slow parts, which leaves no drift
+    ("odd", 12, 52),  # a variance below the smallest number
+    ("odd", 12, 92),  # an upper bound below zero
 ]
 
 

@@ -163,4 +163,4 @@ def _upper_scale(
         design.coordinates.without(others), [processes[i] for i in part], part.index(term),
         centre, deviation, 0.0, wv,
     )  # fmt: skip
-    return float(bound ** (1.0 / design.terms[term].linear.power))
+    return float(max(bound, 0.0) ** (1.0 / design.terms[term].linear.power))

@@ -87,7 +87,8 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
     # Of the correlation: variances of correlation times and of amplitudes are twenty decades apart,
     # and rounding of the largest would be far above the smallest.
     errors = np.sqrt(np.diag(estimate.covariance))
-    shares, vectors = np.linalg.eigh(estimate.covariance / np.outer(errors, errors))
+    known = np.where(errors > 0.0, errors, 1.0)
+    shares, vectors = np.linalg.eigh(estimate.covariance / np.outer(known, known))
     root = errors[:, None] * vectors * np.sqrt(np.maximum(shares, 0.0))
     counted = [
         i for i, term in enumerate(model.terms) if any(term is kept for kept in target.terms)
