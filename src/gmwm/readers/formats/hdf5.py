@@ -7,12 +7,13 @@ of what it holds, ``imu.gyro`` or ``imu/gyro``, where these alone are not clear;
 
 from __future__ import annotations
 
+import mmap
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from gmwm.readers.names import bare, meaning
 
 _MAT_73 = b"MATLAB 7.3"
 _GROUPS = re.compile(r"[./]")
+_SIGNATURE, _HEAP = b"\x89HDF\r\n\x1a\n", b"GCOL\x01\0\0\0"
 _UNITS = ("units", "unit", "Units", "Unit")
 
 
@@ -43,6 +45,7 @@ def open_hdf5(path: Path) -> ArrayTable:
     read = lru_cache(maxsize=1)(partial(_read_data_set, h5py, path))
     with damage_named(path.name), path.open("rb") as stream, h5py.File(path, "r") as file:
         is_mat = stream.read(len(_MAT_73)) == _MAT_73
+        _check_heaps(stream)
 
         def add(name: str, item: Any) -> None:
             if isinstance(item, h5py.Dataset) and item.dtype.kind in "iufV" and item.shape:
@@ -55,6 +58,31 @@ def open_hdf5(path: Path) -> ArrayTable:
         # What MATLAB refers to, cells and structure arrays, hides in #refs#.
         file.visititems(lambda name, item: None if name.startswith("#") else add(name, item))
     return _table(path.name, found, is_transposed=is_mat)
+
+
+def _check_heaps(stream: BinaryIO) -> None:
+    """Refuse damaged heaps of texts, which the library reads without end or into all memory.
+
+    Global heap collections after the HDF5 file format specification, version 3, secs. II.A and
+    III.E.
+    """
+    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        begin = data.find(_SIGNATURE)
+        if data[begin + (14 if data[begin + 8] < 2 else 10)] != 8:
+            return  # lengths of other sizes are rare
+        start = data.find(_HEAP)
+        while start >= 0:
+            end = start + int.from_bytes(data[start + 8 : start + 16], "little")
+            place = start + 16
+            if end > len(data):
+                raise ValueError("a heap beyond the end of the file")
+            while place + 16 <= end:
+                index = int.from_bytes(data[place : place + 2], "little")
+                size = int.from_bytes(data[place + 8 : place + 16], "little")
+                if index == 0 and size == 0:
+                    raise ValueError("free space of no size in a heap")
+                place = end if index == 0 else place + 16 + -(-size // 8) * 8
+            start = data.find(_HEAP, start + 1)
 
 
 def _read_data_set(h5py: Any, path: Path, name: str) -> AnyArray:

@@ -216,3 +216,25 @@ def test_missing_half_floats_of_any_pattern_are_missing():
     table = pa.table({"gyro_x": pa.array(codes.view(np.float16))})
     rec = gmwm.read(table, rate=100.0, units={"gyro": "rad/s"})
     assert np.flatnonzero(np.isnan(rec["gyro_x"].values)).tolist() == [7]
+
+
+@pytest.mark.parametrize(("place", "size"), [("collection", 1 << 40), ("free space", 0)])
+def test_a_damaged_heap_of_hdf5_is_refused_before_its_library_reads_it(place, size, tmp_path):
+    """It goes on without end where free space has no size."""
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["gyro_x"] = np.random.default_rng(3).normal(size=300)
+        file["gyro_x"].attrs["units"] = "rad/s"
+    data = bytearray(path.read_bytes())
+    start = data.find(b"GCOL")
+    assert gmwm.read(path, rate=100.0)["gyro_x"].n == 300
+    where, index = start + 16, 1
+    while index:
+        index = int.from_bytes(data[where : where + 2], "little")
+        length = int.from_bytes(data[where + 8 : where + 16], "little")
+        where += 16 + -(-length // 8) * 8 if index else 0
+    at = where + 8 if place == "free space" else start + 8
+    data[at : at + 8] = size.to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(gmwm.InputError, match="damaged or cut off"):
+        gmwm.read(path, rate=100.0)
