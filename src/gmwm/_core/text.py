@@ -47,9 +47,10 @@ def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) ->
 
 
 def brief(value: float, digits: int = 2) -> str:
-    """Some significant digits, without an exponent where a person writes none: ``430``."""
+    """Some significant digits, without an exponent where a person writes none: ``1,230``."""
     text = f"{value:.{digits}g}"
-    return f"{float(text):,.0f}" if "e+" in text and abs(value) < _HUGE else text
+    is_whole = "e+" in text or abs(value) >= _LARGE
+    return f"{float(text):,.0f}" if is_whole and abs(value) < _HUGE else text
 
 
 def per_cent(share: float, digits: int = 2) -> str:

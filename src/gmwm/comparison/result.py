@@ -46,7 +46,7 @@ _NAMES = {"short": "short times", "R": "drift"}
 
 def percent(share: float) -> str:
     """A relative difference; a factor from one on."""
-    return f"{per_cent(share)}" if share < 0.995 else f"a factor of {brief(1.0 + share)}"
+    return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
 
 
 def _reason(notice: Notice) -> str:

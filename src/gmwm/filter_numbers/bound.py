@@ -88,8 +88,7 @@ def bound(
     on many models (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not
     in the model. Quantization noise and resonances above ten over the horizon count by their
     density at low frequencies (resonances not far above by a part of their peak too), lines not at
-    all, and a ramp R is a constant of standard deviation
-    ``|R| horizon``; notices report them.
+    all, and a ramp R is a constant of standard deviation ``|R| horizon``; notices report them.
     """
     checks.choice("form", form, list(KINDS))
     tau = given_tau(form, tau)

@@ -132,27 +132,15 @@ class Chain:
         columns = list(zip(*kept, strict=True))
         return ChainErrors(*(np.array(column) for column in columns))
 
-    def judged(
-        self,
-        truth: Model,
-        believed: Model,
-        dt: float,
-        times: Sequence[float],
-        true_sd: float,
-        believed_sd: float,
-    ) -> list[ChainErrors]:
-        """The same errors; of one integral, then those of what it gains.
+    @property
+    def judged(self) -> list[Chain]:
+        """The chain; of one integral, also what it gains.
 
         An absolute fix of half a degree hides what it gains in a minute, which is what counts for a
         dead reckoning, or for a filter that has no fixes of it.
         """
-        counted = [self]
-        if self.order == 1 and not self.is_relative:
-            counted.append(replace(self, is_gained=True))
-        return [
-            each.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
-            for each in counted
-        ]
+        gains = self.order == 1 and not self.is_relative
+        return [self, replace(self, is_gained=True)] if gains else [self]
 
     def worse(
         self,
@@ -164,7 +152,10 @@ class Chain:
         believed_sd: float,
     ) -> ChainErrors:
         """Those of what an integral gains where they are the worse, of the integrals elsewhere."""
-        whole, *others = self.judged(truth, believed, dt, times, true_sd, believed_sd)
+        whole, *others = (
+            each.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
+            for each in self.judged
+        )
         for gained in others:
             least = tuning.HIDDEN * np.maximum(whole.nees(), 1.0)[:, None, None]
             worse = (gained.predicted > 0.0) & (gained.actual > least * gained.predicted)

@@ -176,7 +176,17 @@ class _Search:
             # Finite beyond the farthest too, where a line search may try: it takes differences.
             model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
             errors = [
-                self.chain(axis).judged(axis.model, model, axis.dt, self.times, axis.bias_sd, sd)
+                [
+                    chain.errors(
+                        axis.model,
+                        model,
+                        axis.dt,
+                        self.times,
+                        true_sd=axis.bias_sd,
+                        believed_sd=sd,
+                    )
+                    for chain in self.chain(axis).judged
+                ]
                 for axis in group
             ]
             total = tuning.INERTIA * float(logs @ logs)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.text import per_cent
+from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
@@ -16,7 +16,7 @@ from gmwm.estimate import Fit
 from gmwm.export import Triad
 from gmwm.report.health import findings_of_fits
 from gmwm.report.numbers import SHOWN, Certified
-from gmwm.report.text import duration_text, short
+from gmwm.report.text import duration_text
 
 _WHY = {
     "misfit": "the model misses the data",
@@ -114,7 +114,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:
-        share = f"{per_cent(abs(at.worst[0]))}"
+        share = per_cent(abs(at.worst[0]))
         fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
     return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
@@ -127,7 +127,7 @@ def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
         si = unit.replace("u", fit.wv.unit, 1)
     found = field_units(unit, fit.wv.quantity)
     own = (found[0].per_si, found[0].unit) if found else (1.0, si)
-    return {"field": f"{short(value * own[0])} {own[1]}", "si": f"{value:.3g} {si}"}
+    return {"field": f"{brief(value * own[0], 3)} {own[1]}", "si": f"{value:.3g} {si}"}
 
 
 def bias_instability(fit: Fit) -> dict[str, str]:
@@ -153,7 +153,7 @@ def slow_terms(fit: Fit) -> list[dict[str, str]]:
         sign = "< " if item.key in bounds else ""
         value = bounds.get(item.key, item.value or 0.0)
         text = quantity_text(value, size.unit, fit)
-        tail = f", {short(times[0])} s" if times and not sign else ""
+        tail = f", {brief(times[0], 3)} s" if times and not sign else ""
         word = "ramp" if term.is_drift else "walk" if term.is_walk else "GM"
         shown.append({key: f"{word} {sign}{each}{tail}" for key, each in text.items()})
     return shown

@@ -13,7 +13,7 @@ from typing import Any
 from gmwm._core.files import written
 from gmwm._core.notices import worst_first
 from gmwm._core.runs import shared
-from gmwm._core.text import per_cent
+from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
 from gmwm.readers import Channel, Recording
@@ -32,7 +32,7 @@ from gmwm.report.health import ambiguity, health
 from gmwm.report.numbers import SHOWN, Certified, certified
 from gmwm.report.page import origin, rendered, resource
 from gmwm.report.samples import Spans
-from gmwm.report.text import duration_text, needed, number, short
+from gmwm.report.text import duration_text, needed
 
 _AIM = 0.1  # relative standard error
 
@@ -217,7 +217,7 @@ def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
     for key, value in values.items():
         text = f"{key} {quantity_text(value, units[key], fit)['field']}"
         if measured[key] > 0.0:
-            text += f" (measured {short(measured[key] / value)} times that)"
+            text += f" (measured {brief(measured[key] / value, 3)} times that)"
         parts.append(text)
     return f"Data sheet: {', '.join(parts)}."
 
@@ -236,17 +236,17 @@ def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str,
 
     def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
         if estimate.kind == "bound":
-            return {"value": f"< {number(high)}", "interval": "upper bound, 95 %", "unit": unit}
+            return {"value": f"< {brief(high, 4)}", "interval": "upper bound, 95 %", "unit": unit}
         if estimate.kind == "estimated":
-            interval = f"{number(low)} to {number(high)}"
-            return {"value": number(value), "interval": interval, "unit": unit}
-        return {"value": number(value), "interval": estimate.kind, "unit": unit}
+            interval = f"{brief(low, 4)} to {brief(high, 4)}"
+            return {"value": brief(value, 4), "interval": interval, "unit": unit}
+        return {"value": brief(value, 4), "interval": estimate.kind, "unit": unit}
 
     si = (estimate.value, estimate.lower, estimate.upper, estimate.unit)
     cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
     error = ""
     if estimate.kind == "estimated" and estimate.value and estimate.stderr is not None:
-        error = f"{per_cent(estimate.stderr / abs(estimate.value))}"
+        error = per_cent(estimate.stderr / abs(estimate.value))
     return {
         "key": estimate.key,
         "meaning": estimate.meaning,

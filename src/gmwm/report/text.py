@@ -25,18 +25,6 @@ def duration_text(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours else f"{minutes} min"
 
 
-def number(value: float) -> str:
-    """Four significant digits, without an exponent where a person would write none."""
-    text = f"{value:,.4g}"
-    return text if "e" not in text else f"{value:.3e}"
-
-
-def short(value: float) -> str:
-    """Three significant digits, likewise."""
-    text = f"{value:.3g}"
-    return f"{float(text):,.0f}" if abs(value) >= 1000.0 else text
-
-
 def model_text(model: Model, quantity: str) -> str:
     """A model's terms with their parameters, in the first unit of the field where there is one."""
     terms: dict[int, list[str]] = {}

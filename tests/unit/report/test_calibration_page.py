@@ -31,7 +31,7 @@ from gmwm.report.figure import (
 from gmwm.report.health import health
 from gmwm.report.numbers import certified
 from gmwm.report.page import resource
-from gmwm.report.text import duration_text, needed, number
+from gmwm.report.text import duration_text, needed
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
@@ -789,19 +789,3 @@ def test_a_folder_that_is_not_there(calibration, tmp_path):
 )
 def test_duration(seconds, words):
     assert duration_text(seconds) == words
-
-
-@pytest.mark.parametrize(
-    ("value", "words"),
-    [
-        (0.0, "0"),
-        (1.0, "1"),
-        (2.33333, "2.333"),
-        (-0.00123456, "-0.001235"),
-        (1234.56, "1,235"),
-        (1.23456e-7, "1.235e-07"),
-        (1e-7, "1.000e-07"),
-    ],
-)
-def test_number(value, words):
-    assert number(value) == words

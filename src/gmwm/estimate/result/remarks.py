@@ -212,7 +212,7 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
         return []
     misfit, tau, residual = beyond
     values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
-    share = f"{per_cent(abs(misfit))}"
+    share = per_cent(abs(misfit))
     if goodness.is_poor:
         side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
         text = f"the data lie {share} {side} the model's Allan deviation"

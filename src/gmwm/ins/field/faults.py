@@ -311,7 +311,7 @@ def _signs(fault: Explanation) -> tuple[str, str]:
 
 def _outliers(fault: Explanation) -> tuple[str, str]:
     count = int(fault.values["count"])
-    share = f"{per_cent(fault.values['fraction'])}"
+    share = per_cent(fault.values["fraction"])
     return (
         f"{count} {'fix is an outlier' if count == 1 else 'fixes are outliers'} ({share})",
         "leave them out",

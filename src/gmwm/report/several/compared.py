@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import worst_first
+from gmwm._core.text import brief
 from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.estimate import Estimate, Fit
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import origin, write_page
 from gmwm.report.several.multiples import COLOURS, multiple
-from gmwm.report.text import duration_text, number, short
+from gmwm.report.text import duration_text
 
 _SIDE_BY_SIDE = 6
 """Recordings whose values stand in columns of their own; of more the range is shown."""
@@ -140,7 +141,7 @@ def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...])
     cells = [_cell(by_label.get(label)) for label in labels]
     if len(labels) > _SIDE_BY_SIDE:
         known = [e.usual.value for e in spread.each if e is not None and e.kind == "estimated"]
-        text = f"{number(min(known))} to {number(max(known))}" if known else "none"
+        text = f"{brief(min(known), 4)} to {brief(max(known), 4)}" if known else "none"
         cells = [{"value": text, "interval": f"{len(known)} of {len(spread.each)}"}]
     return {
         "key": spread.key,
@@ -159,16 +160,15 @@ def _cell(estimate: Estimate | None) -> dict[str, str]:
         return {"value": "–", "interval": ""}
     usual = estimate.usual
     if estimate.kind == "bound":
-        return {"value": f"< {short(usual.upper)}", "interval": ""}
+        return {"value": f"< {brief(usual.upper, 3)}", "interval": ""}
     if estimate.kind != "estimated":
-        return {"value": short(usual.value), "interval": estimate.kind}
+        return {"value": brief(usual.value, 3), "interval": estimate.kind}
     if not (np.isfinite(usual.upper) and usual.lower > 0.0):
-        return {"value": short(usual.value), "interval": "not determined"}
+        return {"value": brief(usual.value, 3), "interval": "not determined"}
     ratio = usual.upper / usual.lower
-    text = number if ratio < _NARROW else short
-    ends = [text(end) if ratio < _WIDE else short(float(f"{end:.2g}"))
-            for end in (usual.lower, usual.upper)]  # fmt: skip
-    return {"value": text(usual.value), "interval": "–".join(ends)}
+    digits = 4 if ratio < _NARROW else 3
+    ends = [brief(end, digits if ratio < _WIDE else 2) for end in (usual.lower, usual.upper)]
+    return {"value": brief(usual.value, digits), "interval": "–".join(ends)}
 
 
 def _share(value: float) -> str:
@@ -185,7 +185,7 @@ def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict
     covering, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
     sign = "≤ " if letter in axis.numbers.upper else ""
     stated = sheet.of(axis.name, axis.quantity).get(letter) if sheet is not None else None
-    times = f"{short(covering / stated)} times" if stated and np.isfinite(covering) else ""
+    times = f"{brief(covering / stated, 3)} times" if stated and np.isfinite(covering) else ""
     ends = [axis.number_text(letter, end)[0] for end in found and (min(found), max(found))]
     text, unit = axis.number_text(letter, covering)
     details = [f"{covering:.3e} SI"] if np.isfinite(covering) else []

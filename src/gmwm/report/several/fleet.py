@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.text import per_cent
+from gmwm._core.text import brief, per_cent
 from gmwm.errors import printable
 from gmwm.fleet import (
     CONFIDENCE,
@@ -24,7 +24,7 @@ from gmwm.fleet import (
     outlier_distance,
 )
 from gmwm.report.page import write_page
-from gmwm.report.text import duration_text, short
+from gmwm.report.text import duration_text
 
 _TITLES = {
     "filter_N": "N for a filter",
@@ -147,7 +147,7 @@ def _row(spread: Spread) -> dict[str, Any]:
     unit, scale = spread.field_unit
 
     def text(value: float) -> str:
-        return short(value * scale) if np.isfinite(value) else "-"
+        return brief(value * scale, 3) if np.isfinite(value) else "-"
 
     bounds = int(np.count_nonzero(~spread.found))
     free, both = spread.free_limit, spread.free_limits
@@ -182,7 +182,7 @@ def _row(spread: Spread) -> dict[str, Any]:
 def _spread_text(spread: Spread, text: Any) -> str:
     if not np.isfinite(spread.sd):
         return "-"
-    return f"{per_cent(spread.sd)}" if spread.is_logarithmic else text(spread.sd)
+    return per_cent(spread.sd) if spread.is_logarithmic else text(spread.sd)
 
 
 def _outliers(spreads: Sequence[Spread]) -> list[dict[str, str]]:
@@ -195,8 +195,8 @@ def _outliers(spreads: Sequence[Spread]) -> list[dict[str, str]]:
                     "device": each.device,
                     "channel": spread.channel,
                     "parameter": spread.parameter,
-                    "value": f"{short(each.value * scale)} {unit}",
-                    "times": short(each.value / spread.median) if spread.median else "",
+                    "value": f"{brief(each.value * scale, 3)} {unit}",
+                    "times": brief(each.value / spread.median, 3) if spread.median else "",
                     "distance": f"{each.distance:+.3g}",
                     "needed": f"{outlier_distance(spread.n):.3g}",
                 }
@@ -277,7 +277,7 @@ def _picture(spreads: Sequence[Spread]) -> dict[str, Any]:
         "bottom": height,
         "half": 0.36 * _ROW,
         "rows": rows,
-        "ticks": [(place(value), short(value)) for value in _ticks(low, high)],
+        "ticks": [(place(value), brief(value, 3)) for value in _ticks(low, high)],
     }
 
 
