@@ -9,14 +9,14 @@ from typing import Any
 
 from gmwm._core import checks
 from gmwm.calibration import Calibration
-from gmwm.export.gtsam import GTSAM
-from gmwm.export.json_targets import JSON_TARGETS
-from gmwm.export.keyed import KEYED
-from gmwm.export.kfgins import KFGINS
-from gmwm.export.matlab import MATLAB
-from gmwm.export.ros import ROS
-from gmwm.export.simulators import SIMULATORS
-from gmwm.export.state_space import STATE_SPACE
+from gmwm.export.programs.gtsam import GTSAM
+from gmwm.export.programs.json_targets import JSON_TARGETS
+from gmwm.export.programs.keyed import KEYED
+from gmwm.export.programs.kfgins import KFGINS
+from gmwm.export.programs.matlab import MATLAB
+from gmwm.export.programs.ros import ROS
+from gmwm.export.programs.simulators import SIMULATORS
+from gmwm.export.programs.state_space import STATE_SPACE
 from gmwm.export.target import Target
 from gmwm.filter_numbers import SensorNumbers
 

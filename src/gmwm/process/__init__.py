@@ -1,6 +1,5 @@
 """What an error process is: parameters, spectrum, wavelet variance, state space, simulation."""
 
-from gmwm.process.arma import AR as AR, ARIMA as ARIMA, ARMA as ARMA, MA as MA
 from gmwm.process.base import Process as Process, Shape as Shape
 from gmwm.process.catalogue import (
     CATALOGUE as CATALOGUE,
@@ -9,22 +8,23 @@ from gmwm.process.catalogue import (
     shaped_curve as shaped_curve,
     shaped_slope as shaped_slope,
 )
-from gmwm.process.gauss_markov import GaussMarkov as GaussMarkov, Resonance as Resonance
-from gmwm.process.low_pass import (
+from gmwm.process.kinds.arma import AR as AR, ARIMA as ARIMA, ARMA as ARMA, MA as MA
+from gmwm.process.kinds.gauss_markov import GaussMarkov as GaussMarkov, Resonance as Resonance
+from gmwm.process.kinds.low_pass import (
     BUTTERWORTH as BUTTERWORTH,
     AveragedNoise as AveragedNoise,
     LowPassNoise as LowPassNoise,
 )
-from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
-from gmwm.process.noise import (
+from gmwm.process.kinds.noise import (
     BiasInstability as BiasInstability,
     QuantizationNoise as QuantizationNoise,
     RandomWalk as RandomWalk,
     RateRamp as RateRamp,
     WhiteNoise as WhiteNoise,
 )
+from gmwm.process.kinds.sinusoid import Sinusoid as Sinusoid
+from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
 from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
-from gmwm.process.sinusoid import Sinusoid as Sinusoid
 from gmwm.process.spectral import (
     PSD as PSD,
     Panels as Panels,

@@ -10,13 +10,25 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process.arma import AR, ARIMA, ARMA, MA
 from gmwm.process.base import Process
-from gmwm.process.gauss_markov import GaussMarkov, Resonance, real_haar, real_slope, resonance_haar
-from gmwm.process.low_pass import AveragedNoise, LowPassNoise, low_pass_haar, on_panels
+from gmwm.process.kinds.arma import AR, ARIMA, ARMA, MA
+from gmwm.process.kinds.gauss_markov import (
+    GaussMarkov,
+    Resonance,
+    real_haar,
+    real_slope,
+    resonance_haar,
+)
+from gmwm.process.kinds.low_pass import AveragedNoise, LowPassNoise, low_pass_haar, on_panels
+from gmwm.process.kinds.noise import (
+    BiasInstability,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+)
+from gmwm.process.kinds.sinusoid import Sinusoid
 from gmwm.process.model import Model
-from gmwm.process.noise import BiasInstability, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
-from gmwm.process.sinusoid import Sinusoid
 
 CATALOGUE: tuple[type[Process], ...] = (
     QuantizationNoise,

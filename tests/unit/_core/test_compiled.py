@@ -14,7 +14,7 @@ from gmwm._core import compiled
 
 _SCRIPT = """
 import numpy as np
-import gmwm.process.noise, gmwm.variance
+import gmwm.process.kinds.noise, gmwm.variance
 print(gmwm.__file__)
 x = np.random.default_rng(1).normal(size=4096)
 print(gmwm.variance.wavelet_variance(x, dt=1.0).variance[0])

@@ -22,7 +22,7 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.comments import wrapped
 from gmwm.export.found import numbers_of
-from gmwm.export.json_targets import json_text
+from gmwm.export.programs.json_targets import json_text
 from gmwm.export.target import Target
 from gmwm.filter_numbers import FORMS, SensorNumbers
 from gmwm.process import Model, Process, StateSpace, block_diagonal

@@ -18,8 +18,8 @@ from scipy import fft
 from gmwm._core.compiled import compiled
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
-from gmwm.process.arma import haar_sum
 from gmwm.process.base import Process, Shape
+from gmwm.process.kinds.arma import haar_sum
 from gmwm.process.parameter import parameter
 from gmwm.process.spectral import (
     HALF_PANEL,
