@@ -140,21 +140,21 @@ def deviation_figure(
 
 
 def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
-    """N where its line passes 1 s, K where its line passes 3 s, B at the lowest point."""
+    """N where its line passes 1 s, K where its line passes 3 s, 0.664 B at the lowest point."""
     low = floor(fitted)
-    places = [("B", low.tau, low.deviation)]
+    places = [("0.664 B", low.tau, low.deviation)]
     if numbers is not None:
         places += [("N", 1.0, numbers[0]), ("K", 3.0, numbers[1])]
     shown = [(label, tau, y * factor) for label, tau, y in places if y > 0.0]
     return {
         "type": "scatter",
         "mode": "markers+text",
-        "name": "N at 1 s, B at the floor, K at 3 s",
+        "name": "N at 1 s, 0.664 B at the floor, K at 3 s",
         "x": [each[1] for each in shown],
         "y": [float(f"{each[2]:.5g}") for each in shown],
         "text": [each[0] for each in shown],
         "textposition": [
-            "top left" if label == "K" or tau > 0.5 * fitted.wv.tau[-1] else "top right"
+            "top left" if label == "K" or tau > 0.1 * fitted.wv.tau[-1] else "top right"
             for label, tau, _ in shown
         ],
         "textfont": {"size": 14, "color": SUM_COLOUR},
@@ -289,9 +289,9 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
             traces.append(_line(times, root_sum(parts), label, SUM_COLOUR, dash, width))
     title = f"{of} {quantity} [{unit}]"
     layout = {
-        "height": 280,
-        "xaxis": _axis("coasting time [s]"),
-        "yaxis": _axis(title[0].upper() + title[1:]),
+        "height": 360,
+        "xaxis": _axis("coasting time [s]") | {"tickvals": known.times, "minor": {}},
+        "yaxis": _axis(title[0].upper() + title[1:]) | {"dtick": 2},
     }
     return _figure(traces, layout, toggles=range(len(traces)))
 

@@ -10,6 +10,7 @@ from gmwm.calibration import AMBIGUITY, DEPARTURES, LONGEST_PART, Calibration
 from gmwm.diagnosis import gathered
 
 _COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
+_LABELS = {"bad": "severe"}
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
 
@@ -63,6 +64,7 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
     return [
         {
             "severity": notice.severity,
+            "label": _LABELS.get(notice.severity, notice.severity),
             "where": ", ".join(part for part in (notice.where, notice.source) if part),
             "text": _begun(notice.text),
             "action": _begun(notice.action),

@@ -49,7 +49,7 @@
       layout.height = Math.round(0.5 * layout.height);
       layout.font.size = 10;
       // The title of the y axis is longer than the axis is high: it goes above.
-      layout.margin = { l: 42, r: 8, t: 17, b: 34 };
+      layout.margin = { l: 42, r: 12, t: 17, b: 34 };
       layout.annotations = [{ text: layout.yaxis.title.text, showarrow: false, xref: "paper",
         yref: "paper", x: 0, y: 1, xanchor: "left", yanchor: "bottom", xshift: -40 }];
       layout.yaxis.title.text = "";

@@ -399,7 +399,7 @@ def test_figures_hold_data_model_and_components(parsed, calibration):
     for fit, figure in zip(calibration.fits.values(), parsed.figures(), strict=True):
         traces = {trace["name"]: trace for trace in figure["data"]}
         positive = [label for label, curve in fit.components.items() if np.any(curve > 0.0)]
-        filtered, marks = "filter: N and K", "N at 1 s, B at the floor, K at 3 s"
+        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the floor, K at 3 s"
         assert list(traces) == [*positive, "model", DATA, filtered, marks]
         scale = {"gyro": 180.0 / np.pi * 3600.0, "accel": 1.0 / 9.80665e-6, None: 1.0}
         factor = scale[fit.wv.quantity]
@@ -627,7 +627,7 @@ def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
         assert sum("moved" in text for _, text in rows) == 1
         shown = page(spoilt)
         assert '<a href="#health">the model misses the data</a>' in shown
-        assert ["bad", "gyro_x The model misses the data by 40 %", "Add a term"] in Page(
+        assert ["severe", "gyro_x The model misses the data by 40 %", "Add a term"] in Page(
             shown
         ).cells
 
