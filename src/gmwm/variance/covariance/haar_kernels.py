@@ -31,16 +31,21 @@ def lag_sums(
     shape = (levels, levels)
     mean, square, whole = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     around = np.empty(lags + 2 * longest)
+    middle = around[longest : longest + lags]
     for j in range(levels):
+        at = -longest % size
         for h in range(around.size):
-            around[h] = once[j, (h - longest) % size]
+            around[h] = once[j, at]
+            at = at + 1 if at + 1 < size else 0
         for k in range(j, levels):
             m = averaging[k]
+            # Slices: an index that might be negative is looked at before each use.
+            later = around[longest + m : longest + m + lags]
+            earlier = around[longest - m : longest - m + lags]
             scale, own = 0.5 / m, counts[j, k]
             plain, squared, total = 0.0, 0.0, 0.0
             for h in range(lags):
-                at = longest + h
-                value = scale * (around[at] - 0.5 * (around[at + m] + around[at - m])) + zero[j, k]
+                value = scale * (middle[h] - 0.5 * (later[h] + earlier[h])) + zero[j, k]
                 plain += own[h] * value
                 squared += own[h] * value * value
                 total += weights[h] * value * value

@@ -90,7 +90,7 @@ def test_a_clock_that_drifts(offset):
 @pytest.mark.parametrize(("kind", "vehicle"), [("gyro", "loiter"), ("accel", "car")])
 def test_a_scale_error(kind, vehicle):
     """White noise of the gyros was blamed, of either."""
-    navigated = found(225, f"{kind} scale", vehicle=vehicle, duration=300.0)
+    navigated = found(225, f"{kind} scale", vehicle=vehicle, duration=200.0)
     (fault,) = navigated.fault_notices
     assert (fault.code, fault.where) == ("scale-error", kind)
     for axis in "xyz":
@@ -131,8 +131,7 @@ def test_a_filter_that_diverges_under_every_sign_shows_none():
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "seed", "rate"),
-    [("car", 202, 10.0), ("helicopter", 202, 10.0), ("helicopter", 1000, 20.0)],
+    ("vehicle", "seed", "rate"), [("car", 202, 10.0), ("helicopter", 1000, 20.0)]
 )
 def test_a_lever_arm_left_out(vehicle, seed, rate):
     """And no time offset beside it, which would explain a part of it too."""
@@ -239,7 +238,7 @@ def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
 
 
 def test_two_faults_together():
-    navigated = found(208, "stamps", "lever arm", duration=300.0)
+    navigated = found(208, "stamps", "lever arm", duration=200.0)
     assert set(codes(navigated)) == {"time-offset", "lever-arm"}
     assert navigated.verdict.values["explained"]
 

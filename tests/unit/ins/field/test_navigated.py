@@ -153,7 +153,8 @@ def test_a_good_gyro_finds_north_by_itself(tmp_path):
     ],
 )  # fmt: skip
 def test_a_wrong_model_is_told(tmp_path, changes, verdict):
-    drive(tmp_path, deviations=False)
+    short = car_drive(duration=80.0, dt=1.0 / RATE)
+    drive(tmp_path, trajectory=short, deviations=False, hole=(50.0, 60.0))
     found = Navigated.of(Measured.of(content(**changes), tmp_path))
     assert not found.fits
     assert (found.verdict.code, found.verdict.severity) == (verdict, "bad")
