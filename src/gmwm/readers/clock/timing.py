@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, median
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock.clock_notices import (
@@ -212,7 +212,7 @@ def _followed(clock: Clock, steps: FloatArray) -> Followed:
         same[1:] = repeats & clock.same(np.arange(clock.stamps.size))[1:]
     found = None
     finest = float(np.spacing(np.max(np.abs(clock.stamps))))
-    if not np.all(repeats) and finest < 0.1 * np.median(np.abs(steps[~repeats])):
+    if not np.all(repeats) and finest < 0.1 * median(np.abs(steps[~repeats])):
         found = followed(clock.stamps, same, clock.extent)
     if found is None or not found.is_a_clock:
         raise _no_clock(clock, steps)
@@ -241,5 +241,5 @@ def _no_clock(clock: Clock, steps: FloatArray) -> InputError:
 
 def _short(steps: FloatArray) -> int | None:
     """First row after a step that rounding does not make so short."""
-    bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * float(np.median(steps))))
+    bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
     return int(bad[0]) + 1 if bad.size else None

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from scipy.special import ndtri
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.readers import tuning
 from gmwm.readers.clock.line import interval_of
 from gmwm.readers.clock.tracking import follow
@@ -42,7 +42,7 @@ class Followed:
     def is_a_clock(self) -> bool:
         """Whether most stamps are near it, and it is seldom set."""
         often = np.count_nonzero(self.is_set) > max(tuning.MOST_SET * self.late.size, 1)
-        return not often and float(np.median(np.abs(self.late))) <= tuning.MOST_UNEVEN
+        return not often and median(np.abs(self.late), overwrite=True) <= tuning.MOST_UNEVEN
 
 
 def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | None:
@@ -89,7 +89,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
             return None
         trend = _smooth(x - slope * number, is_set)
         late = (x - trend) / slope - number
-        spread = float(np.median(np.abs(late))) / ndtri(0.75)
+        spread = median(np.abs(late), overwrite=True) / ndtri(0.75)
         sigma, age, start = max(spread, tuning.LEAST_JITTER), memory, 0.0
     return Followed(advance, is_set, late, rough * slope, burst)
 
@@ -112,7 +112,7 @@ def _rough_interval(stamps: FloatArray, same: BoolArray, burst: int) -> float:
         return 0.0
     first = stamps[starts]
     means = (first[width:] - first[:-width]) / (rows[width:] - rows[:-width])
-    return float(np.median(means))
+    return median(means, overwrite=True)
 
 
 def _costs(stamps: FloatArray, same: BoolArray) -> FloatArray:
