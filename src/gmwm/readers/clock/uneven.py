@@ -58,6 +58,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         return None  # the clock stood still
     if burst > 1:
         same = same & (of_row > burst)  # coarse samples repeat by chance
+    del of_row  # as are others below, once they have served: each is as long as the recording
     rough = _rough_interval(stamps, same, burst)
     if not 0.0 < rough < np.inf:
         return None
@@ -82,6 +83,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         is_set |= is_set_now
         if np.array_equal(advance, before) and not np.any(is_set_now):
             break
+        del trend
         before = advance.copy()
         number = np.cumsum(advance)
         slope = interval_of(x, number, is_set)
@@ -89,6 +91,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
             return None
         trend = _smooth(x - slope * number, is_set)
         late = (x - trend) / slope - number
+        del number
         spread = median(np.abs(late), overwrite=True) / ndtri(0.75)
         sigma, age, start = max(spread, tuning.LEAST_JITTER), memory, 0.0
     return Followed(advance, is_set, late, rough * slope, burst)
@@ -164,10 +167,7 @@ def _smooth(late: FloatArray, is_set: BoolArray) -> FloatArray:
     for start, stop in pairwise(edges):
         part = late[start:stop]
         # The median drops what a stall delays, the mean the noise of the median.
-        calm = scipy.ndimage.median_filter(
-            part, min(tuning.ROWS_OF_TREND, part.size) | 1, mode="nearest"
-        )
-        smooth[start:stop] = scipy.ndimage.uniform_filter1d(
-            calm, tuning.ROWS_OF_TREND, mode="nearest"
-        )
+        calm, size = smooth[start:stop], tuning.ROWS_OF_TREND
+        scipy.ndimage.median_filter(part, min(size, part.size) | 1, output=calm, mode="nearest")
+        scipy.ndimage.uniform_filter1d(calm, size, output=calm, mode="nearest")
     return smooth
