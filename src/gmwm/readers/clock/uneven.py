@@ -71,7 +71,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
     shorter = _likeliest(x, same, costs)
     x, rough = x * shorter, rough / shorter
     advance, is_set = np.ones(n, dtype=np.int64), np.zeros(n, dtype=bool)
-    trend, slope = np.zeros(n), 1.0
+    trend, late, slope = np.zeros(n), np.zeros(0), 1.0
     sigma, age = tuning.JITTER_EXPECTED, tuning.ROWS_KNOWN
     start, before = _start(x), np.zeros(0, dtype=np.int64)
     for memory in tuning.ROWS_OF_CLOCK:
@@ -84,6 +84,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         if np.array_equal(advance, before) and not np.any(is_set_now):
             break
         del trend
+        late = late[:0].copy()
         before = advance.copy()
         number = np.cumsum(advance)
         slope = interval_of(x, number, is_set)
