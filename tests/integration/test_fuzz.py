@@ -37,12 +37,21 @@ FOUND = [
     ("odd", 11, 7),  # noise without slow parts, which leaves no drift
     ("odd", 12, 52),  # a variance below the smallest number
     ("odd", 12, 92),  # an upper bound below zero
+    ("hdf5", 13, 218),  # a unit of 3.9 GB
 ]
 
 
 @pytest.mark.parametrize(("name", "seed", "case"), FOUND)
 def test_what_was_found(name, seed, case, tmp_path):
     fuzz.attempt(name, seed, case, tmp_path)
+
+
+def test_what_needs_too_much_memory_is_a_failure_and_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz, "BYTES", -1)
+    store = tmp_path / "cases.jsonl"
+    assert fuzz.run(["npy"], 2, 0, store=store)["npy"].failures == 2
+    assert store.read_text().count('"outcome": "too large"') == 2
+    assert fuzz.run(["npy"], 2, 0, store=store)["npy"].failures == 2
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def channel_units(
     rate = unknown_rate() if missing or roles.time is None else None
     if missing or rate is not None:
         raise _incomplete(table.source, missing, rate)
-    origin = getattr(table, "message_type", "the names of the columns")
+    origin = getattr(table, "message_type", "") or "the names of the columns"
     return found, tuple(_notices(origin, from_header, overruled))
 
 

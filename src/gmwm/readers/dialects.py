@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from gmwm._core.notices import Notice
+from gmwm.errors import InputError
 from gmwm.readers.layout import Layout
 from gmwm.readers.names import AXES
 
@@ -26,6 +27,8 @@ _KALIBR = {
     for word, sensor in (("omega", "gyro"), ("alpha", "accel"))
     for axis in AXES
 }
+_SHIMMER = re.compile(r"(?:Shimmer_\w+?_)?(?:(Gyro|Accel(?:_LN|_WR)?)_([XYZ])|Timestamp\w*)_CAL")
+_GNSS_LOGGER = re.compile(rb"(?m)^# *UncalGyro,")
 _RENAMED = (
     (frozenset({"timestamp", *_KALIBR}), {"timestamp": "time [ns]", **_KALIBR}),
     (frozenset({"timestamp", "gyro_rad[0]"}), {"timestamp": "time [us]"}),
@@ -44,10 +47,18 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     which the preamble has the number per g. Sensor Logger: axes without the sensor, which is in the
     name of the file, and time in nanoseconds. Gyroflow (gcsv): scales in the preamble. Xsens DOT:
     a clock of 1 MHz, where MTi has 10 kHz. Kalibr, ulog2csv of PX4 and rostopic: units of time.
+    Shimmer: units in a line below the names.
 
     source: Name of the file.
     head: Its beginning.
+    Raises InputError at a log of GnssLogger: each of its lines is of one of several sensors.
     """
+    if _GNSS_LOGGER.search(head):
+        raise InputError(
+            f"{source} is a log of GnssLogger, with lines of several sensors: write those of one "
+            "to a file, e.g. (echo 'time [ns],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]'; "
+            f"grep ^UncalGyro, {source} | cut -d, -f3-6) > gyro.csv"
+        )
     names = layout.names
     if names[:1] == ("loopIteration",):
         steps = _GRAVITY_IN_STEPS.search(head[: layout.offset])
@@ -66,6 +77,8 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     if b"DOT" in preamble:
         renamed = tuple("time [us]" if n == "SampleTimeFine" else n for n in names)
         return replace(layout, names=renamed)
+    if any(map(_SHIMMER.fullmatch, names)):
+        return _of_shimmer(layout, head)
     for known, meant in _RENAMED:
         if known <= set(names):
             return replace(layout, names=tuple(meant.get(name, name) for name in names))
@@ -80,6 +93,26 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
                 notices += (Notice("gravity-absent", "warning", "accel", _FUSED, {}, _NOT_FUSED),)
             return replace(layout, names=renamed, notices=notices)
     return layout
+
+
+def _of_shimmer(layout: Layout, head: bytes) -> Layout:
+    """The low-noise accelerometer, where there are two."""
+    row = head[layout.offset :].partition(b"\n")[0]
+    units = [unit.strip(' "\r') for unit in row.decode(errors="replace").split(layout.delimiter)]
+    if "deg/s" not in units and "m/(s^2)" not in units:
+        return layout
+    names = list(layout.names)
+    has_low_noise = any("Accel_LN_" in name for name in names)
+    for i, (name, unit) in enumerate(zip(layout.names, units, strict=False)):
+        found = _SHIMMER.fullmatch(name)
+        if found and found[1] and not (found[1] == "Accel_WR" and has_low_noise):
+            unit = unit.replace("(s^2)", "s^2")
+            names[i] = f"{found[1][:5].lower().rstrip('_')}_{found[2].lower()} [{unit}]"
+        elif found and not found[1] and unit == "ms":
+            names[i] = "time [ms]"
+    return replace(
+        layout, names=tuple(names), offset=layout.offset + len(row) + 1, line=layout.line + 1
+    )
 
 
 def _of_blackbox(name: str, has_scale: bool) -> str:

@@ -67,4 +67,6 @@ def column_of(table: Table, index: int) -> str:
 
 def usable(values: FloatArray) -> bool:
     """Whether every value is missing (NaN) or finite and of sane magnitude."""
-    return not np.any(np.abs(values) >= LARGEST)
+    # Without an array as long as the values.
+    most, least = np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0)
+    return bool(least > -LARGEST and most < LARGEST)

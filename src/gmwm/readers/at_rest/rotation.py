@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, known_of, median
 from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
@@ -88,15 +88,17 @@ def _integral_means(
     rate: Sequence[FloatArray], force: Sequence[FloatArray], size: int
 ) -> FloatArray:
     """Means over blocks of the sum of w x a, some blocks at a time: memory is that of the means."""
-    middle = [np.nanmedian(column) for column in rate]
+    middle = [median(known_of(column)) for column in rate]
     rows = size * max(_ROWS // size, 1)
     total, means = np.zeros(3), []
     for start in range(0, rate[0].size // size * size, rows):
         part = slice(start, min(start + rows, rate[0].size // size * size))
         w = [column[part] - m for column, m in zip(rate, middle, strict=True)]
         a = [column[part] for column in force]
-        change = np.nan_to_num([w[i - 2] * a[i - 1] - w[i - 1] * a[i - 2] for i in range(3)])
-        integral = np.cumsum(change, axis=1, out=change) + total[:, None]
+        change = np.array([w[i - 2] * a[i - 1] - w[i - 1] * a[i - 2] for i in range(3)])
+        change[np.isnan(change)] = 0.0
+        integral = np.cumsum(change, axis=1, out=change)
+        integral += total[:, None]
         means.append(integral.reshape(3, -1, size).mean(axis=2).T)
         total = integral[:, -1]
     return np.concatenate(means)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, median
 from gmwm.readers import tuning
 
 
@@ -33,11 +33,11 @@ def without_beat(stamps: FloatArray) -> Beat | None:
     if stamps.size < tuning.FEWEST_SAMPLES:
         return None
     steps = np.diff(stamps)
-    interval = 0.5 * float(np.median(stamps[2:] - stamps[:-2]))
+    interval = 0.5 * median(stamps[2:] - stamps[:-2], overwrite=True)
     is_short, is_long = steps < interval, (steps > interval) & (steps < 2.0 * interval)
     if not (interval > 0.0 and np.any(is_short) and np.any(is_long)):
         return None
-    short, long = float(np.median(steps[is_short])), float(np.median(steps[is_long]))
+    short, long = (median(steps[rows], overwrite=True) for rows in (is_short, is_long))
     share = (long - short) / (4.0 * interval)
     near = np.minimum(np.abs(steps - short), np.abs(steps - long)) < tuning.IN_BEAT * interval
     if (

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, median
 from gmwm.readers import tuning
 
 _DAY, _HOUR = 86400.0, 3600.0
@@ -23,7 +23,7 @@ def is_time_of_day(stamps: FloatArray) -> bool:
     if not 0 < count < tuning.MOST_TURNS * turns.size:
         return False
     steps = np.diff(seconds_of_day(stamps))
-    usual = float(np.median(steps[~turns]))
+    usual = median(steps[~turns], overwrite=True)
     even = np.abs(steps[turns] - usual) < 0.5 * abs(usual)
     return int(np.count_nonzero(even)) > 0.5 * count
 
@@ -54,7 +54,7 @@ def without_summer_time(
     known = steps[~np.isnan(steps)]
     if not known.size:
         return stamps, []
-    usual = float(np.median(known))
+    usual = median(known)
     near = max(tuning.STEPS_OF_HOUR * abs(usual), tuning.NEAR_HOUR)
     beyond = steps - usual
     rows = np.flatnonzero(np.abs(np.abs(beyond) - _HOUR) < min(near, 0.1 * _HOUR)) + 1

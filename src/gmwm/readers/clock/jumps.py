@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, median
 from gmwm.readers import tuning
 from gmwm.readers.clock.line import interval_of
 from gmwm.readers.clock.uneven import Followed
@@ -142,7 +142,7 @@ def find_change(stamps: FloatArray) -> Change | None:
     if parts < 2:
         return None
     rows = np.array_split(steps, parts)
-    medians = np.array([np.median(part) for part in rows])
+    medians = np.array([median(part) for part in rows])
     usual = [part[part < _LONG * median] for part, median in zip(rows, medians, strict=True)]
     if not all(part.size for part in usual):
         return None
@@ -183,7 +183,7 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     so that one stamp that comes late, and is followed by a short step, makes no gap.
     """
     steps = np.diff(stamps)
-    usual = np.mean(steps[steps <= tuning.USUAL_STEP * np.median(steps)])
+    usual = np.mean(steps[steps <= tuning.USUAL_STEP * median(steps)])
     candidates = np.flatnonzero(steps > tuning.LONGEST_STEP * usual) + 1
     rest = stamps[-1] - stamps[0] - np.sum(steps[candidates - 1])
     interval = float(rest / (steps.size - candidates.size))

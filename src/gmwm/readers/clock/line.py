@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.readers import tuning
 
 
@@ -33,7 +33,7 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
         for first, then in pairs
         if first.stop > first.start
     ]
-    slope = float(np.median(np.concatenate(slopes), overwrite_input=True))
+    slope = median(np.concatenate(slopes), overwrite=True)
     for part in parts:
         lever[part] -= np.mean(lever[part])
     scale = float(lever @ lever)
@@ -44,8 +44,8 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
         for part in parts:
             np.subtract(stamps[part], stamps[part.start], out=late[part])
             late[part] -= slope * lever[part]
-            late[part] -= np.median(late[part])
-        bound = 3.0 * 1.4826 * float(np.median(np.abs(late), overwrite_input=True))
+            late[part] -= median(late[part])
+        bound = 3.0 * 1.4826 * median(np.abs(late), overwrite=True)
         change = float(lever @ np.clip(late, -bound, bound)) / scale
         slope += change
         if abs(change) < tuning.LINE_SETTLED * abs(slope):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock.beat import without_beat
@@ -146,7 +146,7 @@ def _unwrapped(stamps: FloatArray) -> FloatArray | None:
         back = np.flatnonzero(steps < 0.0)
         if not back.size:
             return None
-        usual = float(np.median(steps))
+        usual = median(steps)
         for bits in (16, 32):
             forward = steps[back] + 2.0**bits
             if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):

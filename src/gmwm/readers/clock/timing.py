@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, median
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.clock.clock_notices import (
@@ -120,7 +120,8 @@ def _steps(clock: Clock) -> _Steps:
             if change is not None or not np.any(jumps.missing > clock.extent):
                 jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
                 return _Steps(jumps, jitter, change, None)
-        uneven = _followed(clock, steps)
+        del steps  # following needs more memory
+        uneven = _followed(clock)
         jitter = float(np.std(np.diff(uneven.late)[uneven.is_usual]))
         return _Steps(jumps_of(uneven), jitter, change, uneven)
 
@@ -204,18 +205,21 @@ def _check_jumps(clock: Clock, jumps: Jumps) -> None:
         )
 
 
-def _followed(clock: Clock, steps: FloatArray) -> Followed:
+def _followed(clock: Clock) -> Followed:
     """Number the rows one by one, if there is a clock that most of them agree on."""
+    steps = np.diff(clock.stamps)
     repeats = steps == 0.0
     same = np.zeros(clock.stamps.size, dtype=bool)
     if np.any(repeats):
         same[1:] = repeats & clock.same(np.arange(clock.stamps.size))[1:]
     found = None
     finest = float(np.spacing(np.max(np.abs(clock.stamps))))
-    if not np.all(repeats) and finest < 0.1 * np.median(np.abs(steps[~repeats])):
+    is_fine = not np.all(repeats) and finest < 0.1 * median(np.abs(steps[~repeats]))
+    del steps
+    if is_fine:
         found = followed(clock.stamps, same, clock.extent)
     if found is None or not found.is_a_clock:
-        raise _no_clock(clock, steps)
+        raise _no_clock(clock, np.diff(clock.stamps))
     return found
 
 
@@ -241,5 +245,5 @@ def _no_clock(clock: Clock, steps: FloatArray) -> InputError:
 
 def _short(steps: FloatArray) -> int | None:
     """First row after a step that rounding does not make so short."""
-    bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * float(np.median(steps))))
+    bad = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
     return int(bad[0]) + 1 if bad.size else None

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from scipy.special import ndtri
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.readers import tuning
 from gmwm.readers.clock.line import interval_of
 from gmwm.readers.clock.tracking import follow
@@ -42,7 +42,7 @@ class Followed:
     def is_a_clock(self) -> bool:
         """Whether most stamps are near it, and it is seldom set."""
         often = np.count_nonzero(self.is_set) > max(tuning.MOST_SET * self.late.size, 1)
-        return not often and float(np.median(np.abs(self.late))) <= tuning.MOST_UNEVEN
+        return not often and median(np.abs(self.late), overwrite=True) <= tuning.MOST_UNEVEN
 
 
 def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | None:
@@ -58,6 +58,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         return None  # the clock stood still
     if burst > 1:
         same = same & (of_row > burst)  # coarse samples repeat by chance
+    del of_row  # as are others below, once they have served: each is as long as the recording
     rough = _rough_interval(stamps, same, burst)
     if not 0.0 < rough < np.inf:
         return None
@@ -70,7 +71,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
     shorter = _likeliest(x, same, costs)
     x, rough = x * shorter, rough / shorter
     advance, is_set = np.ones(n, dtype=np.int64), np.zeros(n, dtype=bool)
-    trend, slope = np.zeros(n), 1.0
+    trend, late, slope = np.zeros(n), np.zeros(0), 1.0
     sigma, age = tuning.JITTER_EXPECTED, tuning.ROWS_KNOWN
     start, before = _start(x), np.zeros(0, dtype=np.int64)
     for memory in tuning.ROWS_OF_CLOCK:
@@ -82,6 +83,8 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         is_set |= is_set_now
         if np.array_equal(advance, before) and not np.any(is_set_now):
             break
+        del trend
+        late = late[:0].copy()
         before = advance.copy()
         number = np.cumsum(advance)
         slope = interval_of(x, number, is_set)
@@ -89,7 +92,8 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
             return None
         trend = _smooth(x - slope * number, is_set)
         late = (x - trend) / slope - number
-        spread = float(np.median(np.abs(late))) / ndtri(0.75)
+        del number
+        spread = median(np.abs(late), overwrite=True) / ndtri(0.75)
         sigma, age, start = max(spread, tuning.LEAST_JITTER), memory, 0.0
     return Followed(advance, is_set, late, rough * slope, burst)
 
@@ -112,7 +116,7 @@ def _rough_interval(stamps: FloatArray, same: BoolArray, burst: int) -> float:
         return 0.0
     first = stamps[starts]
     means = (first[width:] - first[:-width]) / (rows[width:] - rows[:-width])
-    return float(np.median(means))
+    return median(means, overwrite=True)
 
 
 def _costs(stamps: FloatArray, same: BoolArray) -> FloatArray:
@@ -164,10 +168,7 @@ def _smooth(late: FloatArray, is_set: BoolArray) -> FloatArray:
     for start, stop in pairwise(edges):
         part = late[start:stop]
         # The median drops what a stall delays, the mean the noise of the median.
-        calm = scipy.ndimage.median_filter(
-            part, min(tuning.ROWS_OF_TREND, part.size) | 1, mode="nearest"
-        )
-        smooth[start:stop] = scipy.ndimage.uniform_filter1d(
-            calm, tuning.ROWS_OF_TREND, mode="nearest"
-        )
+        calm, size = smooth[start:stop], tuning.ROWS_OF_TREND
+        scipy.ndimage.median_filter(part, min(size, part.size) | 1, output=calm, mode="nearest")
+        scipy.ndimage.uniform_filter1d(calm, size, output=calm, mode="nearest")
     return smooth

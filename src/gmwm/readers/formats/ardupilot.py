@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +79,16 @@ class DataflashTable(MessageTable):
         """Name of the log."""
         return self.path.name
 
+    @property
+    def stamps(self) -> str:
+        """What the time stamps are, for messages."""
+        return f"{self.series.columns[_TIME]} of {self.series.name}"
+
+    @property
+    def message_type(self) -> str:
+        """What says the units."""
+        return f"messages {self.series.kind}"
+
     def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
         fields = list(self.series.columns.values())
         with damage_named(self.source, _damage):
@@ -121,7 +131,9 @@ def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table
         else:
             _, columns = batches[topic.name]
             entries = {name: array_of(values) for name, values in columns.items()}
-            tables.append(ArrayTable.of_entries(path.name, entries, notices))
+            table = ArrayTable.of_entries(path.name, entries, notices)
+            stamps, kinds = f"stamps of {topic.name}", "messages ISBH and ISBD"
+            tables.append(replace(table, stamps=stamps, message_type=kinds))
     return tuple(tables)
 
 

@@ -77,6 +77,8 @@ class ArrayTable:
     tentative: bool = False
     notices: tuple[Notice, ...] = ()
     before: int = 0  # rows of a file of which this is a part
+    stamps: str = ""  # of messages: what messages of the reader call these,
+    message_type: str = ""  # and what says the units
 
     @classmethod
     def of_entries(

@@ -33,6 +33,10 @@ _MAT_73 = b"MATLAB 7.3"
 _GROUPS = re.compile(r"[./]")
 _SIGNATURE, _HEAP = b"\x89HDF\r\n\x1a\n", b"GCOL\x01\0\0\0"
 _UNITS = ("units", "unit", "Units", "Unit")
+# The message of an attribute: its name, text of any length as its type, one value: its length.
+_UNIT = re.compile(
+    rb"nits?\0+\x19...\x10\0{3}.{8,16}?(?:\0{4}\x01\0{7}|\x02\0{3})(.{4})", re.DOTALL
+)
 
 
 def open_hdf5(path: Path) -> ArrayTable:
@@ -61,16 +65,17 @@ def open_hdf5(path: Path) -> ArrayTable:
 
 
 def _check_heaps(stream: BinaryIO) -> None:
-    """Refuse damaged heaps of texts, which the library reads without end or into all memory.
+    """Refuse damaged heaps of texts, and units longer than the file, which the library reads
+    without end or into all memory.
 
-    Global heap collections after the HDF5 file format specification, version 3, secs. II.A and
-    III.E.
+    Global heap collections and attributes after the HDF5 file format specification, version 3,
+    secs. II.A, III.E and IV.A.2.m.
     """
     with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         begin = data.find(_SIGNATURE)
         if data[begin + (14 if data[begin + 8] < 2 else 10)] != 8:
             return  # lengths of other sizes are rare
-        start = data.find(_HEAP)
+        start = first = data.find(_HEAP)
         while start >= 0:
             end = start + int.from_bytes(data[start + 8 : start + 16], "little")
             place = start + 16
@@ -83,6 +88,9 @@ def _check_heaps(stream: BinaryIO) -> None:
                     raise ValueError("free space of no size in a heap")
                 place = end if index == 0 else place + 16 + -(-size // 8) * 8
             start = data.find(_HEAP, start + 1)
+        for unit in _UNIT.finditer(data) if first >= 0 else ():
+            if int.from_bytes(unit[1], "little") > len(data):
+                raise ValueError("a unit longer than the file")
 
 
 def _read_data_set(h5py: Any, path: Path, name: str) -> AnyArray:

@@ -118,12 +118,14 @@ def decode(
         At a message that is too short, or of another encoding.
     """
     n = len(raw)
-    sizes = np.fromiter(map(len, raw), np.int64, n)
-    if np.min(sizes) < serialization.text:
+    lengths = list(map(len, raw))
+    is_even = lengths.count(lengths[0]) == n  # as a topic is, almost always: no copies
+    sizes = np.full(n, lengths[0]) if is_even else np.array(lengths)
+    if sizes.min() < serialization.text:
         raise _cut_off(where(int(np.argmax(sizes < serialization.text))))
     joined = np.frombuffer(b"".join(raw), np.uint8)
     starts = np.cumsum(sizes) - sizes
-    if np.all(sizes == sizes[0]):  # as a topic is, almost always: no copies
+    if is_even:
         head = joined.reshape(n, -1)
     else:
         head = joined[starts[:, None] + np.arange(serialization.text)]
@@ -132,7 +134,7 @@ def decode(
     stamps = np.empty(n, np.int64)
     numbers = [np.empty(n) for _ in wanted]
     left = np.ones(n, dtype=bool)
-    while np.any(left):  # once: a topic has one encoding and one frame_id, almost always
+    while left.any():  # once: a topic has one encoding and one frame_id, almost always
         first = int(np.argmax(left))
         size, code = int(sizes[first]), int(codes[first])
         if code not in _ORDERS:
@@ -142,7 +144,7 @@ def decode(
             )
         order = _ORDERS[code]
         alike = (sizes == size) & (codes == code) & (frames == frames[first])
-        if np.all(alike):
+        if alike.all():
             rows: slice | _Integers = slice(None)
             block = joined.reshape(n, size)
         else:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -63,25 +64,30 @@ def _tables(path: Path, topics: Sequence[str]) -> tuple[ArrayTable, ...]:
     chosen = choose_first(path.name, ranks, topics)
     notices += left_out(ranks[:2], chosen)
     by_name = {_name(each): each for each in sets}
-    tables: list[_Columns] = []
+    tables: list[tuple[str, _Columns]] = []
     for topic in chosen:
         data = by_name[topic.name].data
         if topic.name.startswith(_COMBINED):
-            tables += _combined(data)
+            found = _combined(data)
         elif by_name[topic.name].name in _FIFO:
-            tables.append(_from_fifo(data, _FIFO[by_name[topic.name].name]))
+            found = [_from_fifo(data, _FIFO[by_name[topic.name].name])]
         else:
             sensor = _SINGLE[by_name[topic.name].name]
             _check_not_thinned(path.name, topic, data)
-            tables.append(_columns(data["timestamp"], sensor, [data[axis] for axis in AXES]))
-    tables += _thermometers(sets)
+            found = [_columns(data["timestamp"], sensor, [data[axis] for axis in AXES])]
+        tables += [(topic.name, columns) for columns in found]
+    tables += [("thermometers", columns) for columns in _thermometers(sets)]
     return tuple(
-        ArrayTable.of_entries(
-            path.name,
-            {name: array_of(values) for name, values in columns.items()},
-            notices if i == 0 else (),
+        replace(
+            ArrayTable.of_entries(
+                path.name,
+                {name: array_of(values) for name, values in columns.items()},
+                notices if i == 0 else (),
+            ),
+            stamps=f"stamps of {topic}",
+            message_type=f"the definition of {topic}",
         )
-        for i, columns in enumerate(tables)
+        for i, (topic, columns) in enumerate(tables)
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from pymavlink.DFReader import DFReader_binary
@@ -54,6 +56,8 @@ def test_sensor_combined(tmp_path):
     assert exact(found)
     assert found.rate == pytest.approx(250.0)
     assert np.nanmax(found["sensor_accel_temperature"].values) == 41.0
+    assert "units from the definition of sensor_combined: gyro_x" in str(found)
+    assert "time stamps (stamps of sensor_combined, microseconds)" in str(found)
 
 
 def test_accelerometer_with_stamps_of_its_own(tmp_path):
@@ -132,6 +136,8 @@ def test_imu_of_ardupilot(tmp_path):
     assert exact(found)
     assert found.rate == pytest.approx(400.0)
     assert found["temperature"].mean == pytest.approx(35.5)
+    assert "units from messages IMU: gyro_x" in str(found)
+    assert re.search(r"time stamps \((SampleUS|TimeUS) of IMU(\[0\])?, microseconds\)", str(found))
 
 
 def test_several_imus_of_ardupilot(tmp_path):
@@ -155,6 +161,7 @@ def test_batches(tmp_path):
             messages.append(("ISBD", start, number, 0, *x, *y, *z))
     found = gmwm.read(write_dataflash(tmp_path / "a.bin", BATCH, messages))
     assert found.rate == pytest.approx(1000.0)
+    assert "units from messages ISBH and ISBD" in str(found)
     assert np.array_equal(found["accel_z"].values, counts[0, :, 2].ravel()[:116] / 400)
     assert np.array_equal(found["gyro_x"].values, counts[1, :, 0].ravel()[:116] / 1000)
 

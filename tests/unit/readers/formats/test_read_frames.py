@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+
 import h5py
 import numpy as np
 import pandas as pd
@@ -238,3 +240,21 @@ def test_a_damaged_heap_of_hdf5_is_refused_before_its_library_reads_it(place, si
     path.write_bytes(data)
     with pytest.raises(gmwm.InputError, match="damaged or cut off"):
         gmwm.read(path, rate=100.0)
+
+
+@pytest.mark.parametrize("version", ["earliest", "latest"])
+def test_a_unit_longer_than_its_file_is_refused_before_the_library_makes_room(version, tmp_path):
+    """For a damaged length of 3.9 GB it takes as much memory."""
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=version) as file:
+        file["gyro_x"] = np.random.default_rng(3).normal(size=300)
+        file["gyro_x"].attrs["units"] = "rad/s"
+    assert gmwm.read(path, rate=100.0)["gyro_x"].n == 300
+    data = path.read_bytes()
+    place = data.find(b"GCOL").to_bytes(8, "little")  # its address follows the length
+    assert data.count(b"\5\0\0\0" + place) == 1
+    path.write_bytes(data.replace(b"\5\0\0\0" + place, b"\0\0\0\xe0" + place))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(gmwm.InputError, match=r"a\.h5 is damaged or cut off"):
+        gmwm.read(path, rate=100.0)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 100_000
