@@ -122,7 +122,10 @@ class Replay:
         averages no noise, and the filter's own change of velocity has the noise of the fix in it.
         """
         track, dt = self.track, self.imu.dt
-        total = np.cumsum(np.vstack([np.zeros(3), self.imu.velocity]), axis=0)
+        total, turned = (
+            np.cumsum(np.vstack([np.zeros(3), each]), axis=0)
+            for each in (self.imu.velocity, self.imu.rotation)
+        )
         fixes = []
         for each in self.aiding.fixes:
             seconds = shift(each.time)
@@ -131,7 +134,12 @@ class Replay:
             ends = (np.clip(middle + by, 0.0, self.imu.n * dt) for by in (-reach, reach))
             first, last = (np.rint(end / dt).astype(int) for end in ends)
             force = (total[last] - total[first]) / (np.maximum(last - first, 1) * dt)[:, None]
-            near = np.clip(np.searchsorted(track.time, middle), 0, track.time.size - 1)
+            middle_at = np.clip(np.rint(middle / dt), 0, self.imu.n).astype(int)
+            near = np.searchsorted(track.time, middle_at * dt - 0.5 * tuning.TRACK_STEP)
+            near = np.clip(near, 0, track.time.size - 1)
+            # The track's attitude there, and what the vehicle turns by from then on.
+            since = np.rint(track.time[near] / dt).astype(int)
+            force += np.cross(turned[middle_at] - turned[since], force)
             change = seconds[:, None] * np.einsum("eij,ej->ei", track.matrix[near], force)
             change[:, 2] += seconds * gravity_at(np.sin(track.lla[near, 0]), track.lla[near, 2])
             velocity = np.stack(

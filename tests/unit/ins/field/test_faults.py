@@ -87,6 +87,25 @@ def test_a_clock_that_drifts(offset):
     assert navigated.faults.explained
 
 
+def test_a_clock_that_drifts_in_circles():
+    """A lever arm was named, which is hardly less probable there."""
+    faults = found(3000, "clock drift", vehicle="loiter", duration=300.0, rate=20.0).faults
+    (fault,) = faults.found
+    assert fault.code == "clock-drift"
+    assert abs(fault.values["drift"] - 5e-4) < 3.0 * fault.errors["drift"]
+    assert faults.alternatives == ("lever-arm", "time-offset")
+
+
+@pytest.mark.parametrize("by", [-0.15, 0.15])
+def test_fixes_along_the_track_are_as_good_as_stamps_where_a_vehicle_rolls(by):
+    """The attitude was that of the next second of the track."""
+    replay = found(201, vehicle="loiter").faults.replay
+    exact, smooth = (move(lambda time: np.full(time.shape, by)).standard
+                     for move in (replay.later, replay.along))  # fmt: skip
+    moved = np.nansum((exact - replay.standard) ** 2)
+    assert np.nansum((smooth - exact) ** 2) < 0.15 * moved
+
+
 @pytest.mark.parametrize(("kind", "vehicle"), [("gyro", "loiter"), ("accel", "car")])
 def test_a_scale_error(kind, vehicle):
     """White noise of the gyros was blamed, of either."""
