@@ -32,15 +32,17 @@ def lag_sums(
     mean, square, whole = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     around = np.empty(lags + 2 * longest)
     for j in range(levels):
-        for h in range(around.size):
-            around[h] = once[j, (h - longest) % size]
+        around[:longest] = once[j, size - longest :]
+        around[longest:] = once[j, : lags + longest]
+        # Of views that begin at zero: what an index may be below zero for is not vectorized.
+        middle = around[longest:]
         for k in range(j, levels):
             m = averaging[k]
-            scale, own = 0.5 / m, counts[j, k]
+            before, after = around[longest - m :], around[longest + m :]
+            scale, own, constant = 0.5 / m, counts[j, k], zero[j, k]
             plain, squared, total = 0.0, 0.0, 0.0
             for h in range(lags):
-                at = longest + h
-                value = scale * (around[at] - 0.5 * (around[at + m] + around[at - m])) + zero[j, k]
+                value = scale * (middle[h] - 0.5 * (after[h] + before[h])) + constant
                 plain += own[h] * value
                 squared += own[h] * value * value
                 total += weights[h] * value * value
