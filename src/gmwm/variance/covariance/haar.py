@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -207,7 +208,7 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=2)  # the spectra of a search are rough in the same places; 2 MB each
-def _chosen(averaging: tuple[float, ...], panels: bytes) -> tuple[FloatArray, ...]:
+def _chosen(averaging: tuple[float, ...], panels: bytes) -> tuple[Any, ...]:
     """Frequencies, weights and gains of the nodes of some panels, and their `_excess`."""
     grid, starts = quadrature(averaging), _pairs(averaging).starts
     width = np.diff(starts, append=grid.frequency.size)
