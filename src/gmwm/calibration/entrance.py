@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.runs import PROCESSES, beside, shared, spare
+from gmwm._core.runs import PROCESSES, beside, one_blas_thread, shared, spare
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
@@ -39,6 +39,7 @@ from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.variance import MIN_SAMPLES
 
 
+@one_blas_thread()
 def calibrate(
     recording: Recording | Sequence[Recording] | Any,
     model: GivenModels = None,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.runs import one_blas_thread
 from gmwm._core.typing import Progress
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration.calibration import Calibration
@@ -40,6 +41,7 @@ _NOT_DONE = (
 )
 
 
+@one_blas_thread()
 def calibrate_stream(
     path: Any,
     model: GivenModels = None,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.notices import Notice, Severity, worst_first
-from gmwm._core.runs import shared
+from gmwm._core.runs import one_blas_thread, shared
 from gmwm._core.text import per_cent
 from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning
@@ -63,6 +63,7 @@ class _Examined:
     errors: npt.NDArray[np.float32] | None
 
 
+@one_blas_thread()
 def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     """Find what is wrong with a static recording, or needs a term of its own in the model.
 

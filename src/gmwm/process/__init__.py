@@ -33,6 +33,7 @@ from gmwm.process.spectral import (
     in_hertz as in_hertz,
     legendre as legendre,
     quadrature as quadrature,
+    resolved_share as resolved_share,
 )
 from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
 from gmwm.process.wavelet_gain import pair_weights as pair_weights, unit_legendre as unit_legendre

@@ -52,13 +52,11 @@ class Quadrature:
     frequency: (K,), nodes in cycles per sample, within (0, 1/2).
     weight: (K,), quadrature weights, in cycles per sample; their sum is 1/2.
     gain: (J, K), |H_m|^2 at the nodes, with unresolved lobes replaced by their mean.
-    resolved: (J, K), share of each gain that is resolved (1) rather than averaged over lobes (0).
     """
 
     frequency: FloatArray
     weight: FloatArray
     gain: FloatArray
-    resolved: FloatArray
 
     def sampled(self, psd: PSD, dt: float) -> FloatArray:
         """``psd`` at the nodes per unit of normalised frequency, in u^2, shape (K,)."""
@@ -175,38 +173,45 @@ def _nodes(m_max: float) -> tuple[FloatArray, FloatArray]:
     return (middle + half * x).ravel(), (half * w).ravel()
 
 
-def _gains(averaging: Sequence[float], frequency: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """`Quadrature.gain` and `Quadrature.resolved`."""
+def resolved_share(m: float, frequency: FloatArray) -> FloatArray:
+    """Share of a gain that is resolved (1) rather than averaged over lobes (0), at nodes (K,)."""
+    octave_low = np.ldexp(0.5, np.frexp(frequency)[1])
+    lobes = m * octave_low
+    last, end = np.searchsorted(lobes, (0.5 * _RESOLVED_LOBES, _RESOLVED_LOBES), side="right")
+    share = np.zeros(frequency.size)
+    share[:end] = 1.0
+    if end < frequency.size:  # the last octave fades out, unless nothing follows
+        share[last:end] = _smooth_cut(frequency[last:end] / octave_low[last:end] - 1.0)
+    return share
+
+
+def _gains(averaging: Sequence[float], frequency: FloatArray) -> FloatArray:
+    """`Quadrature.gain`."""
     gain = np.empty((len(averaging), frequency.size))
-    resolved = np.zeros_like(gain)
     square = np.sin(np.pi * frequency) ** 2
-    octave_low = 2.0 ** np.floor(np.log2(frequency))
     for row, m in enumerate(averaging):
         gain[row] = MEAN_SIN4 / (m * m * square)
-        lobes = m * octave_low
-        last, end = np.searchsorted(lobes, (0.5 * _RESOLVED_LOBES, _RESOLVED_LOBES), side="right")
-        share, part = resolved[row, :end], frequency[:end]
-        share[:] = 1.0
-        if end < frequency.size:  # the last octave fades out, unless nothing follows
-            share[last:] = _smooth_cut(part[last:] / octave_low[last:end] - 1.0)
+        share = resolved_share(m, frequency)
+        end = int(np.count_nonzero(share))  # the nodes rise, and the shares fall
+        share, part = share[:end], frequency[:end]
         gain[row, :end] = (1.0 - share) * gain[row, :end] + share * haar_gain(m, part)
-    return gain, resolved
+    return gain
 
 
 def node_weights(averaging: Sequence[float]) -> tuple[FloatArray, FloatArray]:
     """Nodes (K,) in cycles per sample, and the weights (J, K) of a spectrum there."""
     frequency, weight = _nodes(max(averaging))
-    return frequency, 2.0 * weight * _gains(averaging, frequency)[0]
+    return frequency, 2.0 * weight * _gains(averaging, frequency)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=8)  # 7 MB each
 def quadrature(averaging: tuple[float, ...]) -> Quadrature:
     """The quadrature for averaging times of ``averaging`` samples each."""
     frequency, weight = _nodes(max(averaging))
-    gain, resolved = _gains(averaging, frequency)
-    for array in (frequency, weight, gain, resolved):
+    gain = _gains(averaging, frequency)
+    for array in (frequency, weight, gain):
         array.flags.writeable = False
-    return Quadrature(frequency, weight, gain, resolved)
+    return Quadrature(frequency, weight, gain)
 
 
 _PANEL, _POINTS = 0.125, 12
@@ -282,7 +287,7 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
         frequency, weight = _nodes(max(averaging))
         panels = Panels.of(np.log(np.tan(np.pi * frequency)))
         parts = [
-            panels.gathered(2.0 * weight * _gains(averaging[i : i + TOGETHER], frequency)[0])
+            panels.gathered(2.0 * weight * _gains(averaging[i : i + TOGETHER], frequency))
             for i in range(0, len(averaging), TOGETHER)
         ]
         gathered = np.concatenate(parts)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 from gmwm._core import checks
 from gmwm._core.documents import Document
 from gmwm._core.frames import frame
+from gmwm._core.runs import one_blas_thread
 from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate
@@ -176,6 +177,7 @@ class Selection(Document, Printed):
         return "\n".join(lines)
 
 
+@one_blas_thread()
 def select(
     data: Data | Sequence[Data],
     dt: float | None = None,

@@ -22,6 +22,7 @@ from time import sleep
 from typing import Any, TypeVar
 
 from gmwm._core import checks
+from gmwm._core.runs.threads import one_blas_thread
 from gmwm.errors import InputError
 
 T = TypeVar("T")
@@ -217,7 +218,8 @@ def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]
 
 def _in_worker(work: Work[T, R], item: T, parent: int) -> tuple[T, R]:
     _end_with(parent)
-    return _with_item(work, item)
+    with one_blas_thread():
+        return _with_item(work, item)
 
 
 @cache

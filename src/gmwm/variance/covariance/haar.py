@@ -20,12 +20,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature
+from gmwm._core.typing import FloatArray, IntArray
+from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature, resolved_share
 from gmwm.variance.covariance.haar_kernels import lag_sums
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
 
@@ -128,42 +129,44 @@ def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
     return ratio
 
 
-@lru_cache(maxsize=4)
-def _excess(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows, columns and weights of what replaced lobes take from products of gains.
+def _excess(
+    averaging: tuple[float, ...], frequency: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Rows, columns and weights at nodes of what replaced lobes take from products of gains.
 
     Where lobes were replaced by their mean, the mean of a product of two gains is not the
     product of the means if the averaging times are equal or differ by a factor of two.
     """
-    grid = quadrature(averaging)
     m = np.array(averaging)
     rows, columns, weights = [], [], []
+    resolved = [resolved_share(each, frequency) for each in averaging]
     for step, excess in _MEAN_PRODUCT_EXCESS.items():
         for j in range(m.size - step):
-            averaged = 1.0 - grid.resolved[j] * grid.resolved[j + step]
+            averaged = 1.0 - resolved[j] * resolved[j + step]
             if np.any(averaged > 0.0):
                 rows.append(j)
                 columns.append(j + step)
                 scale = excess / (m[j] * m[j + step]) ** 2
-                weights.append(scale * averaged / np.sin(np.pi * grid.frequency) ** 4)
-    return np.array(rows, dtype=int), np.array(columns, dtype=int), np.array(weights)
+                weights.append(scale * averaged / np.sin(np.pi * frequency) ** 4)
+    found = np.array(weights).reshape(-1, frequency.size)
+    return np.array(rows, dtype=int), np.array(columns, dtype=int), found
 
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
     """Weights of the integrals of products of two gains against the square of a spectrum.
 
-    panels: Of the frequencies.
+    starts: (P,), first node of each panel.
     frequency: (P * 12,), points of the panels, cycles per sample.
     weight: (pairs, P, 12).
     first, second: (pairs,), levels.
     """
 
-    panels: Panels
+    starts: IntArray
     frequency: FloatArray
     weight: FloatArray
-    first: npt.NDArray[np.intp]
-    second: npt.NDArray[np.intp]
+    first: IntArray
+    second: IntArray
 
 
 @lru_cache(maxsize=4)
@@ -175,14 +178,13 @@ def _pairs(averaging: tuple[float, ...]) -> _Pairs:
     weight = np.concatenate(
         [panels.gathered(own * weighted[j:]) for j, own in enumerate(grid.gain)]
     )
-    rows, columns, excess = _excess(averaging)
-    if rows.size:
-        place = np.zeros((len(averaging), len(averaging)), dtype=int)
-        place[first, second] = np.arange(first.size)
-        weight[place[rows, columns]] += panels.gathered(grid.weight * excess)
+    rows, columns, excess = _excess(averaging, grid.frequency)
+    place = np.zeros((len(averaging), len(averaging)), dtype=int)
+    place[first, second] = np.arange(first.size)
+    weight[place[rows, columns]] += panels.gathered(grid.weight * excess)
     frequency = np.arctan(np.exp(panels.log_tangent.ravel())) / np.pi
     frequency.flags.writeable = False  # what spectra make of them is kept
-    return _Pairs(panels, frequency, weight, first, second)
+    return _Pairs(panels.starts, frequency, weight, first, second)
 
 
 def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
@@ -194,8 +196,8 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
     averaging = tuple(m.tolist())
     pairs = _pairs(averaging)
     square = (evaluated(psd, in_hertz(pairs.frequency, dt), dt) / dt) ** 2
-    square = square.reshape(pairs.panels.log_tangent.shape)
-    smooth = pairs.panels.are_smooth(square)
+    square = square.reshape(pairs.weight.shape[1:])
+    smooth = Panels.are_smooth(square)
     square[~smooth] = 0.0
     integral = np.empty((m.size, m.size))
     values = pairs.weight.reshape(pairs.first.size, -1) @ square.ravel()
@@ -206,34 +208,28 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=2)  # the spectra of a search are rough in the same places; 2 MB each
-def _chosen(
-    averaging: tuple[float, ...], panels: bytes
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Frequencies, weights and gains of the nodes of some panels, and the weights of `_excess`."""
-    grid, starts = quadrature(averaging), _pairs(averaging).panels.starts
+def _chosen(averaging: tuple[float, ...], panels: bytes) -> tuple[Any, ...]:
+    """Frequencies, weights and gains of the nodes of some panels, and their `_excess`."""
+    grid, starts = quadrature(averaging), _pairs(averaging).starts
     width = np.diff(starts, append=grid.frequency.size)
     nodes = np.flatnonzero(np.repeat(np.frombuffer(panels, dtype=bool), width))
-    _, _, excess = _excess(averaging)
-    weights = excess[:, nodes] if excess.size else excess
     frequency = grid.frequency[nodes]
     frequency.flags.writeable = False
-    return frequency, grid.weight[nodes], grid.gain[:, nodes], weights
+    return frequency, grid.weight[nodes], grid.gain[:, nodes], *_excess(averaging, frequency)
 
 
 def _node_by_node(
     psd: PSD, dt: float, averaging: tuple[float, ...], chosen: npt.NDArray[np.bool_]
 ) -> FloatArray:
     """A quarter of the integrals over some panels, from all of their nodes."""
-    frequency, weight, gain, excess = _chosen(averaging, chosen.tobytes())
+    frequency, weight, gain, rows, columns, excess = _chosen(averaging, chosen.tobytes())
     density = evaluated(psd, in_hertz(frequency, dt), dt) / dt
     scaled = gain * (np.sqrt(weight) * density)
     integral = scaled @ scaled.T
-    rows, columns, _ = _excess(averaging)
-    if rows.size:
-        correction = excess @ (weight * density**2)
-        integral[rows, columns] += correction
-        apart = rows != columns
-        integral[columns[apart], rows[apart]] += correction[apart]
+    correction = excess @ (weight * density**2)
+    integral[rows, columns] += correction
+    apart = rows != columns
+    integral[columns[apart], rows[apart]] += correction[apart]
     return np.asarray(integral)
 
 
