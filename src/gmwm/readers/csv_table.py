@@ -26,7 +26,7 @@ from gmwm.readers.cells import BLANKS, FIELD_OF_DATE, has_zone, number, seconds_
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
 from gmwm.readers.table import label, usable
-from gmwm.readers.text_file import blocks, content_size
+from gmwm.readers.text_file import blocks, content_size, count_lines
 
 if TYPE_CHECKING:
     import pyarrow
@@ -200,7 +200,8 @@ def _parse_with_arrow(
     try:
         table = csv.read_csv(
             pyarrow.BufferReader(block),
-            read_options=csv.ReadOptions(column_names=names),
+            # Blocks of this size gain nothing by threads, and are the same every time without.
+            read_options=csv.ReadOptions(column_names=names, use_threads=False),
             parse_options=csv.ParseOptions(
                 delimiter=layout.delimiter,
                 quote_char=False,
@@ -223,7 +224,19 @@ def _parse_with_arrow(
         _since_1970(table.column(name)) if i in layout.dates else _floats(table.column(name))
         for i, name in zip(columns, wanted, strict=True)
     ]
-    return found if all(map(usable, found)) else None
+    complete = _is_complete(table.num_rows, block, blank_counts=layout.width == 1)
+    return found if complete and all(map(usable, found)) else None
+
+
+def _is_complete(rows: int, block: bytes, blank_counts: bool) -> bool:
+    """Whether there is a row for each line of the block.
+
+    blank_counts: Whether a blank line is a missing sample.
+    """
+    lines = count_lines(block) + (not block.endswith((b"\n", b"\r")))
+    if rows == lines or blank_counts:
+        return rows == lines
+    return rows == sum(1 for line in block.splitlines() if line.strip(b" \t"))
 
 
 def _arrow_type(has_zone: bool | None) -> pyarrow.DataType:

@@ -69,3 +69,8 @@ def test_the_wavelet_variance_is_the_integral_of_the_spectrum_however_sharp(orde
     tau = 2.0 ** np.arange(19)
     integral = spectral.haar_variance(process.psd, tau, 1.0)
     np.testing.assert_allclose(process.haar_variance(tau, 1.0), integral, rtol=1e-9)
+
+
+def test_a_moving_average_has_the_density_of_its_noise_at_frequency_zero():
+    process = AveragedNoise(N=0.3, window=0.057)
+    np.testing.assert_allclose(process.psd(np.array([0.0, 1e-9]), 0.01), 0.09, rtol=1e-12)

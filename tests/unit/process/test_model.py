@@ -106,3 +106,11 @@ def test_partial_autocorrelations_are_a_bijection():
     process = ARMA(3, 2)
     z = np.array([0.3, -1.2, 0.7, 2.0, -0.4])
     np.testing.assert_allclose(process.shape_to_free(process.shape_from_free(z)), z, rtol=1e-9)
+
+
+def test_a_process_times_a_number_is_that_many_terms():
+    assert 1 * gmwm.GaussMarkov() == gmwm.Model([gmwm.GaussMarkov()])
+    assert len((3 * gmwm.GaussMarkov()).terms) == 3
+    for times in (0, -1, True, 1.0):
+        with pytest.raises(gmwm.InputError, match="1 or more, whole"):
+            times * gmwm.GaussMarkov()

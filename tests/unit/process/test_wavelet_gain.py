@@ -131,6 +131,8 @@ def test_twice_integrated_noise_needs_two_vanishing_moments():
     assert np.all(np.isfinite(of(process, "coif1", 20)))
     with pytest.raises(gmwm.InputError, match=r"f\^-4 .* 1 vanishing moment of .*'db2'"):
         of(process, "db1")
+    with pytest.raises(gmwm.InputError, match=r"'db2'"):  # however small its unit makes it
+        of(gmwm.ARIMA([], 2, [], 1e-18), "db1")
 
 
 @pytest.mark.parametrize(
