@@ -4,27 +4,21 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import gmwm
 from gmwm._core.runs import one_blas_thread
-from gmwm._core.runs.threads import _libraries
 
 
 def numbers():
-    return [get() for get, _ in _libraries()]
+    return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
 
 
 @pytest.fixture(autouse=True)
 def of_two_threads():
     """As where OMP_NUM_THREADS is not set."""
-    if not _libraries():
-        pytest.skip("another BLAS than OpenBLAS")
-    before = numbers()
-    for _, set_number in _libraries():
-        set_number(2)
-    yield
-    for (_, set_number), number in zip(_libraries(), before, strict=True):
-        set_number(number)
+    with threadpool_limits(2, user_api="blas"):
+        yield
 
 
 def test_a_block_has_one_thread_however_it_ends():
