@@ -41,7 +41,7 @@ def report(run, file, tmp_path, monkeypatch):
 def test_what_is_found_and_taken_off(report):
     text, _ = report()
     assert "Usable in part : gyro_x not valid" in text
-    assert re.search(r"bad gyro_x A step of .*? --remove-departures", text)
+    assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")
     assert "Healthy, with care : departures from noise taken off (gyro_x)" in text
     assert re.search(r"note gyro_x A step of .*? Taken off", text)
