@@ -179,24 +179,27 @@ def _scores(
     slowest = np.where(widths > tuning.UNRESOLVED, widths / tuning.NARROW, 0).astype(np.int64)
     slowest = np.maximum(slowest, np.maximum(tuning.FIRST_BIN, low + widths // 2))
     table = np.stack([limits[width] for width in limits])
-    found: tuple[FloatArray, IntArray] = _largest(
-        total, low, freedom[start:stop], start, grid, widths, slowest, table
-    )
+    place = np.interp(freedom[start:stop], grid, np.arange(grid.size))
+    found: tuple[FloatArray, IntArray] = _largest(total, low, start, place, widths, slowest, table)
     return found
 
 
 @compiled()
 def _largest(
-    total: FloatArray, low: int, freedom: FloatArray, start: int, grid: FloatArray,
+    total: FloatArray, low: int, start: int, place: FloatArray,
     widths: IntArray, slowest: IntArray, table: FloatArray,
 ) -> tuple[FloatArray, IntArray]:  # fmt: skip
-    """Hot loop of `_scores`: from sums of ratios; by width, the first bin and the limits."""
-    score, best = np.zeros(freedom.size), np.ones(freedom.size, dtype=np.int64)
-    for i in range(freedom.size):
+    """Hot loop of `_scores`.
+
+    total: Sums of ratios from bin ``low`` on.
+    place: Of bins from ``start`` on, where they are between the columns of ``table``.
+    widths, slowest, table: By width, the first bin and the limits.
+    """
+    score, best = np.zeros(place.size), np.ones(place.size, dtype=np.int64)
+    for i in range(place.size):
         k = start + i
-        cell = min(max(np.searchsorted(grid, freedom[i], side="right") - 1, 0), grid.size - 2)
-        part = (freedom[i] - grid[cell]) / (grid[cell + 1] - grid[cell])
-        part = min(max(part, 0.0), 1.0)
+        cell = min(int(place[i]), table.shape[1] - 2)
+        part = place[i] - cell
         for w in range(widths.size):
             begin = k - widths[w] // 2 - low
             if k < slowest[w] or begin + widths[w] >= total.size:
