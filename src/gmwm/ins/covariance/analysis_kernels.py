@@ -90,10 +90,10 @@ def run_both(
     mid_matrix, mid_v, mid_lla: True attitude, velocity and position in the middle of each step.
     end_matrix, end_v, end_rate: Attitude, velocity and angular rate (body axes, rad/s) at each
         epoch.
-    P, axis, ..., coloured: Of the filter, as in `gmwm.ins.filter.filter_kernels.run`.
+    P, axis, ..., coloured: Of the filter, as in `gmwm.ins.filter.filter_arrays`.
     J, j_axis, ..., j_coloured: Of the joint vector; ``j_coloured`` are the places of the true
         coloured noise.
-    event_epoch, ..., out_before: As in `gmwm.ins.filter.filter_kernels.run`.
+    event_epoch, ..., out_before: As in `gmwm.ins.filter.filter_arrays`.
     out_P: (K, 9 + m, 9 + m), out_J : (K, N, N), results.
     """
     n, size, m = P.shape[0], J.shape[0], axis.size

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Events
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
+from gmwm.ins.filter.filter_arrays import Kept, Measured, Sampled, Sensors, State
 from gmwm.ins.filter.filter_kernels import PAUSED, run
 from gmwm.ins.filter.measurement_kernels import IS_POSITION, KINDS
 from gmwm.ins.filter.solution import FilterInnovations, Solution
@@ -141,50 +141,55 @@ class Filter:
         Raises InputError if it starts closer than 1 deg to a pole.
         """
         check_latitudes(initial.lla[None, :], "initial")
-        table, m, kept = self.states, self.states.m, outputs.epoch.size
-        C = matrix_from_rpy(initial.rpy)
-        v, lla, x = initial.velocity.copy(), initial.lla.copy(), table.mean.copy()
-        P = self.covariance(initial, initial_sd)
-        nav, matrices, nav_P = np.zeros((kept, 6)), np.zeros((kept, 3, 3)), np.zeros((kept, 9, 9))
-        sensor, sensor_P = np.zeros((kept, 6)), np.zeros((kept, 6, 6))
-        innovation, sd = np.full((2, events.epoch.size, 3), np.nan)
-        used = np.ones(events.epoch.size, dtype=np.bool_)
+        table, m = self.states, self.states.m
+        P, x = self.covariance(initial, initial_sd), table.mean.copy()
+        state = State(
+            matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy(), P, x
+        )
         axis = table.axis[table.axis != NO_AXIS]
-        first = np.searchsorted(axis, np.arange(7)).astype(np.int64)
-        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
-        ready = partial(
-            run, imu.rotation, imu.velocity, imu.dt, self.stride, C, v, lla, P, x,
-            first, table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
-            table.noise, table.noise_off, table.cross, table.integral, self.coloured,
-            events.epoch, events.kind, events.offset, events.value, events.sd, events.gate,
-            self.lever_arm, self.second_order,
-            outputs.epoch, outputs.before,
-            nav, matrices, nav_P, sensor, sensor_P, innovation, sd, used,
+        sensors = Sensors(
+            np.searchsorted(axis, np.arange(7)).astype(np.int64),
+            bool(np.any(table.partner != np.arange(m))),
+            table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
+            table.noise, table.noise_off, table.cross, table.integral,
         )  # fmt: skip
+        shape = events.value.shape
+        measured = Measured(
+            events.epoch, events.kind, events.offset, events.value, events.sd, events.gate,
+            self.coloured, self.lever_arm, self.second_order,
+            np.full(shape, np.nan), np.full(shape, np.nan), np.ones(shape[0], dtype=np.bool_),
+        )  # fmt: skip
+        count = outputs.epoch.size
+        kept = Kept(
+            outputs.epoch, outputs.before, np.zeros((count, 6)), np.zeros((count, 3, 3)),
+            np.zeros((count, 9, 9)), np.zeros((count, 6)), np.zeros((count, 6, 6)),
+        )  # fmt: skip
+        sampled = Sampled(imu.rotation, imu.velocity, imu.dt, self.stride)
+        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
         stopped = PAUSED
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
-                stopped = ready(part.stop, place, carry)
+                stopped = run(sampled, state, sensors, measured, kept, part.stop, place, carry)
             release(imu.rotation)
             release(imu.velocity)
-        done = kept if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
+        done = count if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
         for part in windows(done):
-            nav_P[part] = unmodified(nav_P[part], nav[part, 3:])
+            kept.P[part] = unmodified(kept.P[part], kept.nav[part, 3:])
         return Solution(
             time=outputs.time(imu.dt)[:done],
             before=outputs.before[:done] == 1,
-            lla=nav[:done, :3],
-            velocity=nav[:done, 3:],
-            matrix=matrices[:done],
-            covariance=nav_P[:done],
-            sensor_errors=sensor[:done],
-            sensor_covariance=sensor_P[:done],
+            lla=kept.nav[:done, :3],
+            velocity=kept.nav[:done, 3:],
+            matrix=kept.C[:done],
+            covariance=kept.P[:done],
+            sensor_errors=kept.sensor[:done],
+            sensor_covariance=kept.sensor_covariance[:done],
             innovations=FilterInnovations(
                 time=events.epoch * imu.dt + events.offset,
                 kind=events.kind,
-                value=innovation,
-                sd=sd,
-                used=used,
+                value=measured.innovation,
+                sd=measured.innovation_sd,
+                used=measured.used,
             ),
             state_names=table.names,
             states=x,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
@@ -16,6 +15,15 @@ from gmwm.ins.filter.covariance_kernels import (
     propagate,
     tilt_squared,
     transition,
+)
+from gmwm.ins.filter.filter_arrays import (
+    Kept,
+    Measured,
+    Room,
+    Sampled,
+    Sensors,
+    State,
+    room_for,
 )
 from gmwm.ins.filter.measurement_kernels import (
     IS_HEIGHT,
@@ -131,193 +139,70 @@ def axis_sums(
 
 @compiled()
 def run(
-    rotation: FloatArray, increment: FloatArray, dt: float, stride: int,
-    C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
-    first: IntArray, axis: IntArray, output: FloatArray, partner: IntArray,
-    phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
-    noise_off: FloatArray, cross: FloatArray, integral: FloatArray, coloured: IntArray,
-    event_epoch: IntArray, event_kind: IntArray, event_offset: FloatArray,
-    event_value: FloatArray, event_sd: FloatArray, event_gate: FloatArray, lever: FloatArray,
-    second_order: bool, out_epoch: IntArray, out_before: IntArray,
-    out_nav: FloatArray, out_C: FloatArray, out_P: FloatArray, out_sensor: FloatArray,
-    out_sensor_P: FloatArray, innovation: FloatArray, innovation_sd: FloatArray,
-    used: npt.NDArray[np.bool_], last: int, place: IntArray, carry: FloatArray,
+    imu: Sampled, state: State, sensors: Sensors, measured: Measured, kept: Kept,
+    last: int, place: IntArray, carry: FloatArray,
 ) -> int:  # fmt: skip
     """Filter a record; returns the epoch at which it diverged, -1 at its end, or `PAUSED`.
 
-    rotation, increment: (N, 3), IMU increments, rad and m/s.
-    dt: s.
-    stride: Samples per step of the covariance.
-    C, v, lla, P, x: Attitude, velocity, position, covariance (9 + m, 9 + m) and sensor states (m,)
-        at the first epoch; those at the last one after the call.
-    first: (7,) of int, range of the states of each sensor.
-    axis, ..., integral: As in `gmwm.ins.filter.states.SensorStates`.
-    coloured: (4,) of int, state of the coloured noise of the north, east and down position and of
-        the barometric height; -1 for none.
-    event_epoch, event_kind: (E,) of int, measurements in order of time.
-    event_offset: (E,), times of the measurements less those of their epochs, s.
-    event_value, event_sd: (E, 3).
-    event_gate: (E,), normalised innovation squared beyond which a measurement is rejected.
-    lever: (3,).
-    second_order: Whether products of errors are allowed for; see
-        `gmwm.ins.filter.covariance_kernels.tilt_squared` and ``excess``.
-    out_epoch: (K,) of int, epochs to be kept, in order of time.
-    out_before: (K,) of int, 1 for the state before the measurements of the epoch, 0 for that after
-        them; at one epoch those before come first.
-    out_nav: out_sensor_P : (K, 6, 6), innovation, innovation_sd : (E, 3) ndarray Results; position
-        and velocity, attitude, covariance, sums of sensor states and their covariance; innovations
-        of the components, each given those before it, with their standard deviation.
-    used: (E,) of bool, set to False where a measurement was rejected.
+    state: At the first epoch; that at the last one after the call.
     last: Epoch from which on the filter pauses, to go on with the next call.
-    place: (4 + kinds,) of int, carry : (7,) ndarray, where it is and what it needs of the samples
-        before: zeros at first.
+    place, carry: (4 + kinds,) of int and (7,), where it is and what it needs of the samples before:
+        zeros at first.
     """
-    n, m = P.shape[0], x.size
-    n_samples, n_events, n_out = rotation.shape[0], event_epoch.size, out_epoch.size
-    paired = False
-    for i in range(m):
-        paired = paired or partner[i] != i
-    F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
-    S, T, U = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6))
-    row, K, h, error = np.zeros(n), np.zeros(n), np.zeros(9), np.zeros(6)
-    estimated, held = np.zeros(n), np.zeros(m)
-    P_held, estimated_held = np.zeros((n, n)), np.zeros(n)
-    rejected = place[4:]
-    C_mid, v_mid, lla_mid = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    C_at, v_at, lla_at = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    rate, rate_at, force_at, h_at = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(9)
-    ax, ay, az, fx, fy, fz = carry[0], carry[1], carry[2], carry[3], carry[4], carry[5]
-    gathered = carry[6]
+    C, v, lla, P, x = state
+    # Tuples are for what is rare: numba counts references to each of their arrays when they pass.
+    rotation, velocity, dt, _ = imu
+    first, paired, axis, output, partner, phi, phi_off, gain, noise, noise_off, cross, integral = (
+        sensors
+    )
+    n = rotation.shape[0]
+    room = room_for(P.shape[0])
+    F, A, B, S, T, U, row = room.F, room.A, room.B, room.S, room.T, room.U, room.row
+    C_mid, v_mid, lla_mid = room.C_mid, room.v_mid, room.lla_mid
+    held, error, decay, decay_off = room.x_held, room.error, phi[1], phi_off[1]
+    rate, estimated = np.zeros(3), np.zeros(P.shape[0])
     epoch, event, out, steps = place[0], place[1], place[2], place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
-        while out < n_out and out_epoch[out] == epoch and out_before[out] == 1:
-            _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
-                  out_sensor_P)  # fmt: skip
+        while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
+            _keep(out, state, sensors, kept)
             out += 1
-        measured = of_gnss = False
-        attitude = P[6, 6] + P[7, 7] + P[8, 8] if second_order else 0.0
-        if event < n_events and event_epoch[event] == epoch:
-            measured = True
-            if epoch > 0:
-                rate[0], rate[1], rate[2] = ax / dt, ay / dt, az / dt
-            elif n_samples > 0:
-                for i in range(3):
-                    rate[i] = rotation[0, i] / dt
-        while event < n_events and event_epoch[event] == epoch:
-            kind = event_kind[event]
-            offset = event_offset[event]
-            moved = offset != 0.0 and n_samples > 0
-            if moved:
-                i = min(max(epoch if offset > 0.0 else epoch - 1, 0), n_samples - 1)
-                for a in range(3):
-                    rate_at[a], force_at[a] = rotation[i, a] / dt, increment[i, a] / dt
-                for k in range(m):
-                    if 0 <= axis[k] < 3:
-                        rate_at[axis[k]] -= output[k] * x[k]
-                    elif axis[k] >= 3:
-                        force_at[axis[k] - 3] -= output[k] * x[k]
-                propagated(C, v, lla, rate_at, force_at, offset, C_at, v_at, lla_at, F, A, B)
-            gated = event_gate[event] < np.inf and (
-                kind == IS_STANDSTILL or rejected[kind] < _PATIENCE
-            )
-            if gated:
-                for j in range(n):
-                    estimated_held[j] = estimated[j]
-                    for k in range(n):
-                        P_held[j, k] = P[j, k]
-            squares = 0.0
-            components = 1 if kind == IS_HEIGHT else 3
-            for component in range(components):
-                sd = event_sd[event, component]
-                if not sd > 0.0:
-                    continue
-                if moved:
-                    measurement_row(kind, component, C_at, v_at, rate_at, lever, h_at)
-                    z = residual(
-                        kind, component, event_value[event], C_at, v_at, lla_at, rate_at, lever
-                    )
-                    for j in range(9):
-                        h[j] = 0.0
-                        for k in range(9):
-                            h[j] += h_at[k] * A[k, j]
-                else:
-                    measurement_row(kind, component, C, v, rate, lever, h)
-                    z = residual(kind, component, event_value[event], C, v, lla, rate, lever)
-                state = noise_state(kind, component, coloured)
-                if state >= 0:
-                    z += x[state]
-                    state += 9
-                variance = sd * sd + excess(P, h, attitude)
-                found, variance = measurement_update(P, h, state, variance, z, estimated, K)
-                innovation[event, component] = found
-                innovation_sd[event, component] = math.sqrt(variance)
-                squares += found * found / variance
-            if squares <= event_gate[event]:
-                # As many must agree in a row before an open gate is closed again.
-                rejected[kind] = rejected[kind] - 1 if rejected[kind] > _PATIENCE else 0
-            elif not gated:
-                rejected[kind] = 2 * _PATIENCE
-            else:
-                used[event] = False
-                rejected[kind] += 1
-                if rejected[kind] == _PATIENCE:
-                    rejected[kind] = 2 * _PATIENCE
-                for j in range(n):
-                    estimated[j] = estimated_held[j]
-                    for k in range(n):
-                        P[j, k] = P_held[j, k]
-            if used[event] and kind in (IS_POSITION, IS_VELOCITY):
-                of_gnss = True
-            event += 1
-        if measured:
-            for i in range(m):
+        if event < measured.epoch.size and measured.epoch[event] == epoch:
+            attitude = P[6, 6] + P[7, 7] + P[8, 8] if measured.second_order else 0.0
+            for i in range(3):
+                rate[i] = carry[i] / dt if epoch > 0 or n == 0 else imu.rotation[0, i] / dt
+            while event < measured.epoch.size and measured.epoch[event] == epoch:
+                if _measure(
+                    event, imu, state, sensors, measured, attitude, rate, estimated, place[4:], room
+                ):
+                    carry[6] = 0.0
+                event += 1
+            for i in range(x.size):
                 x[i] += estimated[9 + i]
                 estimated[9 + i] = 0.0
             correct(C, v, lla, estimated)
-            if of_gnss:
-                gathered = 0.0
-        while out < n_out and out_epoch[out] == epoch:
-            _keep(out, C, v, lla, P, x, first, output, out_nav, out_C, out_P, out_sensor,
-                  out_sensor_P)  # fmt: skip
+        while out < kept.epoch.size and kept.epoch[out] == epoch:
+            _keep(out, state, sensors, kept)
             out += 1
-        if epoch >= n_samples:
+        if epoch >= n:
             return -1
         # One step of the covariance, cut short at the next epoch that something is asked for.
-        stop = min(epoch + stride, n_samples)
-        if event < n_events:
-            stop = min(stop, event_epoch[event])
-        if out < n_out:
-            stop = min(stop, out_epoch[out])
+        stop = min(epoch + imu.stride, n)
+        if event < measured.epoch.size:
+            stop = min(stop, measured.epoch[event])
+        if out < kept.epoch.size:
+            stop = min(stop, kept.epoch[out])
         samples = stop - epoch
-        for j in range(samples):
-            if j == samples // 2:
-                for a in range(3):
-                    v_mid[a], lla_mid[a] = v[a], lla[a]
-                    for b in range(3):
-                        C_mid[a, b] = C[a, b]
-            sample_error(first, output, phi[1], phi_off[1], partner, paired, x, held, error)
-            i = epoch + j
-            bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
-            ax, ay = rotation[i, 0] - error[0] * dt, rotation[i, 1] - error[1] * dt
-            az, fx = rotation[i, 2] - error[2] * dt, increment[i, 0] - error[3] * dt
-            fy, fz = increment[i, 1] - error[4] * dt, increment[i, 2] - error[5] * dt
-            if i == 0:
-                bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
-            step(C, v, lla, ax, ay, az, fx, fy, fz, bx, by, bz, gx, gy, gz, dt)
-            if 2 * j + 1 == samples:
-                # The middle of the step lies within this sample.
-                for a in range(3):
-                    v_mid[a], lla_mid[a] = 0.5 * (v_mid[a] + v[a]), 0.5 * (lla_mid[a] + lla[a])
-                    for b in range(3):
-                        C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
-        epoch = stop
+        _advance(epoch, stop, rotation, velocity, dt, C, v, lla, x, first, output, decay, decay_off,
+                 partner, paired, held, error, C_mid, v_mid, lla_mid, carry)  # fmt: skip
         transition(v_mid, lla_mid, C_mid, samples * dt, F, A, B)
         propagate(P, A, B, axis, partner, phi[samples], phi_off[samples], gain[samples],
-              noise[samples], noise_off[samples], cross[samples], integral[samples],
-              S, T, U, row)  # fmt: skip
-        if second_order:
-            gathered = tilt_squared(P, gravity(lla[0], lla[2]), samples * dt, gathered)
+                  noise[samples], noise_off[samples], cross[samples], integral[samples],
+                  S, T, U, row)  # fmt: skip
+        if measured.second_order:
+            g = gravity(lla[0], lla[2])
+            carry[6] = tilt_squared(P, g, samples * dt, carry[6])
+        epoch = stop
         steps += 1
         if steps % _CLEAN_EVERY == 0:
             orthonormalise(C)
@@ -327,24 +212,158 @@ def run(
             and abs(lla[2]) < 1e7
         ):
             return epoch
-        if last <= epoch < n_samples:
+        if last <= epoch < n:
             place[0], place[1], place[2], place[3] = epoch, event, out, steps
-            carry[0], carry[1], carry[2], carry[3], carry[4], carry[5] = ax, ay, az, fx, fy, fz
-            carry[6] = gathered
             return PAUSED
 
 
 @compiled()
-def _keep(
-    k: int, C: FloatArray, v: FloatArray, lla: FloatArray, P: FloatArray, x: FloatArray,
-    first: IntArray, output: FloatArray, out_nav: FloatArray, out_C: FloatArray,
-    out_P: FloatArray, out_sensor: FloatArray, out_sensor_P: FloatArray,
+def _measure(
+    event: int, imu: Sampled, state: State, sensors: Sensors, measured: Measured, attitude: float,
+    rate: FloatArray, estimated: FloatArray, rejected: IntArray, room: Room,
+) -> bool:  # fmt: skip
+    """Update the covariance and the estimated errors by a measurement, unless it is far off.
+
+    attitude: Variance of the attitude, rad^2; 0 where products of errors are not allowed for.
+    rate: (3,), at the epoch, rad/s.
+    estimated: (9 + m,), errors estimated at the epoch so far.
+    rejected: (kinds,), measurements that were rejected in a row.
+    Returns: whether a position or velocity was used.
+    """
+    C, v, lla, P, x = state
+    h, h_at = room.h, room.h_at
+    kind, gate = measured.kind[event], measured.gate[event]
+    moved = measured.offset[event] != 0.0 and imu.rotation.shape[0] > 0
+    if moved:
+        _look(event, imu, state, sensors, measured, room)
+        C, v, lla, rate = room.C_at, room.v_at, room.lla_at, room.rate_at
+    gated = gate < np.inf and (kind == IS_STANDSTILL or rejected[kind] < _PATIENCE)
+    if gated:
+        _copy(P, estimated, room.P_held, room.estimated_held)
+    squares = 0.0
+    for component in range(1 if kind == IS_HEIGHT else 3):
+        sd = measured.sd[event, component]
+        if not sd > 0.0:
+            continue
+        measurement_row(kind, component, C, v, rate, measured.lever, h)
+        z = residual(kind, component, measured.value[event], C, v, lla, rate, measured.lever)
+        if moved:
+            for j in range(9):
+                h_at[j] = h[j]
+            for j in range(9):
+                h[j] = 0.0
+                for k in range(9):
+                    h[j] += h_at[k] * room.A[k, j]
+        own = noise_state(kind, component, measured.coloured)
+        if own >= 0:
+            z += x[own]
+            own += 9
+        variance = sd * sd + excess(P, h, attitude)
+        found, variance = measurement_update(P, h, own, variance, z, estimated, room.gain)
+        measured.innovation[event, component] = found
+        measured.innovation_sd[event, component] = math.sqrt(variance)
+        squares += found * found / variance
+    if _is_accepted(squares, gate, gated, kind, rejected):
+        return kind in (IS_POSITION, IS_VELOCITY)
+    measured.used[event] = False
+    _copy(room.P_held, room.estimated_held, P, estimated)
+    return False
+
+
+@compiled()
+def _look(
+    event: int, imu: Sampled, state: State, sensors: Sensors, measured: Measured, room: Room
+) -> None:
+    """Solution at the time of a measurement between two epochs, and the transition to there."""
+    x, epoch, offset = state.x, measured.epoch[event], measured.offset[event]
+    rate, force = room.rate_at, room.force_at
+    i = min(max(epoch if offset > 0.0 else epoch - 1, 0), imu.rotation.shape[0] - 1)
+    for a in range(3):
+        rate[a], force[a] = imu.rotation[i, a] / imu.dt, imu.velocity[i, a] / imu.dt
+    for k in range(x.size):
+        a = sensors.axis[k]
+        if 0 <= a < 3:
+            rate[a] -= sensors.output[k] * x[k]
+        elif a >= 3:
+            force[a - 3] -= sensors.output[k] * x[k]
+    propagated(
+        state.C, state.v, state.lla, rate, force, offset, room.C_at, room.v_at, room.lla_at,
+        room.F, room.A, room.B,
+    )  # fmt: skip
+
+
+@compiled()
+def _copy(P: FloatArray, x: FloatArray, P_to: FloatArray, x_to: FloatArray) -> None:
+    for j in range(x.size):
+        x_to[j] = x[j]
+        for k in range(x.size):
+            P_to[j, k] = P[j, k]
+
+
+@compiled()
+def _is_accepted(squares: float, gate: float, gated: bool, kind: int, rejected: IntArray) -> bool:
+    """Whether a measurement is used; counts those of its kind that were rejected in a row."""
+    if squares <= gate:
+        # As many must agree in a row before an open gate is closed again.
+        rejected[kind] = rejected[kind] - 1 if rejected[kind] > _PATIENCE else 0
+        return True
+    if not gated:
+        rejected[kind] = 2 * _PATIENCE
+        return True
+    rejected[kind] += 1
+    if rejected[kind] == _PATIENCE:
+        rejected[kind] = 2 * _PATIENCE
+    return False
+
+
+@compiled()
+def _advance(
+    epoch: int, stop: int, rotation: FloatArray, velocity: FloatArray, dt: float,
+    C: FloatArray, v: FloatArray, lla: FloatArray, x: FloatArray,
+    first: IntArray, output: FloatArray, decay: FloatArray, decay_off: FloatArray,
+    partner: IntArray, paired: bool, held: FloatArray, error: FloatArray,
+    C_mid: FloatArray, v_mid: FloatArray, lla_mid: FloatArray, carry: FloatArray,
 ) -> None:  # fmt: skip
+    """Mechanize the samples of a step of the covariance; the solution in its middle.
+
+    carry: (6,) at least, increments of the sample before, corrected; then those of the last one.
+    """
+    samples = stop - epoch
+    ax, ay, az, fx, fy, fz = carry[0], carry[1], carry[2], carry[3], carry[4], carry[5]
+    for j in range(samples):
+        if j == samples // 2:
+            for a in range(3):
+                v_mid[a], lla_mid[a] = v[a], lla[a]
+                for b in range(3):
+                    C_mid[a, b] = C[a, b]
+        sample_error(first, output, decay, decay_off, partner, paired, x, held, error)
+        i = epoch + j
+        bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
+        ax, ay = rotation[i, 0] - error[0] * dt, rotation[i, 1] - error[1] * dt
+        az, fx = rotation[i, 2] - error[2] * dt, velocity[i, 0] - error[3] * dt
+        fy, fz = velocity[i, 1] - error[4] * dt, velocity[i, 2] - error[5] * dt
+        if i == 0:
+            bx, by, bz, gx, gy, gz = ax, ay, az, fx, fy, fz
+        step(C, v, lla, ax, ay, az, fx, fy, fz, bx, by, bz, gx, gy, gz, dt)
+        if 2 * j + 1 == samples:
+            # The middle of the step lies within this sample.
+            for a in range(3):
+                v_mid[a] = 0.5 * (v_mid[a] + v[a])
+                lla_mid[a] = 0.5 * (lla_mid[a] + lla[a])
+                for b in range(3):
+                    C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
+    carry[0], carry[1], carry[2], carry[3], carry[4], carry[5] = ax, ay, az, fx, fy, fz
+
+
+@compiled()
+def _keep(k: int, state: State, sensors: Sensors, kept: Kept) -> None:
     for i in range(3):
-        out_nav[k, i], out_nav[k, 3 + i] = lla[i], v[i]
+        kept.nav[k, i], kept.nav[k, 3 + i] = state.lla[i], state.v[i]
         for j in range(3):
-            out_C[k, i, j] = C[i, j]
+            kept.C[k, i, j] = state.C[i, j]
     for i in range(9):
         for j in range(9):
-            out_P[k, i, j] = P[i, j]
-    axis_sums(P, first, output, out_sensor[k], x, out_sensor_P[k])
+            kept.P[k, i, j] = state.P[i, j]
+    axis_sums(
+        state.P, sensors.first, sensors.output, kept.sensor[k], state.x, kept.sensor_covariance[k]
+    )
