@@ -146,7 +146,8 @@ def _unwrapped(stamps: FloatArray) -> FloatArray | None:
         back = np.flatnonzero(steps < 0.0)
         if not back.size:
             return None
-        usual = median(steps)
+        forwards = steps[steps > 0.0]  # in bursts most are none
+        usual = median(forwards) if forwards.size else 0.0
         for bits in (16, 32):
             forward = steps[back] + 2.0**bits
             if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):
