@@ -124,11 +124,6 @@ class Change:
     row: int
     rates: tuple[float, float]
 
-    @property
-    def ratio(self) -> float:
-        """The larger rate over the smaller one."""
-        return max(self.rates) / min(self.rates)
-
 
 def find_change(stamps: FloatArray) -> Change | None:
     """Find out whether some parts of a recording have another sampling rate than others.
