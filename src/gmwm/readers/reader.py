@@ -200,7 +200,13 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
-    at_rest = rest_notices(recording, unit_of, given.units, isinstance(given.channels, Mapping))
+    at_rest = rest_notices(
+        recording,
+        unit_of,
+        given.units,
+        isinstance(given.channels, Mapping),
+        has_layout=isinstance(table, BinaryTable),
+    )
     recording = replace(
         recording,
         channels=(*recording.channels, *further),

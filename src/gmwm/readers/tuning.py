@@ -17,6 +17,11 @@ GRAVITY_SURE, GRAVITY_NOISE = 0.05, 0.03
 """The same where gravity stands in the columns of a gyro, and its noise: that of an accelerometer
 is below 20 mg, while a bias of 1 deg/s has noise of a tenth of it."""
 
+SCALE_AGREES, NO_GRAVITY, NOISE_OF_GRAVITY = 0.3, 1.0, 0.2
+"""The same of the usual length, where no unit explains it: biases of the cheapest are a quarter of
+gravity, ranges differ by two; m/s^2 below which, and part of it that is noise above which, a record
+may be without gravity."""
+
 NOISIEST_GYRO = 8.7e-3
 """rad/s/sqrt(Hz) (0.5 deg/s/sqrt(Hz)): twice that of gyros for 20,000 deg/s, ten times that of the
 cheapest usual ones."""
