@@ -158,6 +158,7 @@ def _gravity(
             f"{recording.source}: {text}",
             "accel-unit-missing",
             f'give the unit, units={{"accel": "{likely[0]}"}}',
+            {"unit": likely[0]},
         )
     values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
     off = _GRAVITY / force.size
