@@ -71,6 +71,10 @@ OF_QUARTILES, LEAST_REPEATS, TRANSITIONS = 2.44, 3, 0.1
 """Times the distance of the quartiles, 90 % of Gaussian samples lie in; how often a number comes at
 least that is no sample; and the part of these times that something leads to it or lies near."""
 
+MOST_SENSORS, IN_TURNS = 16, 0.1
+"""Of one file, and part of the rows at which their number changes: recordings one after another do
+so once."""
+
 SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
 """Samples that give the range of most, and by how many times the width of 90 % of them a number is
 away that is no sample: ten times as far as one Gaussian sample in 1e9. More than a tenth of all
