@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from gmwm.calibration import Calibration
 
 HINTS = {
-    "accel-unit-missing": "--accel-unit g",
+    "accel-unit-missing": "--accel-unit {unit}",
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "channels-swapped": "--channel accel_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
@@ -39,9 +39,12 @@ HINTS = {
 def with_hint(error: InputError) -> str:
     """The message of an error, its mend in the words of the command line."""
     hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
-    hint = hint.format(**({"rate": 100.0, "column": "by its unit"} | error.values))
+    usual = {"rate": 100.0, "column": "by its unit", "unit": "g"}
+    hint = hint.format(**(usual | error.values))
     if not hint:
         return str(error)
+    if error.code == "clock":  # to ignore the stamps is right only if nothing else is
+        return str(error).replace("give rate= and time=False", f"give e.g. {hint}")
     if error.mend:
         return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
     return f"{error} (on the command line: {hint})"

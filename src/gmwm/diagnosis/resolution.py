@@ -61,6 +61,8 @@ def is_coarse(values: FloatArray, step: float) -> bool:
 
     values: (n,), samples, none missing; their mean may wander, but little within a block.
     """
+    if not values.size:  # all of them belong to events
+        return False
     size = min(tuning.BLOCK_OF_LEVELS, values.size)
     blocks = values[: values.size // size * size].reshape(-1, size)
     places = (blocks - blocks[:, :1]) / step

@@ -36,6 +36,12 @@ _SENSOR_WORDS = {
 # These mean a sensor only where nothing stands before them.
 _SENSOR_LETTERS = {"g": "gyro", "w": "gyro", "a": "accel", "f": "accel"}
 
+NUMBERS_OF_SENSORS = frozenset(
+    {"id", "i", "inst", "instance"}
+    | {f"{what}{end}" for what in ("imu", "sensor", "device", "unit") for end in ("", "id", "_id")}
+)
+"""Names of columns that say which of several sensors a row is of."""
+
 # Columns about a sensor other than its samples.
 _OTHER_MEANINGS = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "covariance", "err", "error", "ref"}

@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._core.files import existing_file
 from gmwm._core.notices import Notice
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
@@ -39,7 +39,7 @@ from gmwm.readers.formats import (
     shares,
     with_temperature,
 )
-from gmwm.readers.names import meaning, stated_seconds
+from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
 from gmwm.readers.sentinels import without_sentinels
@@ -155,6 +155,8 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
     """The recording of a table, and when it begins; ``before`` are rows of parts before this."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
+    if not before:
+        _check_one_sensor(table, roles)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
@@ -200,7 +202,13 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
-    at_rest = rest_notices(recording, unit_of, given.units, isinstance(given.channels, Mapping))
+    at_rest = rest_notices(
+        recording,
+        unit_of,
+        given.units,
+        isinstance(given.channels, Mapping),
+        has_layout=isinstance(table, BinaryTable),
+    )
     recording = replace(
         recording,
         channels=(*recording.channels, *further),
@@ -208,6 +216,27 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
         jitter=timing.jitter if timing is not None else None,
     )
     return Part(recording, start, timing.jumps if timing is not None else None)
+
+
+def _check_one_sensor(table: Table, roles: Roles) -> None:
+    """Raise InputError if a column says that the rows are of several sensors in turns."""
+    for index, name in enumerate(table.names):
+        if index in roles.columns or bare(name).lower() not in NUMBERS_OF_SENSORS:
+            continue
+        segments = getattr(table, "segments", None)
+        try:
+            first = next(segments([index], tuning.FEWEST_OF_BLOCK)) if segments else None
+            numbers = known_of((first or table.load([index]))[index])
+        except InputError:  # of words
+            continue
+        several = np.unique(numbers).size
+        turns = np.count_nonzero(np.diff(numbers))
+        if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
+            raise InputError(
+                f"{table.source}, {column_of(table, index)}: rows of {several} sensors come in "
+                "turns: keep those of one",
+                "several-sensors",
+            )
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

@@ -17,6 +17,11 @@ GRAVITY_SURE, GRAVITY_NOISE = 0.05, 0.03
 """The same where gravity stands in the columns of a gyro, and its noise: that of an accelerometer
 is below 20 mg, while a bias of 1 deg/s has noise of a tenth of it."""
 
+SCALE_AGREES, NO_GRAVITY, NOISE_OF_GRAVITY = 0.3, 1.0, 0.2
+"""The same of the usual length, where no unit explains it: biases of the cheapest are a quarter of
+gravity, ranges differ by two; m/s^2 below which, and part of it that is noise above which, a record
+may be without gravity."""
+
 NOISIEST_GYRO = 8.7e-3
 """rad/s/sqrt(Hz) (0.5 deg/s/sqrt(Hz)): twice that of gyros for 20,000 deg/s, ten times that of the
 cheapest usual ones."""
@@ -65,6 +70,10 @@ STEPS_OF_HOUR, NEAR_HOUR, MOST_HOURS = 2.0, 0.25, 2
 OF_QUARTILES, LEAST_REPEATS, TRANSITIONS = 2.44, 3, 0.1
 """Times the distance of the quartiles, 90 % of Gaussian samples lie in; how often a number comes at
 least that is no sample; and the part of these times that something leads to it or lies near."""
+
+MOST_SENSORS, IN_TURNS = 16, 0.1
+"""Of one file, and part of the rows at which their number changes: recordings one after another do
+so once."""
 
 SAMPLED_FOR_RANGE, FAR_OUTSIDE, MOST_SENTINELS = 10_000, 20.0, 0.1
 """Samples that give the range of most, and by how many times the width of 90 % of them a number is
@@ -128,8 +137,10 @@ harm."""
 OFF_GRID = 0.25
 """Sampling intervals from the grid beyond which a jump is reported as off it."""
 
-FEWEST_IN_RHYTHM = 4
-"""Jumps from which a rhythm shows that stamps were rounded."""
+FEWEST_IN_RHYTHM, ALL_IN_RHYTHM = 4, 6
+"""Jumps from which a rhythm shows that stamps were rounded, and distances of jumps below which all
+are alike, above which half of them: of one of a hundred rows lost at random, 0.4 % of recordings
+have as many alike at most."""
 
 ROUNDS_OF_LINE, LINE_SETTLED = 20, 1e-9
 """Steps of the robust line through the stamps, at most, and the relative change that ends them."""

@@ -3,12 +3,14 @@
 import ast
 import re
 
+import numpy as np
 import pytest
 
 from gmwm._core.notices import Notice
 from gmwm.cli.hints import HINTS, with_hint, with_option
 from gmwm.cli.main import cli
 from gmwm.errors import InputError
+from gmwm.readers import read
 from places import REPOSITORY
 
 ROOT = REPOSITORY / "src" / "gmwm"
@@ -29,6 +31,28 @@ def test_a_mend_is_said_in_the_words_of_the_command_line():
     error = InputError("the rates differ", "rate-contradicted", "give time=False")
     assert with_hint(error) == f"the rates differ: {HINTS['rate-contradicted']}"
     assert with_hint(InputError("wrong", "unknown-code", "do this")) == "wrong: do this"
+
+
+def test_the_unit_that_is_advised_is_that_of_gravity(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = np.random.default_rng(1).normal(size=(100, 3)) * 1e-3 + [0.1, -0.2, 9.8]
+    np.savetxt(path, rows, delimiter=",", header="ax [g],ay [g],az [g]", comments="")
+    with pytest.raises(InputError, match="is gravity in m/s") as caught:
+        read(path, rate=100.0)
+    assert with_hint(caught.value).endswith("give e.g. --accel-unit m/s^2")
+
+
+def test_rows_in_no_order_are_sorted_before_their_stamps_are_ignored(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = np.column_stack([np.arange(200) / 100.0, np.random.default_rng(1).normal(size=200)])
+    rows = np.random.default_rng(2).permutation(rows)
+    np.savetxt(path, rows, delimiter=",", header="time_s,gx [deg/s]", comments="", fmt="%.9f")
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert re.search(
+        "sort the rows .* if the samples are evenly spaced .* --rate 100 --time none",
+        with_hint(caught.value),
+    )
 
 
 @pytest.mark.parametrize(

@@ -91,3 +91,13 @@ def test_noise_before_rounding_is_told(record):
     # a standard deviation from 50,000 samples is 0.3 %.
     assert notice.values["noise"] == pytest.approx(0.1 * np.sqrt(18.0 / 17.0), rel=0.015)
     assert "8.16 mg" in notice.text  # 0.08 m/s^2
+
+
+def test_a_recording_all_of_which_is_left_out_as_events():
+    """Of pairs that are nearly equal, every second prediction error is large."""
+    rng = np.random.default_rng(3)
+    x = np.repeat(np.round(rng.normal(size=4000), 3), 2)
+    x[1::2] += np.round(0.01 * rng.normal(size=4000), 3)
+    recording = gmwm.Recording.from_arrays({"gyro_x": x}, 400.0, {"gyro": "rad/s"})
+    with pytest.raises(gmwm.InputError, match="all samples missing"):
+        gmwm.calibrate(recording, gmwm.WhiteNoise())

@@ -59,6 +59,22 @@ def test_stretches_are_found_to_a_second(phases, seed, rate):
     assert found.longest == pytest.approx(max(b - a for a, b in rest), abs=1.0)
 
 
+@pytest.mark.parametrize("freedom", [3, 5])
+@pytest.mark.parametrize("phases", [FLIGHT, STOPS])
+def test_noise_of_heavy_tails_is_at_rest_whole(phases, freedom):
+    """Where blocks with large samples are left out, the noise of the others is too small."""
+    recording, rest = log(*phases)
+    rng = np.random.default_rng(4)
+    drawn = rng.standard_t(freedom, size=(6, recording.n))
+    channels = [
+        replace(c, values=c.values + np.sqrt(RATE) * (ACCEL if c.quantity == "accel" else GYRO) * x)
+        for c, x in zip(recording.channels, drawn, strict=True)
+    ]
+    found = find_still(replace(recording, channels=tuple(channels)))
+    assert len(found.stretches) == len(rest)
+    assert np.max(np.abs(np.array(found.stretches) - rest)) < 1.0
+
+
 def test_an_engine_is_no_rest_though_it_is_the_quietest_there_is():
     recording, _ = log(("idle", 40.0), ("move", 30.0), ("idle", 20.0))
     found = find_still(recording)

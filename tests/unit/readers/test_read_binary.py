@@ -84,6 +84,21 @@ def test_a_wrong_layout(tmp_path, layout, words):
     assert caught.value.code == "layout"
 
 
+@pytest.mark.parametrize(
+    ("own", "other"),
+    [("KF-GINS", "IXSEA"), ("IXSEA", "KF-GINS"), ("IMAR", "LN200"),
+     ("KF-GINS", "float64,1,1,rates")],
+)  # fmt: skip
+def test_a_layout_in_which_gravity_does_not_show(tmp_path, own, other):
+    path = tmp_path / "imu.bin"
+    path.write_bytes(records(LAYOUTS[own]).tobytes())
+    assert "gravity" not in {each.code for each in read(path, layout=own).notices}
+    with pytest.raises(InputError, match="times gravity: its numbers are not of this") as caught:
+        read(path, layout=other)
+    assert caught.value.code == "layout"
+    assert read(path, layout=other, units={"accel": "m/s^2"}).n == N
+
+
 def test_too_short(tmp_path):
     path = tmp_path / "imu.bin"
     path.write_bytes(records(LAYOUTS["LN200"]).tobytes()[:320])

@@ -35,9 +35,26 @@ def test_a_unit_that_gravity_contradicts(write, samples, norm, unit, likely):
 
 @pytest.mark.parametrize(
     ("norm", "unit"),
-    [(1.02, "g"), (9.5, "m/s^2"), (985.0, "mg"), (0.0, "g"), (0.0, "m/s^2"), (3.0, "m/s^2")],
+    [(1.02, "g"), (9.5, "m/s^2"), (985.0, "mg"), (0.0, "g"), (0.0, "m/s^2"), (0.8, "m/s^2")],
 )
 def test_gravity_or_none_at_all(write, samples, norm, unit):
     path = write(at_rest(samples, norm), HEADER.format(unit))
     notices = read(path, rate=100.0).notices
     assert "gravity" not in {notice.code for notice in notices}
+
+
+@pytest.mark.parametrize(
+    ("norm", "unit"), [(4.9, "m/s^2"), (2.0, "g"), (3.0, "m/s^2"), (16384.0, "m/s^2")]
+)
+def test_a_scale_that_no_unit_explains(write, samples, norm, unit):
+    """Of another range, or counts."""
+    found = read(write(at_rest(samples, norm), HEADER.format(unit)), rate=100.0)
+    (notice,) = [each for each in found.notices if each.code == "gravity"]
+    assert notice.severity == "warning"
+    assert "neither that nor none" in notice.text
+
+
+def test_samples_without_gravity_may_be_noisy(write, samples):
+    path = write(np.column_stack([samples[:, :3], 3.0 * samples[:, 3:] + 1.5]), BARE)
+    found = read(path, rate=1.0, units={"gyro": "deg/s", "accel": "m/s^2"})
+    assert "gravity" not in {notice.code for notice in found.notices}

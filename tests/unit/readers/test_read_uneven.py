@@ -8,6 +8,7 @@ import pytest
 import gmwm
 from gmwm.errors import InputError
 from gmwm.readers import read, tuning
+from gmwm.readers.clock import Jumps
 from gmwm.readers.clock.beat import without_beat
 from gmwm.readers.clock.uneven import _costs, followed
 
@@ -164,6 +165,41 @@ def test_coarse_stamps_with_a_loss_are_refused_as_without(recorded):
     clock.stamps = np.round(clock.stamps, 3)
     with pytest.raises(InputError, match="rounded too coarsely"):
         recorded(clock)
+
+
+@pytest.mark.parametrize(
+    ("rate", "unit"), [(800.0, 1e-3), (952.0, 1e-3), (6664.0, 1e-3), (80.0, 1e-2)]
+)
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_coarse_stamps_are_not_a_faster_clock_that_loses_rows(recorded, rate, unit, loss):
+    clock = Simulated(0, rate)
+    clock.lose(loss)
+    clock.stamps = np.round(clock.stamps / unit) * unit
+    with pytest.raises(InputError, match="rounded too coarsely"):
+        recorded(clock)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_rows_lost_at_random_have_no_rhythm(seed):
+    rng = np.random.default_rng(seed)
+    rows = np.cumsum(rng.geometric(0.01, size=(5, 8, 10, 30, 100)[seed % 5]))
+    one = np.ones(rows.size)
+    assert not Jumps(rows, 2.0 * one, one, 1.0).are_rounding
+
+
+def test_a_counter_that_runs_over_in_bursts_is_continued(tmp_path):
+    clock = Simulated(4, 200.0)
+    clock.bursts(4)
+    clock.lose(0.01)
+    noise = np.random.default_rng(9).normal(size=N)
+    ticks = np.floor(1e6 * clock.stamps + 2.0**32 - 3e7) % 2.0**32
+    np.savez(tmp_path / "log.npz", time_us=ticks, gx=noise[clock.number])
+    found = read(tmp_path / "log.npz", units={"gyro": "rad/s"})
+    assert found.n == N
+    assert found.rate == pytest.approx(200.0, rel=1e-5)
+    codes = {each.code for each in found.notices}
+    assert "clock-wraps" in codes
+    assert "clock-set" not in codes
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -219,3 +219,17 @@ def test_a_clock_that_is_set_back_repeats_stamps_and_no_rows():
     recording = gmwm.read(frame, units={"gyro": "rad/s"})
     assert recording.n == n
     assert "clock-set" in [each.code for each in recording.notices]
+
+
+def test_rows_of_two_sensors_in_turns_are_refused():
+    found = frame(0.01 * (np.arange(N) // 2)).assign(imu_id=np.arange(N) % 2)
+    with pytest.raises(InputError, match=r"'imu_id': rows of 2 sensors come in turns"):
+        gmwm.read(found)
+    with pytest.raises(InputError, match="in turns"):
+        gmwm.stream(found, rows=1000)
+
+
+@pytest.mark.parametrize("number", [0.0 * np.arange(N), np.arange(N), 1.0 * (np.arange(N) > 2000)])
+def test_columns_that_number_something_else(number):
+    found = gmwm.read(frame(0.01 * np.arange(N)).assign(id=number, device="front"))
+    assert found.n == N

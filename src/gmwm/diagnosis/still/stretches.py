@@ -162,8 +162,15 @@ def _floor(scatter: FloatArray, size: int) -> FloatArray:
 
 
 def _quiet(scatter: FloatArray, floor: FloatArray, size: int) -> BoolArray:
-    """Whether the ratio of a block of so many samples is that of noise."""
-    ratio = scatter / floor
+    """Whether the ratio of a block of so many samples is that of noise.
+
+    By running medians: motion lasts longer than a shock, and to leave out the largest samples of
+    noise of heavy tails would make it smaller than it is.
+    """
+    known = np.where(np.isnan(scatter), np.inf, scatter) / floor
+    width = 2 * tuning.BLOCKS_OF_SHOCK + 1
+    ratio = scipy.ndimage.median_filter(known, (width, 1), mode="nearest")
+    ratio[np.isinf(known)] = np.inf
     together = np.mean(ratio, axis=1)
     freedom = (size - 1.0) * floor.size
     most = max(tuning.MOST_OF_FLOOR, float(chi2.isf(tuning.CHANCE_OF_BLOCK, freedom)) / freedom)

@@ -30,6 +30,8 @@ def rest_notices(
     unit_of: Mapping[str, str],
     given: Mapping[str, str],
     are_columns_given: bool,
+    *,
+    has_layout: bool = False,
 ) -> tuple[Notice, ...]:
     """Compare the means and the noise of the sensors with those of sensors at rest.
 
@@ -39,13 +41,16 @@ def rest_notices(
     unit_of: Unit of each channel in the file.
     given: Units that the user gave, by channel or sensor.
     are_columns_given: Whether the user said which column is which channel.
-    Raises InputError if the unit of the accelerometer or the columns are wrong, and were not given.
+    has_layout: Whether the scales are those of a layout, in which gravity has to show.
+    Raises InputError if the unit of the accelerometer, the columns or the layout are wrong, and
+        the unit or the columns were not given.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
     swapped = _swapped(recording, rate, force, are_columns_given)
     if swapped:
         return swapped
-    return (*_gravity(recording, force, given), *(_gyro_unit(recording, rate) or _mean_rate(rate)))
+    gravity = _gravity(recording, force, given, has_layout)
+    return (*gravity, *(_gyro_unit(recording, rate) or _mean_rate(rate)))
 
 
 class _Sensor:
@@ -53,6 +58,7 @@ class _Sensor:
 
     unit: In the file.
     size: Length of the mean vector, SI.
+    usual: Median length of the means of a second, SI, which no motion changes much.
     scatter: Standard deviation of the fast noise of an axis, SI.
     density: White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a
         second leave, so that neither a filter's band nor a drift counts.
@@ -63,7 +69,10 @@ class _Sensor:
         self.unit = unit
         self.size = float(np.linalg.norm([np.nanmean(values) for values in axes]))
         second = max(round(1.0 / dt), 1)
-        fast, slow = _steps(axes), _steps(block_means(axes, second).T)
+        means = block_means(axes, second)
+        lengths = known_of(np.linalg.norm(means, axis=1))
+        self.usual = median(lengths) if lengths.size else self.size
+        fast, slow = _steps(axes), _steps(means.T)
         self.scatter = float(np.max(fast))
         densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
         self.density = float(np.max(densities))
@@ -128,38 +137,57 @@ def _swapped(
 
 
 def _gravity(
-    recording: Recording, force: _Sensor | None, given: Mapping[str, str]
+    recording: Recording, force: _Sensor | None, given: Mapping[str, str], has_layout: bool
 ) -> tuple[Notice, ...]:
-    """A mean that is no gravity in the unit used, but is in another one."""
+    """A mean that is no gravity in the unit used, but is in another one, or is not small either."""
     if force is None:
         return ()
     in_file = force.size / factor(force.unit, SI_UNIT["accel"])
     likely = _gravity_units(in_file)
     if _is_gravity(force.size):
         return ()
-    if not likely and _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
-        text = (
-            f"the mean of the accelerometer, {in_file:.4g} {force.unit}, is gravity over one "
-            "sampling interval: increments of velocity, read as accelerations"
-        )
-        action = "divide them, and those of the gyro, by the sampling interval"
-        return (Notice("gravity", "bad", "accel", text, {"norm": force.size}, action),)
+    is_given = any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES)))
     if not likely:
-        return ()
+        return _scale(recording, force, must_show=has_layout and not is_given)
     text = (
         f"the mean of the accelerometer is {in_file:.4g} {force.unit} long, which is gravity in "
         f"{likely[0]}"
     )
-    if not any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES))):
+    if not is_given:
         raise InputError(
             f"{recording.source}: {text}",
             "accel-unit-missing",
             f'give the unit, units={{"accel": "{likely[0]}"}}',
+            {"unit": likely[0]},
         )
     values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
     off = _GRAVITY / force.size
     action = f"check the unit: everything of the accelerometer is off by {off:.4g}"
     return (Notice("gravity", "bad", "accel", text, values, action),)
+
+
+def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[Notice, ...]:
+    """A length that is that of gravity in no unit, and not that of an accelerometer without it."""
+    ratio, values = force.usual / _GRAVITY, {"norm": force.size}
+    text = f"the accelerometer reads {force.usual:.4g} m/s^2, {ratio:.3g} times gravity"
+    if must_show and not 0.5 < ratio < 2.0:
+        raise InputError(
+            f"{recording.source}: {text}: its numbers are not of this layout",
+            "layout",
+            'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity',
+        )
+    if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
+        text += ", gravity over one sampling interval: increments of velocity, not accelerations"
+        action = "divide them, and those of the gyro, by the sampling interval"
+        return (Notice("gravity", "bad", "accel", text, values, action),)
+    is_none = (
+        force.usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * force.usual
+    )
+    if is_none or abs(ratio - 1.0) < tuning.SCALE_AGREES:
+        return ()
+    text += ", which is neither that nor none"
+    action = "check its scale and range, and that the numbers are no counts"
+    return (Notice("gravity", "warning", "accel", text, values, action),)
 
 
 def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]:

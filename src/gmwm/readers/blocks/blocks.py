@@ -14,7 +14,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.clock import agree
+from gmwm.readers.clock import agree, change_notice, check_rates
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
@@ -98,10 +98,10 @@ def read_blocks(
         found = part.recording
         first = first or found
         if not agree(found.rate, first.rate):
-            raise InputError(
-                f"{first.source}: the sampling rate changes, from {first.rate:.6g} to "
-                f"{found.rate:.6g} Hz about row {done:,}: cut the file there"
-            )
+            where = table.where(done)
+            check_rates(first.rate, found.rate, f"{first.source}, near {where}")
+            changes = change_notice((first.rate, found.rate), first.rate, where)
+            found = replace(found, notices=(changes, *found.notices))
         samples = part.samples(own)
         cut = [replace(c, values=c.values[samples], dt=first.dt) for c in found.channels]
         done += own.stop - own.start

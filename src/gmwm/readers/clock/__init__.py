@@ -5,7 +5,13 @@ from gmwm.readers.clock.civil_time import (
     seconds_of_day as seconds_of_day,
     without_summer_time as without_summer_time,
 )
+from gmwm.readers.clock.clock_notices import change_notice as change_notice
 from gmwm.readers.clock.jumps import Jumps as Jumps
 from gmwm.readers.clock.stamps import Clock as Clock
-from gmwm.readers.clock.timing import Timing as Timing, agree as agree, timing_of as timing_of
+from gmwm.readers.clock.timing import (
+    Timing as Timing,
+    agree as agree,
+    check_rates as check_rates,
+    timing_of as timing_of,
+)
 from gmwm.readers.clock.unit_of_time import without_unit as without_unit

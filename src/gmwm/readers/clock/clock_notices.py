@@ -8,20 +8,30 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm.readers import tuning
-from gmwm.readers.clock.jumps import Change, Jumps, find_shifts
+from gmwm.readers.clock.jumps import Jumps, find_shifts
 from gmwm.readers.clock.stamps import Clock, repeated_notice
 from gmwm.readers.clock.uneven import Followed
 
 
-def change_notice(clock: Clock, change: Change, seconds: float, used: float) -> Notice:
-    first, then = (rate / seconds for rate in change.rates)
-    when = float(clock.stamps[change.row] - clock.stamps[0]) * seconds
+def change_notice(
+    rates: tuple[float, float], used: float, row: str, time: float | None = None
+) -> Notice:
+    """That the sampling rate changes.
+
+    rates: Before and after, Hz.
+    used: The rate that is taken, Hz.
+    row: Where that is, in words.
+    time: When, s, if that is known.
+    """
+    first, then = rates
+    when = f"near {row}" if time is None else f"at about {time:.4g} s"
     text = (
-        f"the sampling rate goes from {first:.4g} to {then:.4g} Hz at about {when:.4g} s, and "
-        f"{used:.6g} Hz, between the two, is the rate of neither"
+        f"the sampling rate goes from {first:.4g} to {then:.4g} Hz {when}, and "
+        f"{used:.6g} Hz is taken for all of it"
     )
-    values = {"before": first, "after": then, "time": when, "rate": used}
-    action = f"use the part before or after ({clock.where(change.row)})"
+    values = {"before": first, "after": then, "rate": used}
+    values |= {} if time is None else {"time": time}
+    action = f"use the part before or after ({row})"
     return Notice("rate-changes", "bad", "", text, values, action)
 
 

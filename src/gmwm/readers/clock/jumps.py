@@ -72,13 +72,15 @@ class Jumps:
         """Whether they look like stamps rounded to a coarse unit rather than like missing rows.
 
         A clock of 700 Hz that is written in whole milliseconds steps by 1 and now and then by 2,
-        in a rhythm; rows are lost without one.
+        in a rhythm; rows are lost without one. A row that is lost besides breaks it for two.
         """
         single = self.missing == 1.0
         if np.count_nonzero(single) < max(tuning.FEWEST_IN_RHYTHM, 0.9 * self.rows.size):
             return False
-        low, usual, high = np.quantile(np.diff(self.rows), [0.25, 0.5, 0.75])
-        return bool(high - low <= 1.0 + 0.1 * usual)
+        apart = np.sort(np.diff(self.rows))
+        half = max((apart.size + 1) // 2, min(apart.size, tuning.ALL_IN_RHYTHM))
+        shortest = np.min(apart[half - 1 :] - apart[: apart.size - half + 1])
+        return bool(shortest <= 1.0 + 0.1 * np.median(apart))
 
     def sample(self, rows: _Rows) -> _Rows:
         """Index of rows on the regular grid; -1 of that before the first."""
@@ -121,11 +123,6 @@ class Change:
 
     row: int
     rates: tuple[float, float]
-
-    @property
-    def ratio(self) -> float:
-        """The larger rate over the smaller one."""
-        return max(self.rates) / min(self.rates)
 
 
 def find_change(stamps: FloatArray) -> Change | None:

@@ -147,6 +147,8 @@ def _unwrapped(stamps: FloatArray) -> FloatArray | None:
         if not back.size:
             return None
         usual = median(steps)
+        if usual == 0.0 and np.any(steps > 0.0):  # in bursts most are none
+            usual = median(steps[steps > 0.0])
         for bits in (16, 32):
             forward = steps[back] + 2.0**bits
             if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):

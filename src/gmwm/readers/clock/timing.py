@@ -80,7 +80,10 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     notices = [_rate_notice(clock, rate, seconds, steps.jitter, guessed=guessed)]
     notices += jump_notices(clock, steps.jumps, seconds)
     if steps.change is not None:
-        notices.append(change_notice(clock, steps.change, seconds, rate))
+        row, (before, after) = steps.change.row, steps.change.rates
+        when = float(clock.stamps[row] - clock.stamps[0]) * seconds
+        rates = before / seconds, after / seconds
+        notices.append(change_notice(rates, rate, clock.where(row), when))
     notices += shift_notices(clock, steps.jumps, seconds)
     if steps.uneven is not None:
         notices += uneven_notices(clock, steps.uneven, steps.jumps, seconds)
@@ -157,11 +160,16 @@ def _rate_notice(
 
 
 def _check_change(clock: Clock, change: Change | None, seconds: float) -> None:
-    if change is not None and change.ratio > tuning.SHARP_CHANGE:
+    if change is not None:
         first, then = (rate / seconds for rate in change.rates)
+        check_rates(first, then, f"{clock.place}, near {clock.where(change.row)}")
+
+
+def check_rates(first: float, then: float, place: str) -> None:
+    """Raise InputError if two rates of one recording, Hz, are too different to be one."""
+    if max(first / then, then / first) > tuning.SHARP_CHANGE:
         raise InputError(
-            f"{clock.place}, near {clock.where(change.row)}: the sampling rate goes from "
-            f"{first:.4g} to {then:.4g} Hz",
+            f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz",
             "rate-changes",
             "use the part before or after",
         )

@@ -80,6 +80,16 @@ def test_a_change_of_rate(tmp_path):
         list(read_blocks(table, units=UNITS, rows=10_000))
 
 
+@pytest.mark.parametrize("rows", [8000, 10_000])
+def test_a_small_change_of_rate_is_reported_as_of_the_whole(rows):
+    time = np.cumsum(np.repeat([1.0 / 100.0, 1.0 / 71.0], 20_000))
+    table = pa.table({"time_s": time, "gyro_x": np.random.default_rng(2).normal(size=time.size)})
+    found = gmwm.calibrate_stream(table, gmwm.WhiteNoise(), units=UNITS, rows=rows)
+    for notices in (found.notices, gmwm.stream(table, units=UNITS, rows=rows).notices):
+        assert [n.severity for n in notices if n.code == "rate-changes"] == ["bad"]
+    assert found["gyro_x"].reasons["rate_constant"] is False
+
+
 SEAMS = (8000, 16_000)
 
 
