@@ -10,6 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.text import per_cent
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
@@ -150,6 +151,7 @@ def bound_of(
                 *target.notices,
                 *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
                 *loose,
+                *stands_for(axis, target, model),
                 *about(axis, level),
             ),
             quantity=axis.quantity,
@@ -172,15 +174,27 @@ def _problem(group: Sequence[Axis], horizon: float, level: float | None) -> Prob
 
 
 def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:
-    """Where what the numbers leave out is too large for that."""
-    times = [share * horizon for share in tuning.SUSPECT]
-    found = predicted(axis, axis.chain, model, sd, times)
-    worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
-    if not worst.nees > tuning.OPTIMISTIC:
+    """Where what the numbers leave out is too large for that, without aiding or between fixes."""
+    late, early = ([share * horizon for share in each] for each in (tuning.SUSPECT, tuning.EARLY))
+    try:
+        found = axis.chain.errors(
+            axis.model, model, axis.dt, late, true_sd=axis.bias_sd, believed_sd=sd, every_fix=True
+        )
+    except InputError:  # nothing is predicted
         return ()
+    worst = max(predicted(axis, axis.chain, model, sd, late), key=lambda each: each.nees)
+    when = f"after {worst.time:g} s without aiding"
+    if not worst.nees > tuning.OPTIMISTIC:
+        aided = Predicted(0.0, float(np.max(found.nees()[: -len(late)])), 1.0)
+        soon = predicted(axis, axis.chain, model, sd, early)
+        worst = max((aided, *soon), key=lambda each: each.nees)
+        if not worst.nees > tuning.OPTIMISTIC:
+            return ()
+        every = f"with a fix every {axis.chain.interval:g} s"
+        when = every if worst is aided else f"after {worst.time:g} s without aiding"
     text = (
-        f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding; what "
-        "the numbers leave out is not small here"
+        f"too optimistic: a NEES of {worst.nees:.3g} {when}; what the numbers leave out is not "
+        "small here"
     )
     values = {"nees": worst.nees, "time": worst.time}
     mend = "estimate it as a state, or take it off the data"
@@ -199,6 +213,34 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
     is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
     mend = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
     return (Notice("loose-form", "note", "", text, values, mend),)
+
+
+def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
+    """What N is for beside white noise: the terms where the model needs N, not a slow term."""
+    own, N2 = axis.model.white_density(), model.white_density()
+    if tuning.ABOVE**2 * own >= N2:
+        return ()
+    f = target.frequencies(tuning.POINTS)
+    need, believed = target.psd(f), model.psd(f, axis.dt)
+    alike = np.minimum(need / believed, believed / need)
+    at = int(np.argmax(alike * N2 / believed))
+    if alike[at] < tuning.NEEDED:
+        return ()  # It is there for another axis that shares it.
+    labels = dict(zip(map(id, axis.model.terms), axis.model.term_labels(), strict=True))
+    shares = {
+        labels[id(term)]: float((density[0] + foot) / need[at])
+        for (term, density), foot in zip(target.densities(f[at : at + 1]), target.feet, strict=True)
+        if not term.is_white
+    }
+    large = {
+        key: share
+        for share, key in sorted(((share, key) for key, share in shares.items()), reverse=True)
+        if share > tuning.MENTIONED
+    }
+    parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
+    over = f"{np.sqrt(N2 / own):.3g} times" if own > 0.0 else "not"
+    text = f"N is {over} that of the model's white noise: it has to cover {parts}"
+    return (Notice("more-than-white-noise", "note", "", text, large),)
 
 
 def _fit(axis: Axis) -> Fit:

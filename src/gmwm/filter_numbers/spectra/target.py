@@ -23,7 +23,7 @@ class Target:
     terms: Those that count with their spectrum.
     weights: How far each does: one, or less where its peak is fast, by the rest of which its
         density is that at low frequencies.
-    foot: The sum of these rests, u^2/Hz.
+    feet: Of each, these rests, u^2/Hz.
     constant_sd: Of ramps over the horizon, u.
     dt, horizon: Sampling interval and horizon, s.
     lowest: Frequency below which nothing changes, Hz.
@@ -34,7 +34,7 @@ class Target:
 
     terms: tuple[Process, ...]
     weights: tuple[float, ...]
-    foot: float
+    feet: tuple[float, ...]
     constant_sd: float
     dt: float
     horizon: float
@@ -55,8 +55,9 @@ class Target:
         floor = min(floor, 1e-3 * nyquist)
         kept: list[Process] = []
         weights: list[float] = []
+        feet: list[float] = []
         notices: list[Notice] = []
-        foot = constant = 0.0
+        constant = 0.0
         for label, term in zip(model.term_labels(), model.terms, strict=True):
             if not term.has_spectrum():
                 raise InputError(
@@ -81,12 +82,12 @@ class Target:
                     near = (fast / band[int(np.argmax(density))]) ** tuning.FADING
                     within = tuning.PEAK * (low - own) / (high - own)
                     weight = float(np.clip(within, near, 1.0))
-                foot += (1.0 - weight) * own
                 if high > tuning.PEAK * low:
                     notices.append(_peak(label, band, density, weight, fast))
                 if weight * high > 0.0:
                     kept.append(term)
                     weights.append(weight)
+                    feet.append((1.0 - weight) * own)
         lowest, slope = _limit(kept, floor, dt)
         if slope > tuning.STEEPEST:
             raise InputError(
@@ -94,15 +95,20 @@ class Target:
                 "than that of a random walk: no form dominates it"
             )
         target = cls(
-            tuple(kept), tuple(weights), foot, constant, dt, horizon, lowest, floor, slope,
-            tuple(notices),
+            tuple(kept), tuple(weights), tuple(feet), constant, dt, horizon, lowest, floor,
+            slope, tuple(notices),
         )  # fmt: skip
-        if not kept and foot == 0.0:
+        if not kept:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
                 "stands for: add the white noise of the sensor"
             )
         return target
+
+    @property
+    def foot(self) -> float:
+        """Density at low frequencies of what counts by no more, u^2/Hz."""
+        return sum(self.feet)
 
     @property
     def is_stationary(self) -> bool:
