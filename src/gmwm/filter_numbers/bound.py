@@ -238,8 +238,11 @@ def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
         if share > tuning.MENTIONED
     }
     parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
-    over = f"{np.sqrt(N2 / own):.3g} times" if own > 0.0 else "not"
-    text = f"N is {over} that of the model's white noise: it has to cover {parts}"
+    if own > 0.0:
+        text = f"N is {np.sqrt(N2 / own):.3g} times that of the model's white noise: it"
+    else:
+        text = "the model has no white noise: N"
+    text += f" has to cover {parts}"
     return (Notice("more-than-white-noise", "note", "", text, large),)
 
 

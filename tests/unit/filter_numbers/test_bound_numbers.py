@@ -329,7 +329,7 @@ def test_white_noise_says_what_else_it_stands_for(solve):
     assert not any(n.code == "more-than-white-noise" for n in plain.notices)
     alone = solve({"accel_x": Model((fast, GaussMarkov(1e-4, 3000.0)))}, "N+K", **given)
     (notice,) = (n for n in alone.notices if n.code == "more-than-white-noise")
-    assert "N is not that of the model's white noise" in str(notice)
+    assert "the model has no white noise: N has to cover Gauss-Markov 1" in str(notice)
 
 
 def test_an_axis_does_not_explain_what_another_needs():
