@@ -313,6 +313,19 @@ def test_a_peak_that_is_gone_at_the_horizon_is_there_before(name, peak, form, ho
     assert not any(n.code == "optimistic" for n in without.notices)
 
 
+@pytest.mark.parametrize("frequency", [6.0, 12.0])
+def test_a_peak_counts_alike_at_every_rate(frequency):
+    """At 50 Hz a quarter of the band ends at 6.25 Hz, below ten over the horizon."""
+    truth = WhiteNoise(1e-4) + Resonance(5e-3, frequency, 0.02) + SLOW
+    found = [gmwm.bound(truth, horizon=1.0, dt=dt).N for dt in (0.002, 0.01, 0.02, 0.03)]
+    assert found == pytest.approx([found[0]] * 4, rel=0.05)
+    line = WhiteNoise(1e-4) + Sinusoid(1e-4, 8.0)
+    for dt in (0.002, 0.02):
+        (notice,) = (n for n in gmwm.bound(line, horizon=1.0, dt=dt).notices
+                     if n.code == "line-left-out")  # fmt: skip
+        assert notice.severity == "warning"
+
+
 @pytest.mark.parametrize("solve", [gmwm.bound, gmwm.reduce])
 def test_white_noise_says_what_else_it_stands_for(solve):
     """A process that is over within the horizon is white to it, low-pass noise always."""

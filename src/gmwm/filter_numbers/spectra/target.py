@@ -50,7 +50,8 @@ class Target:
         Raises InputError if a term is known by simulation only, or nothing is left.
         """
         nyquist = 0.5 / dt
-        fast = min(tuning.FAST / horizon, 0.25 * nyquist)
+        passing = tuning.FAST / horizon
+        fast = min(passing, 0.25 * nyquist)
         floor = 1.0 / (tuning.LOWEST * np.pi * max(10.0 * horizon, tuning.SHORTEST_MEMORY))
         floor = min(floor, 1e-3 * nyquist)
         kept: list[Process] = []
@@ -67,7 +68,7 @@ class Target:
                 constant = abs(term.drift_rate()) * horizon
                 notices.append(_ramp(label, term.drift_rate(), constant, unit))
             elif term.is_line:
-                notices += [_line(label, f, a, fast, unit) for f, a in term.lines()]
+                notices += [_line(label, f, a, passing, unit) for f, a in term.lines()]
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
@@ -79,10 +80,10 @@ class Target:
                     weight = float(high <= tuning.PEAK * low)
                     own = 0.0
                 else:
-                    near = (fast / band[int(np.argmax(density))]) ** tuning.FADING
+                    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
                     within = tuning.PEAK * (low - own) / (high - own)
-                    weight = float(np.clip(within, near, 1.0))
-                if high > tuning.PEAK * low:
+                    weight = float(np.clip(within, min(near, 1.0), 1.0))
+                if high > tuning.PEAK * low and weight < 1.0:
                     notices.append(_peak(label, band, density, weight, fast))
                 if weight * high > 0.0:
                     kept.append(term)
