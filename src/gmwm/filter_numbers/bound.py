@@ -174,31 +174,39 @@ def _problem(group: Sequence[Axis], horizon: float, level: float | None) -> Prob
 
 
 def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:
-    """Where what the numbers leave out is too large for that, without aiding or between fixes."""
+    """Where what the numbers leave out is too large for that, without aiding or before."""
     late, early = ([share * horizon for share in each] for each in (tuning.SUSPECT, tuning.EARLY))
+
+    def unaided(times: Sequence[float]) -> list[tuple[float, float, str]]:
+        found = predicted(axis, axis.chain, model, sd, times)
+        return [(e.nees, e.time, f"after {e.time:g} s without aiding") for e in found]
+
     try:
-        found = axis.chain.errors(
-            axis.model, model, axis.dt, late, true_sd=axis.bias_sd, believed_sd=sd, every_fix=True
-        )
+        worst = max(unaided(late))
+        if worst[0] <= tuning.OPTIMISTIC:
+            relative, usual = axis.between(horizon), axis.chain
+            (pose, *_), fixed = (
+                chain.errors(
+                    axis.model, model, axis.dt, [horizon],
+                    true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
+                ).nees()
+                for chain in (relative, usual)
+            )  # fmt: skip
+            worst = max(
+                (float(pose), horizon, f"between keyframes every {horizon:g} s"),
+                (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
+                *unaided(early),
+            )
     except InputError:  # nothing is predicted
         return ()
-    worst = max(predicted(axis, axis.chain, model, sd, late), key=lambda each: each.nees)
-    when = f"after {worst.time:g} s without aiding"
-    if not worst.nees > tuning.OPTIMISTIC:
-        aided = Predicted(0.0, float(np.max(found.nees()[: -len(late)])), 1.0)
-        soon = predicted(axis, axis.chain, model, sd, early)
-        worst = max((aided, *soon), key=lambda each: each.nees)
-        if not worst.nees > tuning.OPTIMISTIC:
-            return ()
-        every = f"with a fix every {axis.chain.interval:g} s"
-        when = every if worst is aided else f"after {worst.time:g} s without aiding"
+    nees, time, when = worst
+    if not nees > tuning.OPTIMISTIC:
+        return ()
     text = (
-        f"too optimistic: a NEES of {worst.nees:.3g} {when}; what the numbers leave out is not "
-        "small here"
+        f"too optimistic: a NEES of {nees:.3g} {when}; what the numbers leave out is not small here"
     )
-    values = {"nees": worst.nees, "time": worst.time}
     mend = "estimate it as a state, or take it off the data"
-    return (Notice("optimistic", "warning", "", text, values, mend),)
+    return (Notice("optimistic", "warning", "", text, {"nees": nees, "time": time}, mend),)
 
 
 def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:

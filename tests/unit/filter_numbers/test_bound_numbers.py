@@ -313,6 +313,19 @@ def test_a_peak_that_is_gone_at_the_horizon_is_there_before(name, peak, form, ho
     assert not any(n.code == "optimistic" for n in without.notices)
 
 
+@pytest.mark.parametrize("name", ["gyro_x", "accel_x"])
+def test_steps_that_a_tilt_hides_show_between_keyframes(name):
+    """A file for a second is for relative poses, in which two errors of quantization are."""
+    truth = QuantizationNoise(3e-5) + WhiteNoise(1e-5) + GaussMarkov(2e-5, 100.0)
+    found = gmwm.bound({name: truth}, horizon=1.0)
+    (notice,) = (n for n in found.notices if n.code == "optimistic")
+    certified = gmwm.certify({name: truth}, found, keyframe=1.0).of("keyframes")[0]
+    assert 1.3 < certified.nees == pytest.approx(notice.values["nees"], rel=1e-6)
+    assert "between keyframes every 1 s" in str(notice)
+    fine = QuantizationNoise(1e-6) + WhiteNoise(1e-5) + GaussMarkov(2e-5, 100.0)
+    assert not any(n.code == "optimistic" for n in gmwm.bound({name: fine}, horizon=1.0).notices)
+
+
 @pytest.mark.parametrize("frequency", [6.0, 12.0])
 def test_a_peak_counts_alike_at_every_rate(frequency):
     """At 50 Hz a quarter of the band ends at 6.25 Hz, below ten over the horizon."""
