@@ -1,9 +1,9 @@
 """Numbers for small filters: how tight, how consistent, and how they go with the record.
 
 Run with ``python benchmarks/filter_numbers.py PART``, one of length, errors, balance, coarse,
-tightness, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405 recordings; the
-tables of docs/filter-numbers.md and docs/filter-numbers-study.md. All but length and errors, which
-simulate and fit records, and real are exact covariance analyses.
+tightness, rates, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405
+recordings; the tables of docs/filter-numbers.md and docs/filter-numbers-study.md. All but length
+and errors, which simulate and fit records, and real are exact covariance analyses.
 """
 
 from __future__ import annotations
@@ -211,6 +211,21 @@ def tightness() -> None:
                 print(f"{name:<15}{form:<8}{shown}   {worst:.5f}", flush=True)
     for form, values in total.items():
         print(f"{form}: mean {np.mean(values):.2f}, {np.min(values):.2f} to {np.max(values):.2f}")
+
+
+def rates() -> None:
+    """How far bounds move with the sampling rate, which slow models do not know of."""
+    rates = (50.0, 100.0, 200.0, 500.0, 1000.0)
+    print(
+        f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: largest over smallest"
+    )
+    print("N, K, and predicted standard deviation at the horizon")
+    for name in ("1 GM", "2 GM", "3 GM, other", "walk + GM", "flicker"):
+        for form in ("N+K", "N+K+GM"):
+            found = [gmwm.bound(TRUTHS[name], form, dt=1.0 / rate) for rate in rates]
+            cells = [[each.N, max(each.K, 1e-12), each.tightness[60.0]] for each in found]
+            ratio = np.max(cells, axis=0) / np.min(cells, axis=0)
+            print(f"{name:<15}{form:<8}" + "".join(f"{value:>8.3f}" for value in ratio), flush=True)
 
 
 def _rules(truth: Model, T: float) -> dict[str, tuple[Model, float]]:
