@@ -1,20 +1,29 @@
 """Numbers for small filters: how tight, how consistent, and how they go with the record.
 
-Run with ``python benchmarks/filter_numbers.py length | tightness | rules | flight``, or
-``... real FOLDER`` with the four ADIS16405 recordings; the tables of
-docs/filter-numbers.md. All but ``length``, which simulates and fits records, are exact covariance
-analyses.
+Run with ``python benchmarks/filter_numbers.py PART``, one of length, errors, balance, coarse,
+tightness, rates, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405
+recordings; the tables of docs/filter-numbers.md and docs/filter-numbers-study.md. All but length
+and errors, which simulate and fit records, and real are exact covariance analyses.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 
 import gmwm
-from gmwm import BiasInstability, GaussMarkov, InputError, Model, RandomWalk, WhiteNoise
+from gmwm import (
+    BiasInstability,
+    GaussMarkov,
+    InputError,
+    Model,
+    QuantizationNoise,
+    RandomWalk,
+    WhiteNoise,
+)
 from gmwm.calibration import random_walk
 from gmwm.filter_numbers import Chain, tuning
 from gmwm.filter_numbers.axes import Axes
@@ -150,6 +159,26 @@ def balance() -> None:
         print(f"{weight:>6g}{cells}{np.mean(losses):>14.3f}{np.max(losses):>8.3f}", flush=True)
 
 
+def coarse() -> None:
+    """What reduced numbers make of a heading in steps."""
+    print("N+K by gmwm.reduce, white noise of 1e-6 rad/sqrt(s) and quantization Q of a heading: N")
+    print("over sqrt(2 Q^2/T), T the longest outage; NEES of the heading, and of what it gains")
+    print(f"{'Q [rad]':<9}{'outages [s]':<14}{'N':>6}{'heading':>22}{'gain':>22}")
+    for Q in (5e-5, 2e-4, 1e-3):
+        for outages in ((60.0,), OUTAGES):
+            truth = Model((WhiteNoise(1e-6), QuantizationNoise(Q), GaussMarkov(1e-7, 100.0)))
+            found = gmwm.reduce({"gyro_z": truth}, outages=outages)["gyro_z"]
+            cells = [
+                "".join(f"{nees:>7.3f}" for nees in chain.errors(
+                    truth, found.model, DT, outages, believed_sd=found.initial_sd
+                ).nees())
+                for chain in Chain.usual("").judged
+            ]  # fmt: skip
+            print(f"{Q:<9g}{', '.join(f'{t:g}' for t in outages):<14}"
+                  f"{found.N / np.sqrt(2.0 * Q**2 / outages[-1]):>6.2f}"
+                  + "".join(f"{cell:>22}" for cell in cells), flush=True)  # fmt: skip
+
+
 def tightness() -> None:
     """Predicted over true standard deviation of bounds at their horizons; the worst direction."""
     print("tilt-velocity-position chain, two minutes with a fix of 1 m every second before")
@@ -182,6 +211,21 @@ def tightness() -> None:
                 print(f"{name:<15}{form:<8}{shown}   {worst:.5f}", flush=True)
     for form, values in total.items():
         print(f"{form}: mean {np.mean(values):.2f}, {np.min(values):.2f} to {np.max(values):.2f}")
+
+
+def rates() -> None:
+    """How far bounds move with the sampling rate, which slow models do not know of."""
+    rates = (50.0, 100.0, 200.0, 500.0, 1000.0)
+    print(
+        f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: largest over smallest"
+    )
+    print("N, K, and predicted standard deviation at the horizon")
+    for name in ("1 GM", "2 GM", "3 GM, other", "walk + GM", "flicker"):
+        for form in ("N+K", "N+K+GM"):
+            found = [gmwm.bound(TRUTHS[name], form, dt=1.0 / rate) for rate in rates]
+            cells = [[each.N, max(each.K, 1e-12), each.tightness[60.0]] for each in found]
+            ratio = np.max(cells, axis=0) / np.min(cells, axis=0)
+            print(f"{name:<15}{form:<8}" + "".join(f"{value:>8.3f}" for value in ratio), flush=True)
 
 
 def _rules(truth: Model, T: float) -> dict[str, tuple[Model, float]]:
@@ -256,17 +300,44 @@ def _flown(truth: SensorModels) -> None:
     print(f"{'':<14}{'outage':>8}{'full [m]':>10}{'true [m]':>10}{'predicted':>10}{'NEES':>8}"
           f"{'worst':>9}")  # fmt: skip
     for name, numbers in found.items():
-        believed = SensorModels.of(
-            {axis: each.model for axis, each in numbers.items()},
-            {axis: each.initial_sd for axis, each in numbers.items()},
-        )
-        analysis = covariance_analysis(scenario, truth, believed)
+        analysis = covariance_analysis(scenario, truth, _filter(numbers))
         ratio = np.linalg.eigvals(np.linalg.solve(analysis.predicted, analysis.actual)).real
         for outage in scenario.outages:
             at = analysis.index(outage.end)
             sizes = (np.hypot(*s[at, :2]) for s in (full.sd, analysis.sd, analysis.predicted_sd))
             print(f"{name:<14}{outage.duration:>6g} s" + "".join(f"{s:>10.4g}" for s in sizes)
                   + f"{analysis.nees()[at]:>8.3f}{ratio.max():>9.4f}", flush=True)  # fmt: skip
+
+
+def whole() -> None:
+    """The whole navigation filter with the bounds of all truths for all horizons."""
+    print(
+        "INS/GNSS on a loiter, the truth on six axes (u: rad/s, m/s^2), outages of 1, 10 and 60 s:"
+    )
+    print("largest eigenvalue of P_predicted^-1 P_true at any time, with bounds for a horizon")
+    print(f"{'truth':<15}{'form':<8}" + "".join(f"{f'{T:g} s':>10}" for T in HORIZONS))
+    scenario = loiter_with_outages((1.0, 10.0, 60.0), DT)
+    for name, truth in TRUTHS.items():
+        models = {"gyro": truth, "accel": truth}
+        for form in ("N+K", "N+GM", "N+K+GM"):
+            cells = []
+            for T in HORIZONS:
+                try:
+                    believed = _filter(gmwm.bound(models, form, T))
+                    analysis = covariance_analysis(scenario, SensorModels.of(models), believed)
+                except InputError:  # a walk beside N+GM; a flicker has many states
+                    break
+                ratio = np.linalg.solve(analysis.predicted, analysis.actual)
+                cells.append(f"{np.linalg.eigvals(ratio).real.max():>10.5f}")
+            if cells:
+                print(f"{name:<15}{form:<8}" + "".join(cells), flush=True)
+
+
+def _filter(numbers: Mapping[str, gmwm.FilterNumbers]) -> SensorModels:
+    return SensorModels.of(
+        {axis: each.model for axis, each in numbers.items()},
+        {axis: each.initial_sd for axis, each in numbers.items()},
+    )
 
 
 # Of the ADIS16405 in u/sqrt(Hz) and u: 2 deg/sqrt(h), 0.007 deg/s; 0.2 m/s/sqrt(h), 0.2 mg.
@@ -301,13 +372,7 @@ def real(folder: str) -> None:
             "reduce": gmwm.reduce(models, outages=(10.0, 60.0)),
         }
         certificates = {name: gmwm.certify(models, numbers) for name, numbers in given.items()}
-        filters = {
-            name: SensorModels.of(
-                {axis: each.model for axis, each in found.numbers.items()},
-                {axis: each.initial_sd for axis, each in found.numbers.items()},
-            )
-            for name, found in certificates.items()
-        }
+        filters = {name: _filter(found.numbers) for name, found in certificates.items()}
         others = [each for i, each in enumerate(recordings) if i != k]
         source = Recorded.of(others, scenario.trajectory.duration)
         runs = monte_carlo(scenario, source, filters, min(24, source.available or 24))

@@ -201,8 +201,9 @@ def axis_of(
     """An axis by its numbers, with upper bounds of its fit in place of zeros."""
     sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
     axis = Axis(
-        name, numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees), rate
-    )
+        name, numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees), rate,
+        notices=numbers.notices,
+    )  # fmt: skip
     if fitted is None:
         return axis
     # A term that the model does not have is given by its upper bound: consumers refuse zeros.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
@@ -31,6 +32,7 @@ class Axis:
     nees: Predicted normalised error squared by time without aiding.
     rate: Of its samples, Hz; NaN if it is not known.
     upper: Which of the numbers are upper bounds of a term that was not found.
+    notices: What there is to know of them.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Axis:
     nees: Mapping[float, float] = field(default_factory=dict)
     rate: float = float("nan")
     upper: frozenset[str] = frozenset()
+    notices: tuple[Notice, ...] = ()
 
     @property
     def model(self) -> Model:

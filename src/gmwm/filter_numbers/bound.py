@@ -10,6 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.text import per_cent
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
@@ -150,6 +151,7 @@ def bound_of(
                 *target.notices,
                 *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
                 *loose,
+                *stands_for(axis, target, model),
                 *about(axis, level),
             ),
             quantity=axis.quantity,
@@ -172,19 +174,39 @@ def _problem(group: Sequence[Axis], horizon: float, level: float | None) -> Prob
 
 
 def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:
-    """Where what the numbers leave out is too large for that."""
-    times = [share * horizon for share in tuning.SUSPECT]
-    found = predicted(axis, axis.chain, model, sd, times)
-    worst = max(found, key=lambda each: -np.inf if np.isnan(each.nees) else each.nees)
-    if not worst.nees > tuning.OPTIMISTIC:
+    """Where what the numbers leave out is too large for that, without aiding or before."""
+    late, early = ([share * horizon for share in each] for each in (tuning.SUSPECT, tuning.EARLY))
+
+    def unaided(times: Sequence[float]) -> list[tuple[float, float, str]]:
+        found = predicted(axis, axis.chain, model, sd, times)
+        return [(e.nees, e.time, f"after {e.time:g} s without aiding") for e in found]
+
+    try:
+        worst = max(unaided(late))
+        if worst[0] <= tuning.OPTIMISTIC:
+            relative, usual = axis.between(horizon), axis.chain
+            (pose, *_), fixed = (
+                chain.errors(
+                    axis.model, model, axis.dt, [horizon],
+                    true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
+                ).nees()
+                for chain in (relative, usual)
+            )  # fmt: skip
+            worst = max(
+                (float(pose), horizon, f"between keyframes every {horizon:g} s"),
+                (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
+                *unaided(early),
+            )
+    except InputError:  # nothing is predicted
+        return ()
+    nees, time, when = worst
+    if not nees > tuning.OPTIMISTIC:
         return ()
     text = (
-        f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding; what "
-        "the numbers leave out is not small here"
+        f"too optimistic: a NEES of {nees:.3g} {when}; what the numbers leave out is not small here"
     )
-    values = {"nees": worst.nees, "time": worst.time}
     mend = "estimate it as a state, or take it off the data"
-    return (Notice("optimistic", "warning", "", text, values, mend),)
+    return (Notice("optimistic", "warning", "", text, {"nees": nees, "time": time}, mend),)
 
 
 def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
@@ -199,6 +221,37 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
     is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
     mend = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
     return (Notice("loose-form", "note", "", text, values, mend),)
+
+
+def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
+    """What N is for beside white noise: the terms where the model needs N, not a slow term."""
+    own, N2 = axis.model.white_density(), model.white_density()
+    if tuning.ABOVE**2 * own >= N2:
+        return ()
+    f = target.frequencies(tuning.POINTS)
+    need, believed = target.psd(f), model.psd(f, axis.dt)
+    alike = np.minimum(need / believed, believed / need)
+    at = int(np.argmax(alike * N2 / believed))
+    if alike[at] < tuning.NEEDED:
+        return ()  # It is there for another axis that shares it.
+    labels = dict(zip(map(id, axis.model.terms), axis.model.term_labels(), strict=True))
+    shares = {
+        labels[id(term)]: float((density[0] + foot) / need[at])
+        for (term, density), foot in zip(target.densities(f[at : at + 1]), target.feet, strict=True)
+        if not term.is_white
+    }
+    large = {
+        key: share
+        for share, key in sorted(((share, key) for key, share in shares.items()), reverse=True)
+        if share > tuning.MENTIONED
+    }
+    parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
+    if own > 0.0:
+        text = f"N is {np.sqrt(N2 / own):.3g} times that of the model's white noise: it"
+    else:
+        text = "the model has no white noise: N"
+    text += f" has to cover {parts}"
+    return (Notice("more-than-white-noise", "note", "", text, large),)
 
 
 def _fit(axis: Axis) -> Fit:

@@ -198,6 +198,8 @@ def _causes(
         for cause, term in terms.items():
             larger = row(cause, _bound(_with(group, [term]), horizon), (first.N, first.K))
             causes.append(larger)
+            if motion is not None and isinstance(term, WhiteNoise):
+                notices.append(_bounded(kind, cause, horizon, motion.memory))
             if max(larger.N_factor, larger.K_factor) > tuning.LARGE:
                 text = (
                     f"larger numbers are a poor substitute for {cause}: N times "
@@ -218,6 +220,16 @@ def _causes(
             every = _bound(_with(group, list(terms.values())), horizon)
             causes.append(row("all together", every, (N, K)))
     return causes, notices
+
+
+def _bounded(kind: str, cause: str, horizon: float, memory: float) -> Notice:
+    """Of an error that is a derivative: its integral is that of the motion at two times."""
+    factor = float(np.sqrt(horizon / memory / -np.expm1(-horizon / memory)))
+    text = (
+        f"what a {cause} does to the first integral does not grow: N for it, which is enough at "
+        f"any time, is {factor:.2g} times too large after {horizon:g} s"
+    )
+    return Notice("bounded-error", "note", kind, text, {"factor": factor})
 
 
 def _units(kind: str, factor: float) -> Notice:

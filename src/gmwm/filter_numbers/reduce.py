@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
-from gmwm.filter_numbers.bound import about, predicted
+from gmwm.filter_numbers.bound import about, predicted, stands_for
 from gmwm.filter_numbers.chain import Chain
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
@@ -130,6 +130,7 @@ class _Search:
         _, model, sd = self.least(group, tau)
         times = (*self.times, 10.0 * longest)
         errors = [predicted(axis, self.chain(axis), model, sd, times) for axis in group]
+        targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
         return [
             FilterNumbers(
                 form=self.form,
@@ -139,14 +140,16 @@ class _Search:
                 method="reduce",
                 predicted=found,
                 notices=(
-                    *_ramps(axis, longest),
+                    # All else that a bound leaves out is part of the truth of these.
+                    *(each for each in target.notices if each.code == "ramp-as-constant"),
                     *_optimistic(found, longest),
                     *_below(axis, model),
+                    *stands_for(axis, target, model),
                     *about(axis, None),
                 ),
                 quantity=axis.quantity,
             )
-            for axis, found in zip(group, errors, strict=True)
+            for axis, found, target in zip(group, errors, targets, strict=True)
         ]
 
     def correlation_time(self, groups: Sequence[Sequence[Axis]]) -> float:
@@ -198,12 +201,32 @@ class _Search:
                 total += float(np.sum(score + tuning.EVENNESS * uneven))
             return total
 
-        best = minimize(
-            cost, np.zeros(len(names)), method="BFGS",
-            options={"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS},
-        )  # fmt: skip
+        starts = [np.zeros(len(names)), *self._with_peaks(group, start, names)]
+        options = {"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS}
+        found = [minimize(cost, logs, method="BFGS", options=options) for logs in starts]
+        best = min(found, key=lambda each: float(each.fun))
         model = scaled(np.clip(best.x, -tuning.FARTHEST, tuning.FARTHEST))
         return float(best.fun), model, sd
+
+    def _with_peaks(
+        self, group: Sequence[Axis], start: Model, names: Sequence[str]
+    ) -> list[FloatArray]:
+        """Another start, N read off at the longest time, where a bound leaves a peak out.
+
+        Of quantization of an angle it is a hundred times that of the bound, with a minimum between.
+        """
+        longest = self.times[-1]
+        notices = [
+            notice
+            for axis in group
+            for notice in Target.of(axis.model, axis.dt, longest, axis.unit).notices
+        ]
+        if not any(notice.code == "fast-peak-left-out" for notice in notices):
+            return []
+        time = np.array([longest])
+        read = max(2.0 * longest * axis.model.haar_variance(time, axis.dt)[0] for axis in group)
+        factor = float(np.sqrt(read / start.white_density()))
+        return [np.where(np.array(names) == "N", np.log(factor), 0.0)]
 
     def _start(self, group: Sequence[Axis], tau: float | None) -> tuple[Model, float]:
         """A bound with given correlation times, without zeros; standard deviation at the start.
@@ -227,12 +250,6 @@ class _Search:
                 own += target.slow_variance(still)
             variance = max(variance, own)
         return model, float(np.sqrt(variance))
-
-
-def _ramps(axis: Axis, longest: float) -> Iterator[Notice]:
-    """All else that a bound leaves out is part of the truth by which these are judged."""
-    found = Target.of(axis.model, axis.dt, longest, axis.unit).notices
-    return (each for each in found if each.code == "ramp-as-constant")
 
 
 def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...]:

@@ -87,11 +87,24 @@ OPTIMISTIC = 1.05
 SUSPECT = (0.1, 0.3, 1.0, 3.0, 10.0)
 """Horizons without aiding at which that is looked for: a slow line returns to where it was."""
 
+EARLY = (0.01, 0.03)
+"""Horizons at which that is looked for, and with fixes, where it is at none of these: a peak that
+is gone at the horizon has not averaged out before."""
+
 LOOSE = 1.2
 """Predicted over true standard deviation at the horizon, above which a bound is called loose."""
 
 WORTH_A_STATE = 1.05
 """Times less of it that another form has to have."""
+
+ABOVE = 1.1
+"""N over that of the error model, above which it is said what else it stands for."""
+
+NEEDED = 0.8
+"""Density of a model over that of its numbers, or the inverse, below which they are not alike."""
+
+MENTIONED = 0.1
+"""Share of a density, above which a term is mentioned."""
 
 # -- reduced numbers ------------------------------------------------------------------------------
 

@@ -202,6 +202,12 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         "texts": certified.texts,
         "problem": certified.problem,
         "notes": certified.notes,
+        "covers": [
+            f"{name}: {notice.text}"
+            for name, axis in certified.axes.items()
+            for notice in axis.notices
+            if notice.code == "more-than-white-noise"
+        ],
     }
 
 

@@ -242,7 +242,8 @@ def test_a_spectrum_alone_is_dominated_without_a_prediction():
     ratio = numbers.model.psd(FREQUENCIES, DT) / truth.psd(FREQUENCIES, DT)
     assert np.min(ratio) > 1.0 - 1e-5
     assert np.isnan(numbers.nees[60.0])
-    assert [notice.code for notice in numbers.notices] == ["not-predicted"]
+    codes = [notice.code for notice in numbers.notices]
+    assert codes == ["more-than-white-noise", "not-predicted"]
 
 
 # ---- The length of the record does not matter ----
@@ -285,6 +286,83 @@ def test_what_is_left_out_and_is_not_small_is_a_warning():
             assert notice.values["time"] == pytest.approx(times[worst])
             assert notice.values["nees"] == pytest.approx(errors.nees()[worst])
     assert max(gmwm.bound({"gyro_z": line})["gyro_z"].nees.values()) < 1.0
+
+
+SLOW = GaussMarkov(1e-4, 120.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "peak", "form", "horizon", "time"),
+    [
+        ("gyro_z", Resonance(5e-3, 12.0, 0.02), "N+K", 10.0, 0.1),
+        ("gyro_z", Resonance(1e-3, 0.5, 0.05), "N+GM", 600.0, 6.0),
+        ("gyro_x", Resonance(1e-3, 0.5, 0.05), "N+GM", 600.0, 0.0),  # with fixes
+    ],
+)
+def test_a_peak_that_is_gone_at_the_horizon_is_there_before(name, peak, form, horizon, time):
+    truth = WhiteNoise(1e-4) + peak + SLOW
+    found = gmwm.bound({name: truth}, form, horizon)[name]
+    (notice,) = (n for n in found.notices if n.code == "optimistic")
+    assert notice.values["time"] == pytest.approx(time)
+    chain = replace(Chain.usual("gyro" if name == "gyro_x" else ""), is_gained=name == "gyro_z")
+    errors = chain.errors(truth, found.model, DT, [time or horizon], every_fix=time == 0.0,
+                          believed_sd=found.initial_sd)  # fmt: skip
+    nees = errors.nees()[:-1] if time == 0.0 else errors.nees()
+    assert 1.05 < notice.values["nees"] == pytest.approx(np.max(nees))
+    without = gmwm.bound({name: WhiteNoise(1e-4) + SLOW}, form, horizon)[name]
+    assert not any(n.code == "optimistic" for n in without.notices)
+
+
+@pytest.mark.parametrize("name", ["gyro_x", "accel_x"])
+def test_steps_that_a_tilt_hides_show_between_keyframes(name):
+    """A file for a second is for relative poses, in which two errors of quantization are."""
+    truth = QuantizationNoise(3e-5) + WhiteNoise(1e-5) + GaussMarkov(2e-5, 100.0)
+    found = gmwm.bound({name: truth}, horizon=1.0)
+    (notice,) = (n for n in found.notices if n.code == "optimistic")
+    certified = gmwm.certify({name: truth}, found, keyframe=1.0).of("keyframes")[0]
+    assert 1.3 < certified.nees == pytest.approx(notice.values["nees"], rel=1e-6)
+    assert "between keyframes every 1 s" in str(notice)
+    fine = QuantizationNoise(1e-6) + WhiteNoise(1e-5) + GaussMarkov(2e-5, 100.0)
+    assert not any(n.code == "optimistic" for n in gmwm.bound({name: fine}, horizon=1.0).notices)
+
+
+@pytest.mark.parametrize("frequency", [6.0, 12.0])
+def test_a_peak_counts_alike_at_every_rate(frequency):
+    """At 50 Hz a quarter of the band ends at 6.25 Hz, below ten over the horizon."""
+    truth = WhiteNoise(1e-4) + Resonance(5e-3, frequency, 0.02) + SLOW
+    found = [gmwm.bound(truth, horizon=1.0, dt=dt).N for dt in (0.002, 0.01, 0.02, 0.03)]
+    assert found == pytest.approx([found[0]] * 4, rel=0.05)
+    line = WhiteNoise(1e-4) + Sinusoid(1e-4, 8.0)
+    for dt in (0.002, 0.02):
+        (notice,) = (n for n in gmwm.bound(line, horizon=1.0, dt=dt).notices
+                     if n.code == "line-left-out")  # fmt: skip
+        assert notice.severity == "warning"
+
+
+@pytest.mark.parametrize("solve", [gmwm.bound, gmwm.reduce])
+def test_white_noise_says_what_else_it_stands_for(solve):
+    """A process that is over within the horizon is white to it, low-pass noise always."""
+    given = {} if solve is gmwm.reduce else {"horizon": 60.0}
+    fast = GaussMarkov(1e-3, 0.1)
+    truth = Model((WhiteNoise(2e-4), fast, GaussMarkov(1e-4, 3000.0)))
+    found = solve({"accel_x": truth}, "N+K", **given)["accel_x"]
+    (notice,) = (n for n in found.notices if n.code == "more-than-white-noise")
+    white, other = (each.psd(np.array([0.1]), DT)[0] for each in (WhiteNoise(2e-4), fast))
+    assert pytest.approx(white + other, rel=0.05) == found.N**2
+    assert notice.values == pytest.approx({"Gauss-Markov 1": other / (white + other)}, rel=0.05)
+    assert f"{found.N / 2e-4:.3g} times that of the model's white noise" in str(notice)
+    plain = solve({"accel_x": WhiteNoise(2e-4) + GaussMarkov(1e-4, 3000.0)}, "N+K", **given)
+    assert not any(n.code == "more-than-white-noise" for n in plain.notices)
+    alone = solve({"accel_x": Model((fast, GaussMarkov(1e-4, 3000.0)))}, "N+K", **given)
+    (notice,) = (n for n in alone.notices if n.code == "more-than-white-noise")
+    assert "the model has no white noise: N has to cover Gauss-Markov 1" in str(notice)
+
+
+def test_an_axis_does_not_explain_what_another_needs():
+    models = {"accel_x": WhiteNoise(1e-3) + SLOW, "accel_y": WhiteNoise(5e-3) + SLOW}
+    numbers = gmwm.bound(models, shared=True)
+    assert pytest.approx(5e-3, rel=0.05) == numbers["accel_x"].N
+    assert not any(n.code == "more-than-white-noise" for n in numbers.notices)
 
 
 @pytest.mark.parametrize("horizon", [1.0, 10.0, 60.0])

@@ -164,6 +164,18 @@ def test_causes_multiply_the_numbers(sheet):
     assert codes == {"gyro", "accel"}
 
 
+def test_numbers_for_a_time_offset_say_that_its_error_does_not_grow():
+    motion, late = Motion(0.4, 1.5, 0.2), Imperfections(time_offset=0.005)
+    found = gmwm.certify({"gyro_x": WhiteNoise(1e-4)}, {"gyro_x": (1e-4, 1e-6)}, outages=(30.0,),
+                         imperfections=late, motion=motion)  # fmt: skip
+    (notice,) = (n for n in found.notices if n.code == "bounded-error")
+    # The angle is that of the motion at two times; between 150 intervals of 30 s of six motions.
+    rate = [GaussMarkov(0.4, 0.2).simulate(450_000, 0.01, seed) for seed in range(6)]
+    gained = 0.005 * np.concatenate([np.diff(each[::3000]) for each in rate])
+    white = late.terms("gyro", motion)["time offset"].N
+    assert white * np.sqrt(30.0) / np.std(gained) == pytest.approx(notice.values["factor"], rel=0.1)
+
+
 def test_the_uncertainty_of_a_fit_is_a_cause():
     fit = gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(3600, 1.0, 5), 1.0)
     found = gmwm.certify(fit, (8e-5, 1e-7), keyframe=2.0)

@@ -9,12 +9,14 @@ from error_models import DT, TRUTHS
 from gmwm import (
     GaussMarkov,
     InputError,
+    Model,
     QuantizationNoise,
     RandomWalk,
     SensorNumbers,
     WhiteNoise,
 )
 from gmwm.filter_numbers import Chain, tuning
+from gmwm.filter_numbers.axes import Axes
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
 from gmwm.study.sensor_tables import TABLE_6
 
@@ -206,3 +208,18 @@ def test_less_white_noise_than_the_model_has_is_reported():
     walk = gmwm.reduce(sensor, "N+K", outages=(10.0,))
     assert walk.N > 8e-5
     assert not any(each.code == "less-white-noise" for each in walk.notices)
+
+
+@pytest.mark.parametrize("coarse", [50.0, 200.0, 1000.0])
+def test_coarse_steps_of_a_heading_are_white_noise_to_one_outage(coarse):
+    """An angle gained has two quantization errors: N^2 T of the filter has to be these 2 Q^2."""
+    N = 1e-6
+    truth = Model((WhiteNoise(N), QuantizationNoise(coarse * N), GaussMarkov(1e-7, 100.0)))
+    found = gmwm.reduce({"gyro_z": truth}, outages=(60.0,))["gyro_z"]
+    assert pytest.approx(np.sqrt(2.0 / 60.0) * coarse * N, rel=0.2) == found.N
+    heading, gained = (
+        chain.errors(truth, found.model, 0.01, [60.0], believed_sd=found.initial_sd).nees()[0]
+        for chain in Axes.of({"gyro_z": truth}, None, 0.0).axes[0].chain.judged
+    )
+    # Half a degree of a fix is no more than a coarse step: both cannot be right.
+    assert abs(np.log(heading)) + abs(np.log(gained)) < (0.15 if coarse < 1000.0 else 0.8)

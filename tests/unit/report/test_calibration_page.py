@@ -5,7 +5,7 @@ import re
 from base64 import b64encode
 from dataclasses import replace
 from hashlib import sha256
-from html import escape
+from html import escape, unescape
 from html.parser import HTMLParser
 
 import numpy as np
@@ -439,6 +439,17 @@ def test_what_is_copied_is_what_is_exported(calibration):
     for title, target in (("YAML, Kalibr", "kalibr"), ("Python, GTSAM", "gtsam")):
         expected = gmwm.export(replace(calibration, fits=inertial), target, horizon=60.0)
         assert found.texts[title] == expected
+
+
+def test_the_box_says_what_white_noise_stands_for(calibration):
+    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 0.1)
+    samples = Channel("gyro_x", truth.simulate(40_000, 0.01, 5), 0.01, "gyro", "rad/s")
+    fit = gmwm.fit(truth.opened(), gmwm.wavelet_variance(samples))
+    one = replace(calibration, fits={"gyro_x": fit})
+    (notice,) = (n for n in gmwm.bound(fit).notices if n.code == "more-than-white-noise")
+    (box,) = answer(one, certified(one))["boxes"]
+    assert box["covers"] == [f"gyro_x: {notice.text}"]
+    assert notice.text in unescape(page(one))
 
 
 def test_shared_numbers_stand_beside_those_of_the_axes(calibration):

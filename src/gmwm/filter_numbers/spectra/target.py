@@ -23,7 +23,7 @@ class Target:
     terms: Those that count with their spectrum.
     weights: How far each does: one, or less where its peak is fast, by the rest of which its
         density is that at low frequencies.
-    foot: The sum of these rests, u^2/Hz.
+    feet: Of each, these rests, u^2/Hz.
     constant_sd: Of ramps over the horizon, u.
     dt, horizon: Sampling interval and horizon, s.
     lowest: Frequency below which nothing changes, Hz.
@@ -34,7 +34,7 @@ class Target:
 
     terms: tuple[Process, ...]
     weights: tuple[float, ...]
-    foot: float
+    feet: tuple[float, ...]
     constant_sd: float
     dt: float
     horizon: float
@@ -50,13 +50,15 @@ class Target:
         Raises InputError if a term is known by simulation only, or nothing is left.
         """
         nyquist = 0.5 / dt
-        fast = min(tuning.FAST / horizon, 0.25 * nyquist)
+        passing = tuning.FAST / horizon
+        fast = min(passing, 0.25 * nyquist)
         floor = 1.0 / (tuning.LOWEST * np.pi * max(10.0 * horizon, tuning.SHORTEST_MEMORY))
         floor = min(floor, 1e-3 * nyquist)
         kept: list[Process] = []
         weights: list[float] = []
+        feet: list[float] = []
         notices: list[Notice] = []
-        foot = constant = 0.0
+        constant = 0.0
         for label, term in zip(model.term_labels(), model.terms, strict=True):
             if not term.has_spectrum():
                 raise InputError(
@@ -66,7 +68,7 @@ class Target:
                 constant = abs(term.drift_rate()) * horizon
                 notices.append(_ramp(label, term.drift_rate(), constant, unit))
             elif term.is_line:
-                notices += [_line(label, f, a, fast, unit) for f, a in term.lines()]
+                notices += [_line(label, f, a, passing, unit) for f, a in term.lines()]
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
@@ -78,15 +80,15 @@ class Target:
                     weight = float(high <= tuning.PEAK * low)
                     own = 0.0
                 else:
-                    near = (fast / band[int(np.argmax(density))]) ** tuning.FADING
+                    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
                     within = tuning.PEAK * (low - own) / (high - own)
-                    weight = float(np.clip(within, near, 1.0))
-                foot += (1.0 - weight) * own
-                if high > tuning.PEAK * low:
+                    weight = float(np.clip(within, min(near, 1.0), 1.0))
+                if high > tuning.PEAK * low and weight < 1.0:
                     notices.append(_peak(label, band, density, weight, fast))
                 if weight * high > 0.0:
                     kept.append(term)
                     weights.append(weight)
+                    feet.append((1.0 - weight) * own)
         lowest, slope = _limit(kept, floor, dt)
         if slope > tuning.STEEPEST:
             raise InputError(
@@ -94,15 +96,20 @@ class Target:
                 "than that of a random walk: no form dominates it"
             )
         target = cls(
-            tuple(kept), tuple(weights), foot, constant, dt, horizon, lowest, floor, slope,
-            tuple(notices),
+            tuple(kept), tuple(weights), tuple(feet), constant, dt, horizon, lowest, floor,
+            slope, tuple(notices),
         )  # fmt: skip
-        if not kept and foot == 0.0:
+        if not kept:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
                 "stands for: add the white noise of the sensor"
             )
         return target
+
+    @property
+    def foot(self) -> float:
+        """Density at low frequencies of what counts by no more, u^2/Hz."""
+        return sum(self.feet)
 
     @property
     def is_stationary(self) -> bool:
