@@ -197,7 +197,7 @@ def test_csv_holds_every_curve(tab, shown):
         "# x: averaging time [s]; y: Allan deviation [deg/h]", "curve,x,y,lower,upper",
     ]  # fmt: skip
     names = {line.split('"')[1] for line in lines[2:]}
-    assert {"model", "white noise", "random walk", "data sheet", "models that tie",
+    assert {"model", "white noise", "random walk", "data sheet", "other models that fit alike",
             "data, 95 % interval", "filter: N and K"} <= names  # fmt: skip
     data = [line.split(",")[2:] for line in lines if line.startswith('"data')]
     low = [float(row[2]) for row in data if row[2]]
@@ -271,6 +271,20 @@ def test_words_of_figures_are_whole_on_paper(tab):
         assert tab.run(closed) == 0
     finally:
         tab.run("dispatchEvent(new Event('afterprint'))")
+
+
+def test_notes_are_on_paper(tab):
+    notes = (
+        "Array.from(document.querySelectorAll('.run span')).filter(function (s) {"
+        " return s.getClientRects().length; }).map(function (s) { return s.innerText; })"
+    )
+    try:
+        tab.call("Emulation.setEmulatedMedia", media="print")
+        tab.run("dispatchEvent(new Event('beforeprint'))")
+        assert "Column not used: 'temp'." in tab.run(notes)
+    finally:
+        tab.run("dispatchEvent(new Event('afterprint'))")
+        tab.call("Emulation.setEmulatedMedia", media="")
 
 
 def test_dashed_lines_have_dashed_marks(tab):
