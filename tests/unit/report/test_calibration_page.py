@@ -787,9 +787,9 @@ def test_a_folder_that_is_not_there(calibration, tmp_path):
         (119.4, "119 s"),
         (120.0, "2 min"),
         (35 * 60.0, "35 min"),
-        (3599.0, "1 h 0 min"),
+        (3599.0, "1 h"),
         (3600.0 * 2 + 46 * 60.0, "2 h 46 min"),
-        (3600.0 * 100, "100 h 0 min"),
+        (3600.0 * 100, "100 h"),
     ],
 )
 def test_duration(seconds, words):

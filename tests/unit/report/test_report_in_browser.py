@@ -330,5 +330,10 @@ def test_a_validation_fits_a_telephone_and_can_be_read(tab, tmp_path, made_up):
             assert tab.run("document.documentElement.scrollWidth") <= 420
             ratio, where = tab.run(CONTRAST)
             assert ratio >= 4.5, (scheme, where)
+        wide = (
+            "Array.from(document.querySelectorAll('.fit')).map(function (f) {"
+            " return f.scrollWidth > f.clientWidth; })"
+        )
+        assert tab.run(wide) == [False]
     finally:
         tab.scheme("light")
