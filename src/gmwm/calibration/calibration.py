@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,11 +124,8 @@ class Calibration(Mapping[str, Fit], Document):
             lines += wrapped(text, first=f"{name:<{width}}  {verdict:<9}  ", indent=2)
         for name, notice in self.skipped.items():
             lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
-        counts = Counter(notice.severity for notice in self.notices)
-        found = [f"{counts[key]} {key}" for key in ("bad", "warning") if counts[key]]
-        if found:
-            lines.append(f"notices: {', '.join(found)}")
-        return "\n".join(lines)
+        health = made_by("verdict", self)
+        return "\n".join([*lines, *wrapped(f"{health['word']}: {health['text']}.", indent=2)])
 
     def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
         """Allan deviations with their models, three channels a row; see `Fit.plot`.

@@ -76,7 +76,8 @@ def suspected_clocks(calibrations: Mapping[str, Calibration]) -> list[Notice]:
 
 def _notice(a: str, b: str, found: ClockRatio) -> Notice:
     shown = ", ".join(f"{f:.4g} -> {g:.4g}" for f, g in found.frequencies)
-    rest = f", {found.others} other{'s' * (found.others > 1)} otherwise" if found.others else ""
+    others = f"{found.others} other{'s' * (found.others > 1)}"
+    rest = f" ({others} moved otherwise)" if found.others else ""
     expected = found.expected_densities
     text = (
         f"its clock may differ by a factor of {found.ratio:.4f} from that of {a}: lines and "

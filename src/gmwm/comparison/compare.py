@@ -324,7 +324,7 @@ def _few(count: int) -> Notice:
     tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
     high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
     text = (
-        f"{count} recordings know a standard deviation between them to within factors of "
-        f"{low:.2g} and {high:.2g} (95 %)"
+        f"of {count} recordings the spread is known only to within factors of {low:.2g} and "
+        f"{high:.2g} (95 %)"
     )
     return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})

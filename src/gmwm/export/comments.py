@@ -46,7 +46,8 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
 def above(imu: Imu, name: str) -> list[str]:
     """What stands above the numbers: their source, the program, and what they are for."""
     lines = [line for source in imu.sources for line in wrapped(plain(source))]
-    lines += wrapped(f"{name}: {imu.form} for {imu.horizon:g} s without aiding; explained below")
+    lines += wrapped(name)
+    lines += wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, explained below")
     if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
         lines += wrapped(
             f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "

@@ -29,7 +29,7 @@ _SENSOR_WORDS = {
         "gyro": "gyro gyr gyroscope omega angularvelocity angularrate angvel angrate "
         "rotationrate rotrate turnrate rate wrss",
         "accel": "accel acc accelerometer acceleration linearacceleration linacc linaccel "
-        "specificforce arss",
+        "specificforce specforce arss",
     }.items()
     for word in words.split()
 }

@@ -1,3 +1,4 @@
+from .answer import verdict as verdict
 from .calibration import fragment as fragment, write_report as write_report
 from .datasheet import read_datasheet as read_datasheet
 from .navigated import (

@@ -117,7 +117,7 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
         share = per_cent(abs(at.worst[0]))
         fits = f"fits within {share} up to {at.known_to:.3g} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
-    return True, f"{fits}, {tied.values.get('models', 2):g} models tie" if tied else fits
+    return True, f"{fits}, {tied.values.get('models', 2):g} models fit alike" if tied else fits
 
 
 def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
@@ -186,7 +186,12 @@ def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str,
 
 
 def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
-    rows = [_shared(triad, certified.horizon, calibration) for triad in certified.triads]
+    groups: dict[str, list[dict[str, Any]]] = {}
+    if certified.triads:
+        groups["One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"] = [
+            _of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads
+        ]
+    rows = groups.setdefault("Each axis by itself", [])
     for name, fit in calibration.items():
         if name in certified.axes:
             each = certified.axes[name]
@@ -198,7 +203,7 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
     return {
         "horizon": f"{certified.horizon:g}",
         "shown": certified.horizon == SHOWN,
-        "rows": rows,
+        "groups": groups,
         "texts": certified.texts,
         "problem": certified.problem,
         "notes": certified.notes,
@@ -211,12 +216,12 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _shared(triad: Triad, horizon: float, calibration: Calibration) -> dict[str, Any]:
+def _of_all_axes(triad: Triad, horizon: float, calibration: Calibration) -> dict[str, Any]:
     """A row of what files hold that have one value for the axes of a sensor."""
     fit = calibration[triad.axes[0].name]
     values = {"N": (triad.N, "u/sqrt(Hz)"), "K": (triad.K, "u/s/sqrt(Hz)")}
     invalid = [axis.name for axis in triad.axes if not calibration[axis.name].valid]
-    row: dict[str, Any] = {"name": f"{triad.quantity}, shared", "invalid": invalid}
+    row: dict[str, Any] = {"name": triad.quantity, "invalid": invalid}
     for letter, (value, unit) in values.items():
         sign = "≤ " if triad.is_upper(letter) else ""
         row[letter] = {key: sign + each for key, each in quantity_text(value, unit, fit).items()}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import Any
 
-import numpy as np
-
 from gmwm._core.text import brief
 from gmwm.budget import (
     FIELD_UNITS,
@@ -23,7 +21,6 @@ from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 
 _COASTING = 60.0  # s, the coasting time of the sentence
-_MINOR = 0.1  # of the variance of an axis: terms always below it are left out on paper
 _NAMES = {
     (HORIZONTAL, "attitude"): "tilt",
     (HORIZONTAL, "velocity"): "horizontal velocity",
@@ -51,7 +48,6 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
     return {
         "problem": "",
         "times": [f"{t:g} s" for t in times],
-        "late": [f"{t:g} s" for t in times if t >= min(_COASTING, times[-1])],
         "sentence": _sentence(known, unknown),
         "starts": [
             (
@@ -94,15 +90,6 @@ def _name(of: str, quantity: str) -> str:
 
 
 def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
-    # On paper, the terms that matter from a minute on, in what an axis has most effect on.
-    ends = {row.channel: row.quantity for row in budget.rows}
-    late = np.array(budget.times) >= min(_COASTING, budget.times[-1])
-    least = {
-        name: _MINOR * sum(
-            np.square(r.values) for r in budget.rows if (r.channel, r.quantity) == (name, end)
-        )
-        for name, end in ends.items()
-    }  # fmt: skip
     return [
         {
             "channel": row.channel,
@@ -111,8 +98,6 @@ def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
             "unit": FIELD_UNITS[row.quantity],
             "values": [brief(value * per_si(row.quantity), 3) for value in row.values],
             "invalid": row.channel in invalid,
-            "minor": row.quantity != ends[row.channel]
-            or not np.any((np.square(row.values) >= least[row.channel])[late]),
         }
         for row in budget.rows
         if any(row.values)

@@ -227,7 +227,7 @@ def _fitness(fit: Fit) -> str:
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value_allowed:.2g}"
     if fit.discrepancy > 0.0:
-        text += f", with a discrepancy of {per_cent(fit.discrepancy)} of the variance"
+        text += f" if the model may be off by {per_cent(fit.discrepancy)} of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 

@@ -94,8 +94,8 @@ def deviation_figure(
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
     traces = [
-        {**_line(at, factor * root_sum(list(parts.values())), "models that tie", "#777777", "solid",
-                 1.0), "opacity": 0.85, "legendgroup": "ties"}
+        {**_line(at, factor * root_sum(list(parts.values())), "other models that fit alike",
+                 "#777777", "solid", 1.0), "opacity": 0.85, "legendgroup": "ties"}
         for at, parts in (dense_curves(fitted, rival) for rival in rivals)
     ]  # fmt: skip
     toggles = [0] if traces else []
@@ -144,7 +144,7 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
     low = floor(fitted)
     places = [("0.664 B", low.tau, low.deviation)]
     if numbers is not None:
-        places += [("N", 1.0, numbers[0]), ("K", 3.0, numbers[1])]
+        places += [("N at 1 s", 1.0, numbers[0]), ("K at 3 s", 3.0, numbers[1])]
     shown = [(label, tau, y * factor) for label, tau, y in places if y > 0.0]
     return {
         "type": "scatter",
@@ -154,7 +154,7 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
         "y": [float(f"{each[2]:.5g}") for each in shown],
         "text": [each[0] for each in shown],
         "textposition": [
-            "top left" if label == "K" or tau > 0.1 * fitted.wv.tau[-1] else "top right"
+            "top left" if label[0] == "K" or tau > 0.1 * fitted.wv.tau[-1] else "top right"
             for label, tau, _ in shown
         ],
         "textfont": {"size": 14, "color": SUM_COLOUR},
@@ -289,7 +289,7 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
             traces.append(_line(times, root_sum(parts), label, SUM_COLOUR, dash, width))
     title = f"{of} {quantity} [{unit}]"
     layout = {
-        "height": 360,
+        "height": 280,
         "xaxis": _axis("coasting time [s]") | {"tickvals": known.times, "minor": {}},
         "yaxis": _axis(title[0].upper() + title[1:]) | {"dtick": 2},
     }

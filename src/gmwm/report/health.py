@@ -68,6 +68,7 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
             "where": ", ".join(part for part in (notice.where, notice.source) if part),
             "text": _begun(notice.text),
             "action": _begun(notice.action),
+            "done": notice.action,
         }
         for notice in worst_first(sorted(notices, key=lambda notice: bool(notice.where)))
     ]

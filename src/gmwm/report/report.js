@@ -46,7 +46,7 @@
     if (printing) {
       var node = document.getElementById(place);
       layout.width = node.parentNode.dataset.width === "half" ? 335 : 690;
-      layout.height = Math.round(0.5 * layout.height);
+      layout.height = Math.round(0.45 * layout.height);
       layout.font.size = 10;
       // The title of the y axis is longer than the axis is high: it goes above.
       layout.margin = { l: 42, r: 12, t: 17, b: 34 };
@@ -140,7 +140,7 @@
       }
       if (t.text) {
         t.y = t.y.map(function (y, i) {
-          return t.text[i] in now ? now[t.text[i]] * figure.whatif.factor : y;
+          return t.text[i][0] in now ? now[t.text[i][0]] * figure.whatif.factor : y;
         });
       }
     });

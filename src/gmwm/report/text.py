@@ -21,8 +21,8 @@ def duration_text(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60.0)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+    parts = zip(divmod(minutes, 60), ("h", "min"), strict=True)
+    return " ".join(f"{count} {unit}" for count, unit in parts if count)
 
 
 def model_text(model: Model, quantity: str) -> str:

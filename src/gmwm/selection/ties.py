@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from gmwm._core.notices import Notice
+from gmwm._core.text import brief
 from gmwm._core.units import field_units
 from gmwm.estimate.problem import Slope
 from gmwm.estimate.result import Fit
@@ -126,7 +127,7 @@ def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
         parameter = next(i.parameter for i in fitted.model.parameters if i.key == key)
         units = field_units(parameter.unit, fitted.wv.quantity)
         unit, factor = (units[0].unit, units[0].per_si) if units else (estimate.unit, 1.0)
-        low, high, a, b = (value * factor for value in (low, high, a, b))
-        ends = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
-        texts.append(f"{key} {ends} {unit} rather than {a:.3g} to {b:.3g}")
+        first, last, *own = (brief(value * factor, 3) for value in (low, high, a, b))
+        ends = f"{first} to {last}" if np.isfinite(high) else f"{first} or more"
+        texts.append(f"{key} {ends} {unit} rather than {' to '.join(own)}")
     return texts

@@ -113,6 +113,8 @@ def test_print_is_short_and_html_escapes(calibration):
     assert max(map(len, text.splitlines())) <= 80
     for name, fit in calibration.items():
         assert re.search(rf"^{name} +{'valid' if fit.valid else 'NOT VALID'} ", text, re.M)
+    verdict = re.search(r"Hz\. (.*)</p>", calibration._repr_html_()).group(1)
+    assert " ".join(text.split()).endswith(verdict)
     shown = replace(calibration, source="<b>x</b>")._repr_html_()
     assert "&lt;b&gt;x" in shown
     assert shown.count("<tr>") == 1 + len(calibration)

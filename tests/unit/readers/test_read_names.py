@@ -10,7 +10,8 @@ GYRO = """gyro_{} g{} w{} omega_{} angular_velocity.{} angular_velocity_{} gyr_{
     imu.angular_velocity.{} /imu/data/angular_velocity/{} gyro{} {}gyro {}_gyro_out RAW_IMU.{}gyro
     w_RS_S_{} gyroscope_{} angularVelocity{} imu_gyro_{} gyro_{}_rps gyro_{}_rad_s"""
 ACCEL = """accel_{} a{} acc_{} f{} linear_acceleration.{} acceleration_{} a_RS_S_{} accelerometer_{}
-    specific_force_{} field.linear_acceleration.{} {}acc a_{} lin_acc_{} accel_{}_mps2"""
+    specific_force_{} SpecForce{} field.linear_acceleration.{} {}acc a_{} lin_acc_{}
+    accel_{}_mps2"""
 NEITHER = """qx qw orientation.x mag_x x y z w a g flag index seq max
     acc_max
     gyro_bias_x bias_gyro_x linear_velocity_x yaw_rate pitch_rate gyro_integral_dt delta_angle_x

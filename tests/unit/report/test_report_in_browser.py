@@ -197,7 +197,7 @@ def test_csv_holds_every_curve(tab, shown):
         "# x: averaging time [s]; y: Allan deviation [deg/h]", "curve,x,y,lower,upper",
     ]  # fmt: skip
     names = {line.split('"')[1] for line in lines[2:]}
-    assert {"model", "white noise", "random walk", "data sheet", "models that tie",
+    assert {"model", "white noise", "random walk", "data sheet", "other models that fit alike",
             "data, 95 % interval", "filter: N and K"} <= names  # fmt: skip
     data = [line.split(",")[2:] for line in lines if line.startswith('"data')]
     low = [float(row[2]) for row in data if row[2]]
@@ -273,6 +273,20 @@ def test_words_of_figures_are_whole_on_paper(tab):
         tab.run("dispatchEvent(new Event('afterprint'))")
 
 
+def test_notes_are_on_paper(tab):
+    notes = (
+        "Array.from(document.querySelectorAll('.run span')).filter(function (s) {"
+        " return s.getClientRects().length; }).map(function (s) { return s.innerText; })"
+    )
+    try:
+        tab.call("Emulation.setEmulatedMedia", media="print")
+        tab.run("dispatchEvent(new Event('beforeprint'))")
+        assert "Column not used: 'temp'." in tab.run(notes)
+    finally:
+        tab.run("dispatchEvent(new Event('afterprint'))")
+        tab.call("Emulation.setEmulatedMedia", media="")
+
+
 def test_dashed_lines_have_dashed_marks(tab):
     kinds = tab.run(
         "Array.from(document.querySelectorAll('[data-legend=plot-1] .swatch')).map("
@@ -316,5 +330,10 @@ def test_a_validation_fits_a_telephone_and_can_be_read(tab, tmp_path, made_up):
             assert tab.run("document.documentElement.scrollWidth") <= 420
             ratio, where = tab.run(CONTRAST)
             assert ratio >= 4.5, (scheme, where)
+        wide = (
+            "Array.from(document.querySelectorAll('.fit')).map(function (f) {"
+            " return f.scrollWidth > f.clientWidth; })"
+        )
+        assert tab.run(wide) == [False]
     finally:
         tab.scheme("light")

@@ -15,7 +15,7 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.notices import Notice
-from gmwm._core.text import Printed, bullets, wrapped
+from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import MissingNameError
@@ -326,7 +326,10 @@ class Fit(Document, Printed):
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"
             if self.discrepancy > 0.0:
-                fitness += f" ({self.p_value_allowed:.2g} with the discrepancy)"
+                fitness += (
+                    f" ({self.p_value_allowed:.2g} if the model may be off by "
+                    f"{per_cent(self.discrepancy)} of the variance)"
+                )
         if np.isfinite(self.log_likelihood):
             lines.append(f"log-likelihood {self.log_likelihood:.8g}")
             fitness = f"of the wavelet variances: {fitness}"

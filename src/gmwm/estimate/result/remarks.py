@@ -102,8 +102,9 @@ def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
         notices.append(
             Notice(
                 "sensor-bandwidth", "note", key,
-                f"the {term.named()} = sensor bandwidth ({bandwidth:.3g} Hz); acts as white noise "
-                f"of N = {density * factor:.3g} {unit}, needs no state",
+                f"the {term.title()} term is white noise of N = {density * factor:.3g} {unit} "
+                f"behind the sensor's bandwidth of {bandwidth:.3g} Hz; a filter needs no state for "
+                "it",
                 {"bandwidth": bandwidth, "density": density},
             )
         )  # fmt: skip

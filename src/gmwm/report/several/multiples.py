@@ -20,7 +20,7 @@ COLOURS = 8
 
 _WIDTH, _HEIGHT = 380.0, 316.0
 _LEFT, _RIGHT = 46.0, 374.0
-_TOP, _MIDDLE = 8.0, 196.0  # of the deviations
+_TOP, _MIDDLE = 15.0, 196.0  # of the deviations
 _LOW, _BOTTOM = 212.0, 284.0  # of the ratios
 _LIMITS = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # per cent
 _DODGE = 0.05  # decades between the first and the last recording at a level
@@ -116,7 +116,7 @@ def _frame(x: _Scale, y: _Scale, unit: str) -> str:
         parts.append(f'<path class="grid" d="M{_LEFT:g} {at:.1f}H{_RIGHT:g}"/>')
         parts.append(_text(_LEFT - 4.0, at + 3.5, f"{value:g}", "end"))
     parts.append(_text(0.5 * (_LEFT + _RIGHT), _HEIGHT - 4.0, "averaging time [s]", "middle"))
-    parts.append(_text(_LEFT + 5.0, _TOP + 12.0, f"Allan deviation [{unit}]", "start"))
+    parts.append(_text(_LEFT, _TOP - 5.0, f"Allan deviation [{unit}]", "start"))
     return "".join(parts)
 
 
@@ -147,7 +147,7 @@ def _ratios(
         parts.append(
             _text(_LEFT - 4.0, float(y(value)) + 3.5, f"{value:+g}" if value else "0", "end")
         )
-    parts.append(_text(_LEFT + 5.0, _LOW + 11.0, "from their mean [%]", "start"))
+    parts.append(_text(_LEFT, _LOW - 4.0, "from their mean [%]", "start"))
     for row, label in enumerate(shown):
         known = np.isfinite(away[row])
         at = x(np.log10(equality.tau[known]) + shifts[label])
