@@ -12,7 +12,8 @@ import yaml
 
 import gmwm
 from browser import Browser, needs_chromium
-from gmwm import GaussMarkov, RandomWalk, WhiteNoise
+from gmwm import GaussMarkov, LowPassNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
+from gmwm._core.notices import Notice
 from gmwm.report import write_report
 
 pytestmark = needs_chromium
@@ -299,10 +300,37 @@ def test_dashed_lines_have_dashed_marks(tab):
 
 
 def test_paper(tab):
-    """Three axes take six pages at most; the small table of six takes eight on a real sensor."""
     pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf()))
     assert 2 <= pages <= 6
     assert trace(tab, "model") is not None
+
+
+def test_six_axes_with_much_to_say_take_eight_pages(tab, tmp_path):
+    model = (
+        WhiteNoise(5e-4) + RandomWalk(1e-4) + GaussMarkov(3e-4, 0.1) + GaussMarkov(2e-4, 8.0)
+        + Resonance(1e-4, 10.0, 0.03) + Sinusoid(1e-4, 0.56)
+        + LowPassNoise(4e-4, bandwidth=25.0, order=1, damping=0.7071)
+    )  # fmt: skip
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    samples = {name: model.simulate(8000, 0.01, seed) for seed, name in enumerate(names)}
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    many = gmwm.Recording.from_arrays(samples, 100.0, units)
+    found = gmwm.calibrate(many, model.with_params({"N": None}))
+    text = (
+        "a periodic line at 0.4626 Hz, amplitude 0.145 mg, 23.6 times its surroundings, with "
+        "harmonics at 1.69 and {} Hz"
+    )
+    done = "counted as additive noise, which is nearly true"
+    notices = [
+        Notice(f"{severity}-{k}", severity, names[k % 6], text.format(k), {}, done)
+        for severity, count in (("warning", 12), ("note", 14))
+        for k in range(count)
+    ]
+    same = f"2 models describe the data equally well: {model.title()}; {model.title()}"
+    notices += [Notice("ambiguity", "note", name, same) for name in names]
+    full = replace(found, notices=(*found.notices, *notices))
+    tab.open(write_report(full, tmp_path / "six.html", many))
+    assert len(re.findall(rb"/Type\s*/Page\b", tab.pdf())) <= 8
 
 
 def test_a_comparison_fits_a_telephone_and_fetches_nothing(calibration, tab, tmp_path):
