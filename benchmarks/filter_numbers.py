@@ -216,10 +216,8 @@ def tightness() -> None:
 def rates() -> None:
     """How far bounds move with the sampling rate, which slow models do not know of."""
     rates = (50.0, 100.0, 200.0, 500.0, 1000.0)
-    print(
-        f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: largest over smallest"
-    )
-    print("N, K, and predicted standard deviation at the horizon")
+    print(f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: the largest over")
+    print("the smallest N, K, and predicted standard deviation at the horizon")
     for name in ("1 GM", "2 GM", "3 GM, other", "walk + GM", "flicker"):
         for form in ("N+K", "N+K+GM"):
             found = [gmwm.bound(TRUTHS[name], form, dt=1.0 / rate) for rate in rates]
