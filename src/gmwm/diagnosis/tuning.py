@@ -341,6 +341,10 @@ MOST_OF_FLOOR, MOST_OF_AXIS, CHANCE_OF_BLOCK = 1.8, 3.5, 1e-5
 noise in six axes is above 1.8 in 1 of 100,000 blocks, in one axis above 3.5 in as many. Where fewer
 axes have a larger one as often, that counts."""
 
+NOW_AND_THEN = 0.1
+"""Of its blocks in which most axes scatter more than noise, from which a stretch vibrates; of six
+axes of Student's t with 3 degrees of freedom a twentieth do."""
+
 BLOCKS_OF_SHOCK = 4
 """Blocks (1 s) of a shock within a stretch, which screening masks."""
 

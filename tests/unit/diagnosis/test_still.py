@@ -75,6 +75,20 @@ def test_noise_of_heavy_tails_is_at_rest_whole(phases, freedom):
     assert np.max(np.abs(np.array(found.stretches) - rest)) < 1.0
 
 
+@pytest.mark.parametrize(("on", "period"), [(0.25, 2.0), (0.5, 2.0), (0.8, 3.0)])
+def test_what_shakes_now_and_then_is_no_rest(on, period):
+    recording, _ = log(("rest", 60.0), ("move", 40.0), ("rest", 60.0))
+    t, rng = np.arange(recording.n) / RATE, np.random.default_rng(5)
+    shaken = (t > 100.0) & (t % period < on)
+    channels = [
+        replace(c, values=c.values + 3.0 * np.nanstd(c.values[:5000]) * shaken * noise)
+        for c, noise in zip(recording.channels, rng.normal(size=(6, recording.n)), strict=True)
+    ]
+    found = find_still(replace(recording, channels=tuple(channels)))
+    assert len(found.stretches) == 1
+    assert found.stretches[0][1] == pytest.approx(60.0, abs=1.0)
+
+
 def test_an_engine_is_no_rest_though_it_is_the_quietest_there_is():
     recording, _ = log(("idle", 40.0), ("move", 30.0), ("idle", 20.0))
     found = find_still(recording)

@@ -229,7 +229,7 @@ def _vibrates(
     size: int,
     dt: float,
 ) -> list[bool]:
-    """Whether a stretch scatters more than the quietest one, or in a narrow band."""
+    """Whether a stretch scatters more than the quietest one, now and then, or in a narrow band."""
     if not runs:
         return []
     levels = np.array([np.nanmedian(scatter[a:b], axis=0) for a, b in runs])
@@ -237,6 +237,10 @@ def _vibrates(
     floor = np.min(levels, axis=0)
     alive = floor > 0.0
     excess = np.max(levels[:, alive] / floor[alive], axis=1, initial=0.0) > tuning.LOUDER_THAN_REST
+    # Large samples of noise come in one axis at a time, what shakes now and then in most of them.
+    if np.any(alive):
+        shaken = np.median(scatter[:, alive] / floor[alive], axis=1) > tuning.MOST_OF_FLOOR
+        excess |= [bool(np.mean(shaken[a:b]) > tuning.NOW_AND_THEN) for a, b in runs]
     return [
         bool(loud) or any(_has_band(c.values[a * size : b * size], dt) for c in channels)
         for (a, b), loud in zip(runs, excess, strict=True)
