@@ -54,8 +54,12 @@ ZERO_VELOCITY = (2.0, 1.0)
 rest, and the length that is looked at, s: engines and roads shake it by far more."""
 
 WAY, FEWEST_WAYS, MIXED_UP = 20.0, 8, 3.0
-"""s between fixes whose way is compared with their velocities; how many are needed; and how many
-times as far off they must be as with two columns exchanged: right ones are never farther off."""
+"""s between fixes whose way is compared with their velocities, one begun in the middle of another;
+how many are needed; and how many times as far off they must be as with two columns exchanged or
+another unit: right ones are never farther off."""
+
+LONGEST_HELD = 5.0
+"""s of one value in a channel, beyond which it is stuck: a second of noise has others."""
 
 # -- alignment ------------------------------------------------------------------------------------
 
@@ -177,7 +181,7 @@ SCALE_STEP, LARGEST_SCALE = math.log(5.0), math.log(1000.0)
 """Logarithm of the factors on a noise that are tried first, and of the largest."""
 
 NOT_NOISE = 30.0
-"""Times the white noise of a model, beyond which a log is more likely wrong than a calibration."""
+"""Times the noise of a model, beyond which a log is more likely wrong than a calibration."""
 
 AMBIGUOUS = 3.0
 """Of the log-likelihood: an explanation that is less than 20 times as probable is no decision."""

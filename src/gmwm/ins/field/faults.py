@@ -35,7 +35,8 @@ class Faults:
 
     found: Each given those before it; empty if there is none.
     alternatives: Codes that explain the log nearly as well as the first.
-    explained: Whether the innovations agree with the filter, with these allowed for.
+    explained: Whether the innovations agree with the filter, with these allowed for, and none is a
+        noise that no sensor has.
     replay: The log with these allowed for.
     resolution: Constant error -> its standard error from this motion, s, m, rad.
     """
@@ -83,7 +84,8 @@ class Faults:
             found += best
             here = found[-1].replay
         found, here = _cleaned_again(base, found, here)
-        return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
+        explained = not contradicted(here) and not any(map(_is_beyond_noise, found))
+        return cls(tuple(found), alternatives, explained, here, resolution)
 
 
 def contradicted(replay: Replay, level: float = LEVEL) -> bool:
@@ -147,6 +149,16 @@ def _cleaned_again(
     return [*others[:place], again, *others[place:]], again.replay
 
 
+def _is_beyond_noise(fault: Explanation) -> bool:
+    """Whether a sensor would be so much worse than its model that another fault must be behind it.
+
+    Enough noise explains anything. Vibration may be that of accelerometers.
+    """
+    if not fault.code.startswith("sensor-") or fault.values["factor"] < tuning.NOT_NOISE:
+        return False
+    return (fault.code, fault.where) != ("sensor-white-noise", "accel")
+
+
 def _may_be_a_bias(fault: Explanation) -> bool:
     """Whether only the vertical shows a scale error: gravity is constant there, as a bias is."""
     return (fault.code, fault.where) == ("scale-error", "accel") and all(
@@ -155,6 +167,8 @@ def _may_be_a_bias(fault: Explanation) -> bool:
 
 
 # -- words ----------------------------------------------------------------------------------------
+
+_TIMES = frozenset({"after", "before", "time"})
 
 _MOTION = {
     "time offset": ("time-offset", "a time offset of the fixes", "s", 1.0),
@@ -174,7 +188,7 @@ def fault_notice(fault: Explanation, start: float, assumed: Mapping[str, Notice]
     """
     values: dict[str, Any] = {**fault.values}
     values |= {f"{name} error": each for name, each in fault.errors.items()}
-    values |= {name: values[name] + start for name in ("after", "before") if name in values}
+    values |= {name: values[name] + start for name in _TIMES & values.keys()}
     text, action = _WORDS[fault.code](replace(fault, values=values))
     severity = _severity(fault)
     if fault.code == "fix-noise" and fault.where in assumed:
@@ -363,10 +377,10 @@ def _white(fault: Explanation) -> tuple[str, str]:
 
 def _slow(fault: Explanation) -> tuple[str, str]:
     factor = fault.values["factor"]
-    return (
-        f"slow errors and biases are {brief(factor)} times the model's",
-        "the sensor model or the bias is wrong: calibrate again, or give the bias",
-    )
+    text = f"slow errors and biases are {brief(factor)} times the model's"
+    if factor > tuning.NOT_NOISE:
+        return text, "look at units, axes and stamps, and at the bias, before the model"
+    return text, "the sensor model or the bias is wrong: calibrate again, or give the bias"
 
 
 _WORDS: dict[str, Callable[[Explanation], tuple[str, str]]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +40,8 @@ _OF_POSITION = {"latitude": "north", "longitude": "east", "height": "down"}
 _OF_VELOCITY = frozenset({"velocity", "vel", "v", "speed"})
 _OF_SD = frozenset({"sd", "std", "stdev", "sigma", "accuracy", "acc"})
 _SPEED_UNIT = frozenset({"m", "s", "mps", "ms", "per", "sec"})
+_SPEEDS = {"km/h": 1.0 / 3.6, "knots": 1852.0 / 3600.0, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001}
+_TINY = float(np.finfo(float).tiny)
 _BOTH = {"horizontal": ("north", "east"), "vertical": ("down",)}
 _PASSED_OVER = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"})
 
@@ -297,7 +299,7 @@ def _deviations(
 
 
 def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: FloatArray) -> None:
-    """Refuse positions and velocities that go together with two columns exchanged only.
+    """Refuse positions and velocities that go together with another column or unit only.
 
     A filter would blame the sensors. How far the vehicle went by the positions is compared with the
     integral of the velocities.
@@ -305,7 +307,8 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
     time: (E,), s.
     position, velocity: (E, 3), latitude, longitude (rad), height (m); north, east, down (m/s); NaN
         where there is none.
-    Raises InputError if the way by the velocities fits far better with an exchange.
+    Raises InputError if the way by the velocities fits far better with an exchange, a sign turned
+        or a factor between units.
     """
     there = np.all(np.isfinite(position) & np.isfinite(velocity), axis=1)
     time, position, velocity = time[there], position[there], velocity[there]
@@ -315,8 +318,8 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
     gone = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step, axis=0)
     gone = np.concatenate([np.zeros((1, 3)), gone])
     holes = np.concatenate([[0], np.cumsum(step[:, 0] > tuning.CHORD)])
-    marks = np.searchsorted(time, np.arange(time[0], time[-1], tuning.WAY))
-    first, last = marks[:-1], marks[1:]
+    marks = np.searchsorted(time, np.arange(time[0], time[-1], 0.5 * tuning.WAY))
+    first, last = marks[:-2], marks[2:]
     whole = holes[first] == holes[last]
     first, last = first[whole], last[whole]
     if first.size < tuning.FEWEST_WAYS:
@@ -325,19 +328,35 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
 
     def apart(here: FloatArray, way: FloatArray, part: slice) -> float:
         off = (ned_difference(here[last], here[first]) - way)[:, part]
-        return float(np.median(np.sum(off**2, axis=1)))
+        # Of the way itself, for a smaller unit makes everything smaller.
+        size = max(float(np.median(np.sum(way[:, part] ** 2, axis=1))), _TINY)
+        return float(np.median(np.sum(off**2, axis=1))) / size
 
+    better = dict[str, float]()
+    for what, part, here, way in _misread(position, by_velocity):
+        if np.all(np.abs(here[:, 0]) < 0.5 * np.pi):
+            left, now = apart(here, way, part), apart(position, by_velocity, part)
+            if now > tuning.MIXED_UP**2 * left:
+                better[what] = left / now
+    if better:
+        what = min(better, key=better.__getitem__)
+        raise InputError(f"{source}: positions go with velocities only if {what}")
+
+
+def _misread(
+    position: FloatArray, way: FloatArray
+) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
+    """What may be wrong and the mend, what of the way shows it, and what is right then."""
     level, vertical = slice(0, 2), slice(2, 3)
-    other = position[:, [1, 0, 2]]
-    tried = [
-        ("velocity north and east", level, position, by_velocity[:, [1, 0, 2]]),
-        ("velocity down and up", vertical, position, -by_velocity),
-    ]
-    if np.all(np.abs(other[:, 0]) < 0.5 * np.pi):
-        tried.append(("latitude and longitude", level, other, by_velocity))
-    for what, part, here, way in tried:
-        if apart(position, by_velocity, part) > tuning.MIXED_UP**2 * apart(here, way, part):
-            raise InputError(
-                f"{source}: positions go with velocities only if {what} are exchanged: check which "
-                "column is which"
-            )
+    which = "check which column is which"
+    swap, degrees = [1, 0, 2], np.array([np.degrees(1.0), np.degrees(1.0), 1.0])
+    yield f"velocity north and east are exchanged: {which}", level, position, way[:, swap]
+    yield f"velocity down and up are exchanged: {which}", vertical, position, -way
+    yield f"latitude and longitude are exchanged: {which}", level, position[:, swap], way
+    for i, name, axis in ((0, "latitude", "north"), (1, "longitude", "east")):
+        sign = np.where(np.arange(3) == i, -1.0, 1.0)
+        text = f"the sign of {name}, or of velocity {axis}, is turned: check it"
+        yield text, level, position, way * sign
+    yield "latitude and longitude are in rad: give that unit", level, position * degrees, way
+    for unit, factor in _SPEEDS.items():
+        yield f"velocities are in {unit}: convert them to m/s", level, position, way * factor

@@ -119,8 +119,9 @@ def read_imu_log(
             f"{record.source}: the mean specific force is {force:.4g} m/s^2, far from gravity: "
             "check the unit of the accelerometers, and that gravity is not subtracted"
         )
+    held = _held(record, clock)
     imu = record.imu(clock.dt)
-    notices = (*clock.notices, *filled)
+    notices = (*clock.notices, *filled, *held)
     if mean[2] > 0.0:
         text = "its mean is positive: the axis points up, and roll is near 180 deg"
         # A right-handed triad whose z axis points up has its y axis to the left.
@@ -263,6 +264,38 @@ def _fill(record: _Record) -> tuple[Notice, ...]:
     )
     values = {"count": count, "longest": longest}
     return (Notice("samples-filled", "warning", "", text, values),)
+
+
+def _held(record: _Record, clock: _Clock) -> tuple[Notice, ...]:
+    """Channels that have one value for long."""
+    notices = []
+    for name in AXES:
+        first, count = _longest_run(record.column(name))
+        length = count * clock.dt
+        if length <= tuning.LONGEST_HELD or count == 1:
+            continue
+        start = clock.start + (first + 1) * clock.dt  # an increment ends at its stamp
+        text = f"one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck there"
+        values = {"start": start, "length": length}
+        action = "leave that part of the log out, or check what is in the column"
+        notices.append(Notice("stuck", "warning", name, text, values, action))
+    return tuple(notices)
+
+
+def _longest_run(samples: FloatArray) -> tuple[int, int]:
+    """First sample, and number, of most equal values in a row."""
+    first, most, begin, last = 0, 0, 0, np.nan
+    for part in windows(samples.size):
+        own = samples[part]
+        changes = part.start + np.flatnonzero(np.diff(own, prepend=last) != 0.0)
+        starts = np.concatenate([[begin], changes])
+        lengths = np.diff(np.append(starts, part.stop))
+        longest = int(np.argmax(lengths))
+        if lengths[longest] > most:
+            first, most = int(starts[longest]), int(lengths[longest])
+        begin, last = int(starts[-1]), own[-1]
+        release(samples)
+    return first, most
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,36 @@ def test_two_steps_of_a_clock_that_goes_back():
         within(fault, "time offset", -0.4)
 
 
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda imu: replace(imu, rotation=imu.rotation / np.degrees(1.0)),
+        lambda imu: replace(imu, velocity=held(imu.velocity, 0, 60.0, imu.dt)),
+    ],
+    ids=["deg/s for rad/s", "an axis that is stuck"],
+)
+def test_noise_that_no_sensor_has_explains_nothing(spoil):
+    """White noise of the gyros 200 to 600 times the model's was said to explain all."""
+    log, _ = emulated_log(5, duration=DURATION, rate=10.0)
+    navigated = Navigated.of(replace(log, imu=spoil(log.imu)))
+    assert not navigated.faults.explained
+    assert navigated.verdict.code == "lost"
+
+
+def held(samples, axis, start, dt):
+    """Samples of which one axis keeps its value from a time on."""
+    first, result = round(start / dt), samples.copy()
+    result[first:, axis] = result[first, axis]
+    return result
+
+
+def test_outliers_are_dated_on_the_clock_of_the_files():
+    log, _ = emulated_log(208, duration=DURATION, rate=10.0, faults=("one far",))
+    (fault,) = Navigated.of(replace(log, start=1e5)).fault_notices
+    assert fault.code == "outliers"
+    assert 1e5 < fault.values["time"] < 1e5 + DURATION
+
+
 def test_a_filter_that_diverges_under_every_sign_shows_none():
     """A fix 500 m off, without velocities: this ended in an error."""
     navigated = found(7105, "one far", vehicle="loiter", velocity=True)
@@ -360,7 +390,7 @@ def test_the_fix_that_a_filter_starts_from_may_be_an_outlier():
         replace(log, aiding=replace(log.aiding, fixes=(moved, *log.aiding.fixes[1:])))
     )
     (fault,) = navigated.fault_notices
-    assert (fault.code, fault.values["count"], fault.values["time"]) == ("outliers", 2.0, 0.0)
+    assert (fault.code, fault.values["count"], fault.values["time"]) == ("outliers", 2.0, start)
     assert navigated.faults.explained
 
 

@@ -78,6 +78,42 @@ def test_columns_that_are_exchanged(tmp_path: Path, column: str, what: str, outl
         assert len(read_fixes(path).fixes) == 2
 
 
+def drive(seconds: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (deg, deg, m) and velocities of a drive with turns, with noise."""
+    rng = np.random.default_rng(6)
+    time = np.arange(float(seconds))
+    velocity = np.stack([12.0 * np.cos(time / 40.0), 9.0 * np.sin(time / 15.0), 0.0 * time], axis=1)
+    gone = np.cumsum(velocity, axis=0) + rng.standard_normal((seconds, 3))
+    position = [46.0 + gone[:, 0] / 111e3, 7.0 + gone[:, 1] / 77e3, 400.0 - gone[:, 2]]
+    return np.stack(position, axis=1), velocity + 0.1 * rng.standard_normal((seconds, 3))
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "what"),
+    [
+        ((1.0, 1.0, 1.0), 1.0, ""),
+        ((1.0, -1.0, 1.0), 1.0, "the sign of longitude"),
+        ((-1.0, 1.0, 1.0), 1.0, "the sign of latitude"),
+        ((np.pi / 180.0, np.pi / 180.0, 1.0), 1.0, "latitude and longitude are in rad"),
+        ((1.0, 1.0, 1.0), 3.6, "velocities are in km/h"),
+        ((1.0, 1.0, 1.0), 3600.0 / 1852.0, "velocities are in knots"),
+        ((1.0, 1.0, 1.0), 1000.0, "velocities are in mm/s"),
+    ],
+)
+def test_units_and_signs_that_do_not_go_together(
+    tmp_path: Path, position: tuple[float, ...], velocity: float, what: str
+) -> None:
+    """In two minutes; the fixes were said to be noisy, or the heading wrong."""
+    places, speeds = drive(120)
+    rows = np.column_stack([np.arange(120.0), places * position, speeds * velocity])
+    path = write(tmp_path, rows.tolist(), f"{HEAD},vn,ve,vd")
+    if what:
+        with pytest.raises(InputError, match=f"only if {what}"):
+            read_fixes(path)
+    else:
+        assert len(read_fixes(path).fixes) == 2
+
+
 @pytest.mark.parametrize(
     ("header", "count"),
     [
@@ -191,3 +227,18 @@ def test_bad_imu_files(tmp_path: Path) -> None:
     upward[:, 6] *= -1.0
     notices = read_imu_log(write_imu(tmp_path, upward)).notices
     assert ("axis-up", "accel_z") in {(notice.code, notice.where) for notice in notices}
+
+
+@pytest.mark.parametrize("first", [0, 100])
+def test_a_channel_that_is_stuck(tmp_path: Path, first: int) -> None:
+    """The noise of another sensor was blamed for it."""
+    rng = np.random.default_rng(3)
+    rows = np.column_stack([0.02 * np.arange(500), 0.01 * rng.standard_normal((500, 6))])
+    rows[:, 6] -= 9.8
+    assert "stuck" not in {each.code for each in read_imu_log(write_imu(tmp_path, rows)).notices}
+    rows[first : first + 300, 2] = rows[first, 2]
+    notices = read_imu_log(write_imu(tmp_path, rows)).notices
+    (stuck,) = (each for each in notices if each.code == "stuck")
+    assert stuck.where == "gyro_y"
+    assert stuck.values["length"] == pytest.approx(6.0)
+    assert stuck.values["start"] == pytest.approx(0.02 * first)
