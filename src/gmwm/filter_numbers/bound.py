@@ -181,24 +181,21 @@ def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[No
         found = predicted(axis, axis.chain, model, sd, times)
         return [(e.nees, e.time, f"after {e.time:g} s without aiding") for e in found]
 
-    try:
-        worst = max(unaided(late))
-        if worst[0] <= tuning.OPTIMISTIC:
-            relative, usual = axis.between(horizon), axis.chain
-            (pose, *_), fixed = (
-                chain.errors(
-                    axis.model, model, axis.dt, [horizon],
-                    true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
-                ).nees()
-                for chain in (relative, usual)
-            )  # fmt: skip
-            worst = max(
-                (float(pose), horizon, f"between keyframes every {horizon:g} s"),
-                (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
-                *unaided(early),
-            )
-    except InputError:  # nothing is predicted
-        return ()
+    worst = max(unaided(late))
+    if worst[0] <= tuning.OPTIMISTIC:  # not NaN, where nothing is predicted
+        relative, usual = axis.between(horizon), axis.chain
+        (pose, *_), fixed = (
+            chain.errors(
+                axis.model, model, axis.dt, [horizon],
+                true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
+            ).nees()
+            for chain in (relative, usual)
+        )  # fmt: skip
+        worst = max(
+            (float(pose), horizon, f"between keyframes every {horizon:g} s"),
+            (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
+            *unaided(early),
+        )
     nees, time, when = worst
     if not nees > tuning.OPTIMISTIC:
         return ()
@@ -226,9 +223,11 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
 def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
     """What N is for beside white noise: the terms where the model needs N, not a slow term."""
     own, N2 = axis.model.white_density(), model.white_density()
-    if tuning.ABOVE**2 * own >= N2:
-        return ()
     f = target.frequencies(tuning.POINTS)
+    # White noise behind a low-pass is that of the sensor, too, and nothing to be explained.
+    filtered = [term for term in axis.model.terms if term.is_band_limited]
+    if tuning.ABOVE**2 * (own + sum(term.psd(f[:1], axis.dt)[0] for term in filtered)) >= N2:
+        return ()
     need, believed = target.psd(f), model.psd(f, axis.dt)
     alike = np.minimum(need / believed, believed / need)
     at = int(np.argmax(alike * N2 / believed))

@@ -13,6 +13,7 @@ from gmwm import (
     FilterNumbers,
     GaussMarkov,
     InputError,
+    LowPassNoise,
     Model,
     Process,
     QuantizationNoise,
@@ -356,6 +357,13 @@ def test_white_noise_says_what_else_it_stands_for(solve):
     alone = solve({"accel_x": Model((fast, GaussMarkov(1e-4, 3000.0)))}, "N+K", **given)
     (notice,) = (n for n in alone.notices if n.code == "more-than-white-noise")
     assert "the model has no white noise: N has to cover Gauss-Markov 1" in str(notice)
+
+
+def test_white_noise_behind_a_low_pass_is_nothing_to_be_explained():
+    """It was said that the model had no white noise."""
+    truth = LowPassNoise(2e-4, 20.0, 2.0, 0.7) + SLOW
+    assert pytest.approx(2e-4, rel=0.05) == (found := gmwm.bound(truth, "N+K", 60.0)).N
+    assert "more-than-white-noise" not in {notice.code for notice in found.notices}
 
 
 def test_an_axis_does_not_explain_what_another_needs():

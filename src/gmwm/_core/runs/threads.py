@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from threading import Lock
 from typing import Any
 
@@ -36,8 +37,7 @@ def one_blas_thread() -> Iterator[None]:
 @cache
 def _controller() -> Any:
     """Of all that is loaded; looking for it takes milliseconds."""
-    import numpy.linalg  # noqa: F401
-    import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 
+    import_module("scipy.linalg")  # has a BLAS of its own, found only once it is loaded
     return ThreadpoolController()
