@@ -143,6 +143,18 @@ LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
 """s, of a constant error of the fixes' stamps that is looked for: leap seconds are more, and leave
 no fix near; and of the fixes left out at both ends beside it."""
 
+FAR_BETTER = 0.5
+"""Mean square of the innovations, of that with the stamps as they are, below which another offset
+is worth a closer look."""
+
+LEAP_SECONDS = 18.0
+"""s, by which GPS time is ahead of UTC since 2017."""
+
+FARTHEST_OFFSET, FAR_STEP, FAR_NEAR = 60.0, 2.0, 0.25
+"""s, of larger errors of the stamps, which are looked for where the filter is lost: the farthest
+(TAI is ahead of UTC by 37 s), the steps in which all are tried (a vehicle does not turn much
+faster), and the last step, which leaves an error that the innovations show in proportion."""
+
 STEP_PARTS = 16
 """Parts of a log between which a step of a clock is looked for before the best is refined."""
 

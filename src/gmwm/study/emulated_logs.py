@@ -31,12 +31,13 @@ VEHICLES: dict[str, Callable[..., Trajectory]] = {
 }
 
 FAULTS = (
-    "coloured", "stamps", "clock step", "lever arm", "off-grid", "one far", "outliers", "mounting",
-    "clock drift", "gyro scale", "accel scale",
+    "coloured", "stamps", "leap seconds", "clock step", "lever arm", "off-grid", "one far",
+    "outliers", "mounting", "clock drift", "gyro scale", "accel scale",
 )  # fmt: skip
-"""Coloured GNSS; stamps 0.2 s late; stamps a second late from the middle on; lever arm left out;
-fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU turned by 90 deg about its
-vertical axis; the fixes' clock 500 ppm fast; 3 % too much of all gyros, or accelerometers."""
+"""Coloured GNSS; stamps 0.2 s late; stamps in GPS time, 18 s late; stamps a second late from the
+middle on; lever arm left out; fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU
+turned by 90 deg about its vertical axis; the fixes' clock 500 ppm fast; 3 % too much of all gyros,
+or accelerometers."""
 
 LEVER_ARM = (1.0, 0.3, -1.0)
 _DEGREE_HOUR, _MICRO_G = np.radians(1.0 / 3600.0), 9.80665e-6
@@ -102,7 +103,7 @@ def emulated_log(
         coloured_tau=60.0, imu=_part(ideal, round(late / fine.dt)),
     ).noisy(rng)  # fmt: skip
     aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
-    by = late + (0.2 if "stamps" in faults else 0.0)
+    by = late + (0.2 if "stamps" in faults else 0.0) + (18.0 if "leap seconds" in faults else 0.0)
     step = 1.0 if "clock step" in faults else 0.0
     drift = 5e-4 if "clock drift" in faults else 0.0
     fixes = tuple(_later(each, by, drift, step, duration) for each in aiding.fixes)

@@ -19,9 +19,8 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured, MeasuredSpec
 from gmwm.ins.field.outcome import PARTS, Outcome, Paired, by_part, paired, true_squares
-from gmwm.ins.field.replay import Replay
+from gmwm.ins.field.replay import Replay, alignment_of
 from gmwm.ins.field.smoother import Smoothed, smooth
-from gmwm.ins.field.start import align
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
@@ -300,11 +299,7 @@ def _replay(measured: Measured, models: SensorModels) -> Replay:
     usual = measured.sensors.bias_sd
     bias = {axis: each or usual[axis] for axis, each in models.bias_sd.items()}
     own = replace(measured, sensors=replace(models, bias_sd=bias))
-    alignment = align(
-        own.imu, own.aiding, own.sensors, own.heading, own.heading_sd, own.attitude,
-        own.attitude_sd,
-    )  # fmt: skip
-    return Replay.of(own, alignment)
+    return Replay.of(own, alignment_of(own))
 
 
 def _length(outages: str | float) -> float:

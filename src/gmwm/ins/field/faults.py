@@ -22,8 +22,10 @@ from gmwm.ins.field.explanations import (
     rarer_errors,
     wrong_signs,
 )
+from gmwm.ins.field.far_stamps import FarStamps
+from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.noises import coloured, fix_noise, outliers, sensor_noise
-from gmwm.ins.field.replay import Replay
+from gmwm.ins.field.replay import Replay, alignment_of
 from gmwm.ins.geometry import STANDARD_GRAVITY
 
 _CONSTANT = frozenset({"time-offset", "clock-drift", "lever-arm", "heading"})
@@ -48,13 +50,28 @@ class Faults:
     resolution: dict[str, float]
 
     @classmethod
-    def of(cls, whole: Replay) -> Faults:
+    def of(cls, whole: Replay, measured: Measured | None = None) -> Faults:
         """Look for faults.
+
+        measured: The log as it was, to be aligned anew where the filter is lost.
+        """
+        near = cls._near(whole)
+        if measured is None or not (whole.diagnosed().is_lost or _is_at_its_end(near)):
+            return near
+        far = FarStamps.of(measured)
+        if far is None:
+            return near
+        later = far.start - alignment_of(measured).epoch * measured.imu.dt
+        return min(near, cls._near(far.replay)._beside(far.offset, later), key=cls._effort)
+
+    @classmethod
+    def _near(cls, whole: Replay) -> Faults:
+        """Faults that leave the filter near enough to be seen in its innovations.
 
         One after the other, the explanation is taken that makes the fixes most probable, as long as
         it is more than chance would give.
         """
-        base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
+        base = whole.diagnosed()
         here, found = base, list[Explanation]()
         alternatives: tuple[str, ...] = ()
         resolution: dict[str, float] = {}
@@ -87,6 +104,31 @@ class Faults:
         explained = not contradicted(here) and not any(map(_is_beyond_noise, found))
         return cls(tuple(found), alternatives, explained, here, resolution)
 
+    def _effort(self) -> tuple[bool, int, float]:
+        """The less, the better this explains a log, also if others leave other fixes out."""
+        return not self.explained, len(self.found), -self.replay.log_likelihood_of_one
+
+    def _beside(self, offset: float, later: float) -> Faults:
+        """What was found with stamps that are earlier by an offset, with that as the first fault.
+
+        later: By how much the filter started later, s.
+        """
+        near = [each for each in self.found if each.code == "time-offset"]
+        by = offset + sum(each.values["time offset"] for each in near)
+        error = near[0].errors if near else {"time offset": self.resolution["time offset"]}
+        stamps = Explanation(
+            "time-offset", "", lambda log: log.later(lambda time: np.full_like(time, -by)),
+            self.replay, np.inf, cost(1), {"time offset": by}, error,
+        )  # fmt: skip
+        others = [
+            replace(each, values=each.values | {
+                name: each.values[name] + later for name in _TIMES & each.values.keys()
+            })
+            for each in self.found if each not in near
+        ]  # fmt: skip
+        alternatives = () if near else self.alternatives
+        return replace(self, found=(stamps, *others), alternatives=alternatives)
+
 
 def contradicted(replay: Replay, level: float = LEVEL) -> bool:
     """Whether the innovations have another size than expected, or depend on those before."""
@@ -103,8 +145,7 @@ def _candidates(here: Replay, constants: list[Candidate], known: frozenset[str])
     if cleaned is not None:
         found.append(cleaned)
     if contradicted(here, tuning.SUSPECTED) or any(each.gain > cost(1) for each in found):
-        sizes = [here.test(kind).nis.value for kind in here.kinds()]
-        if not np.isfinite(here.log_likelihood) or max(sizes) > tuning.LOST:
+        if here.is_lost:
             found += [far_heading(here), *wrong_signs(here)]
         found += rarer_errors(here)
         found += [each for each in (clock_step(here), coloured(here)) if each is not None]
@@ -147,6 +188,12 @@ def _cleaned_again(
     (again,) = cleaned.refined()
     place = codes.index("outliers")
     return [*others[:place], again, *others[place:]], again.replay
+
+
+def _is_at_its_end(found: Faults) -> bool:
+    """Whether stamps are off by the most that is looked for near."""
+    return any(abs(each.values.get("time offset", 0.0)) >= tuning.LARGEST_OFFSET
+               for each in found.found)  # fmt: skip
 
 
 def _is_beyond_noise(fault: Explanation) -> bool:
@@ -230,6 +277,8 @@ def _time(fault: Explanation) -> tuple[str, str]:
         f"the fixes are stamped {abs(offset):.3g} s too {'late' if offset > 0.0 else 'early'} "
         f"(standard error {fault.errors['time offset']:.1g} s)"
     )
+    if abs(abs(offset) - tuning.LEAP_SECONDS) < tuning.FAR_NEAR:
+        text += f", as GPS time is ahead of UTC by {tuning.LEAP_SECONDS:g} s"
     return text, "subtract it from their times" if offset > 0.0 else "add it to their times"
 
 

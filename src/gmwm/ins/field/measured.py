@@ -208,7 +208,7 @@ def _scales(log: ImuLog, found: FixLog) -> tuple[Notice, ...]:
         return ()
     text = (
         f"both have dates, those of the fixes in {scale}: if the IMU's are in UTC, GPS time is "
-        "ahead of them by the leap seconds, 18 s since 2017"
+        f"ahead of them by the leap seconds, {tuning.LEAP_SECONDS:g} s since 2017"
     )
     values = {"scale": scale}
     return (Notice("time-scales", "warning", "", text, values, "shift the fixes by as much"),)

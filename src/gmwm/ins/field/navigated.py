@@ -20,8 +20,8 @@ from gmwm.ins import tuning
 from gmwm.ins.field.explanations import LEVEL
 from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
-from gmwm.ins.field.replay import Replay, innovation_sizes
-from gmwm.ins.field.start import Alignment, align
+from gmwm.ins.field.replay import Replay, alignment_of, innovation_sizes
+from gmwm.ins.field.start import Alignment
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.montecarlo import InnovationTest
@@ -88,10 +88,7 @@ class Navigated:
         InputError
             If the initial state cannot be known, or no fix follows it.
         """
-        alignment = align(
-            measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
-            measured.attitude, measured.attitude_sd,
-        )  # fmt: skip
+        alignment = alignment_of(measured)
         replay = Replay.of(measured, alignment)
         imu = replay.imu
         positions = replay.aiding.of("position")
@@ -120,7 +117,7 @@ class Navigated:
         """What explains the innovations better than that all is right; tens of runs of the filter
         where they contradict it, five where they do not.
         """
-        return Faults.of(Replay.of(self.measured, self.alignment))
+        return Faults.of(Replay.of(self.measured, self.alignment), self.measured)
 
     @property
     def fault_notices(self) -> tuple[Notice, ...]:

@@ -13,7 +13,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured
-from gmwm.ins.field.start import Alignment, mean_sd, started
+from gmwm.ins.field.start import Alignment, align, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
@@ -93,6 +93,17 @@ class Replay:
             return -np.inf
         return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(self.innovations.sd)))
 
+    @property
+    def log_likelihood_of_one(self) -> float:
+        """By the mean of all fixes."""
+        return self.log_likelihood / max(self.standard.shape[0], 1)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether errors may be beyond what the innovations show in proportion."""
+        sizes = [self.test(kind).nis.value for kind in self.kinds()]
+        return not np.isfinite(self.log_likelihood) or max(sizes) > tuning.LOST
+
     def kinds(self) -> tuple[str, ...]:
         """Kinds of fixes that there are, whose innovations are judged."""
         return tuple(dict.fromkeys(
@@ -106,10 +117,13 @@ class Replay:
     # -- other assumptions ------------------------------------------------------------------------
 
     def later(self, shift: Shift) -> Replay:
-        """Fixes with later stamps, and with them the one that made the initial state."""
+        """Fixes with later stamps, and with them the one that made the initial state.
+
+        What would leave the record stays at its end: only filters of the same fixes are compared.
+        """
         fixes = []
         for each in self.aiding.fixes:
-            time = each.time + shift(each.time)
+            time = np.clip(each.time + shift(each.time), 0.0, self.imu.n * self.imu.dt)
             order = np.argsort(time, kind="stable")
             value, sd = each.value[order], each.sd[order]
             fixes.append(replace(each, time=time[order], value=value, sd=sd))
@@ -252,6 +266,10 @@ class Replay:
         )
         return replace(self, aiding=replace(self.aiding, fixes=fixes))
 
+    def diagnosed(self) -> Replay:
+        """The part in which faults are looked for."""
+        return self.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
+
     def within(self, margin: float, longest: float) -> Replay:
         """Without fixes near the ends and what comes after ``longest`` (s); no fix is rejected."""
         n = min(self.imu.n, round(longest / self.imu.dt))
@@ -261,6 +279,14 @@ class Replay:
             each.part((each.time > margin) & (each.time < end)) for each in self.aiding.fixes
         )
         return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes, gate=None))
+
+
+def alignment_of(measured: Measured) -> Alignment:
+    """Where a filter of real data starts; `align` with all that is known."""
+    return align(
+        measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
+        measured.attitude, measured.attitude_sd,
+    )  # fmt: skip
 
 
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:

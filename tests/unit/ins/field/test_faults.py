@@ -7,11 +7,12 @@ import pytest
 
 from gmwm.ins import Fixes, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.field.explanations import LEVEL, TESTS, Explanation
+from gmwm.ins.field.far_stamps import FarStamps
 from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay
 from gmwm.ins.filter import InitialSd
-from gmwm.ins.tuning import CONTRADICTED
+from gmwm.ins.tuning import CONTRADICTED, FAR_NEAR
 from gmwm.study.emulated_logs import LEVER_ARM, emulated_log, sensors
 
 DURATION = 160.0
@@ -43,6 +44,41 @@ def test_stamps_that_are_late():
     assert within(fault, "time offset", 0.2) < 0.02
     assert navigated.verdict.values["explained"]
     assert not navigated.faults.alternatives
+
+
+def test_leap_seconds_and_an_outlier():
+    """The filter of such stamps is lost, and is aligned anew; other times stay the log's."""
+    navigated = found(201, "leap seconds", "one far")
+    assert navigated.faults.explained
+    assert navigated.verdict.code == "time-offset"
+    assert "GPS time" in navigated.verdict.text
+    stamps, outlier = navigated.fault_notices
+    assert within(stamps, "time offset", 18.0) < 0.02
+    assert outlier.code == "outliers"
+    times = navigated.measured.aiding.of("position").time
+    truth = times[times.size // 2] - 18.0  # on the IMU's clock
+    assert outlier.values["time"] == pytest.approx(truth, abs=FAR_NEAR)
+
+
+@pytest.mark.parametrize("offset", [1.7, -2.2, 7.3])
+def test_stamps_that_are_off_by_seconds_in_circles(offset):
+    """Nothing near tells the way: a lever arm of 40 m, or a clock that drifts, was named."""
+    log, _ = emulated_log(212, "loiter", duration=DURATION, rate=10.0)
+    fixes = tuple(
+        replace(each, time=each.time + offset).part(
+            (each.time > -offset) & (each.time < DURATION - offset)
+        )
+        for each in log.aiding.fixes
+    )
+    late = replace(log, aiding=replace(log.aiding, fixes=fixes))
+    (fault,) = Navigated.of(late).fault_notices
+    assert fault.code == "time-offset"
+    assert within(fault, "time offset", offset) < 0.3
+
+
+def test_right_stamps_have_no_other_offset():
+    log, _ = emulated_log(1, duration=60.0, rate=5.0)
+    assert FarStamps.of(log) is None
 
 
 def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
