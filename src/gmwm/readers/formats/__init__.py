@@ -9,3 +9,4 @@ from gmwm.readers.formats.joining import (
     with_temperature as with_temperature,
 )
 from gmwm.readers.formats.kinds import is_text as is_text, open_tables as open_tables
+from gmwm.readers.formats.topics import Wanted as Wanted
