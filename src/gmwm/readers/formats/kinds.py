@@ -11,13 +11,10 @@ from typing import Any
 from gmwm._core.files import existing_file
 from gmwm.errors import InputError
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.formats.ardupilot import open_ardupilot
 from gmwm.readers.formats.frame import is_frame, open_feather, open_frame, open_parquet
 from gmwm.readers.formats.hdf5 import open_hdf5, open_mat
+from gmwm.readers.formats.messages import Wanted, open_ardupilot, open_bag, open_ulog
 from gmwm.readers.formats.numpy_file import open_numpy
-from gmwm.readers.formats.rosbag import open_bag
-from gmwm.readers.formats.topics import Wanted
-from gmwm.readers.formats.ulog import open_ulog
 from gmwm.readers.table import Table
 
 CLOCKS = ("header", "log")

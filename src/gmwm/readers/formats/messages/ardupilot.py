@@ -23,9 +23,9 @@ from gmwm.readers.formats.arrays import (
     array_of,
     damage_named,
 )
-from gmwm.readers.formats.dataflash import Messages, messages
-from gmwm.readers.formats.parts import MessageTable
-from gmwm.readers.formats.topics import Topic, Wanted, choose_first, left_out
+from gmwm.readers.formats.messages.dataflash import Messages, messages
+from gmwm.readers.formats.messages.parts import MessageTable
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
 from gmwm.readers.table import Table
 

@@ -23,8 +23,8 @@ from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers.formats.arrays import damage_named
 from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.parts import MessageTable
-from gmwm.readers.formats.ros_messages import (
+from gmwm.readers.formats.messages.parts import MessageTable
+from gmwm.readers.formats.messages.ros_messages import (
     CDR,
     COVARIANCE_OF,
     IMU,
@@ -34,7 +34,7 @@ from gmwm.readers.formats.ros_messages import (
     Serialization,
     decode,
 )
-from gmwm.readers.formats.topics import Topic, Wanted, choose
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds

@@ -23,7 +23,7 @@ from flight_logs import (
     write_ulog,
 )
 from gmwm.readers import read_blocks
-from gmwm.readers.formats import dataflash
+from gmwm.readers.formats.messages import dataflash
 from gmwm.readers.names import CANONICAL
 
 

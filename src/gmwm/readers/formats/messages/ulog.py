@@ -21,7 +21,7 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
 from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.topics import Topic, Wanted, choose_first, left_out
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
 
 _COMBINED = "sensor_combined"
