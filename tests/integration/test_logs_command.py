@@ -36,7 +36,10 @@ def test_accelerometer_alone(run, no_pages, tmp_path):
     accel = X.copy()
     accel[:, :3] = 0.0
     write1(tmp_path / "a.bag", {"/accel": imu_topic(ROS1, accel)})
-    fixed = ("--model", "N", "--leave", "all", "-q")
+    code, _, told = run("health", "a.bag")
+    assert code == 2
+    assert told.count("\n") == 1 and "no angular rates" in told and "--channels accel" in told
+    fixed = ("--channels", "accel", "--model", "N", "--leave", "all", "-q")
     assert run("calibrate", "a.bag", *fixed)[0] == 0
     code, _, told = run("calibrate", "a.bag", "--export", "kalibr", *fixed)
     assert code == 2

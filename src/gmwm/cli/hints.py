@@ -29,6 +29,7 @@ HINTS = {
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
+    "sensor-absent": "record them too, or calibrate the rest alone, --channels {sensor}",
     "time-unit": "--rate {rate:.6g}, or name the column {column}",
     "topic": "--topic NAME",
     "topics-apart": "--topic NAME or --clock log",

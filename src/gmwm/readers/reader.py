@@ -33,6 +33,7 @@ from gmwm.readers.clock import (
 from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
+    Wanted,
     has_sensors,
     joined,
     open_tables,
@@ -74,7 +75,8 @@ def read(
         ``{"gyro": "deg/s", "accel": "g"}``. Not needed where the header has them.
     channels : mapping of str to (str or int), or collection of str, optional
         Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``; or
-        names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read.
+        names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read;
+        a bag or a flight log without one of the two sensors is refused unless they are given.
         A name that begins with ``gyro`` or ``accel`` states what the column measures; for any other
         its unit does (``"temp": "T1"`` in degC or K is auxiliary). By default columns are known by
         their names; without names, six are gyro and accelerometer x, y, z, seven have time before
@@ -118,7 +120,7 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    tables = tables_of(path, layout, topic, clock, format)
+    tables = tables_of(path, layout, topic, clock, format, channels)
     return _read(tables, Given(rate, units or {}, channels, time))
 
 
@@ -128,11 +130,12 @@ def tables_of(
     topic: str | Sequence[str],
     clock: str,
     format: str | None,
+    channels: object,
 ) -> Sequence[Table]:
     """What `read` opens; the arguments are its own."""
     if layout is None:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
-        return open_tables(path, topics, clock, format)
+        return open_tables(path, Wanted(topics, clock, channels is not None), format)
     if format is not None:
         raise InputError("layout is of a binary file without a header: leave out format")
     return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]

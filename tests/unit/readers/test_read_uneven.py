@@ -135,6 +135,22 @@ def test_it_is_reported(recorded, kind, code, key):
     assert notice.values[key] == expected > 0
 
 
+@pytest.mark.parametrize("by", [1.6e9, -0.3])
+@pytest.mark.parametrize("row", [2000, 2001, 2002, 2003])
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_a_clock_that_is_set_in_a_burst_invents_no_sample(recorded, by, row, loss):
+    clock = Simulated(3, 200.0)
+    clock.bursts(4)
+    clock.stamps = clock.stamps + by * (clock.number >= row)
+    clock.lose(loss)
+    found, truth = recorded(clock)
+    assert found.n == N
+    if not loss:  # which row of a burst was lost does not show
+        np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    (notice,) = [each for each in found.notices if each.code == "clock-set"]
+    assert notice.values["largest"] == pytest.approx(by, abs=0.021)
+
+
 def test_by_how_much_a_clock_was_set(recorded):
     found, _ = recorded(made("backward steps", 7, 200.0))
     (notice,) = [each for each in found.notices if each.code == "clock-set"]

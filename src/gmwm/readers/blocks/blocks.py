@@ -75,7 +75,7 @@ def read_blocks(
         missing between two of them are NaN at the beginning of the second.
     Raises InputError if the file cannot be used, or not a block at a time.
     """
-    opened = tables_of(path, layout, topic, clock, format)
+    opened = tables_of(path, layout, topic, clock, format, channels)
     tables = [table for table in opened if has_sensors(table)] or opened
     if not all(hasattr(table, "segments") for table in tables):
         raise InputError(

@@ -65,7 +65,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
     x = (stamps - stamps[0]) / rough
     if burst > 1:
         # The stamp of a burst is that of its last row.
-        x = x - _rows_that_follow(stamps, same)
+        x = x - _rows_that_follow(x, same, burst, extent)
     n = x.size
     costs = _costs(stamps, same)
     shorter = _likeliest(x, same, costs)
@@ -153,10 +153,18 @@ def _likeliest(x: FloatArray, same: BoolArray, costs: FloatArray) -> float:
     return min(tuning.TRIED_INTERVALS, key=cost)
 
 
-def _rows_that_follow(stamps: FloatArray, same: BoolArray) -> IntArray:
-    """Rows of the same stamp after each row, those that repeat it not counted."""
+def _rows_that_follow(x: FloatArray, same: BoolArray, burst: int, extent: int) -> IntArray:
+    """Rows of its burst after each row, those that repeat it not counted.
+
+    x: (n,), stamps, in sampling intervals.
+    """
     fresh = np.cumsum(~same)
-    last = np.append(np.flatnonzero(np.diff(stamps) != 0.0), stamps.size - 1)
+    last = np.flatnonzero(np.diff(x) != 0.0)
+    # Where the clock was set in the midst of a burst, two stamps share the rows of one.
+    ahead = x[last + 1] - x[last]
+    rows = np.diff(fresh[np.append(last, x.size - 1)], prepend=0)
+    is_cut = ((ahead < 0.0) | (ahead > extent)) & (rows[:-1] + rows[1:] <= burst)
+    last = np.append(last[~is_cut], x.size - 1)
     ends = np.repeat(fresh[last], np.diff(last, prepend=-1))
     return np.asarray(ends - fresh)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +11,10 @@ from typing import Any
 from gmwm._core.files import existing_file
 from gmwm.errors import InputError
 from gmwm.readers.csv_table import CsvTable
-from gmwm.readers.formats.ardupilot import open_ardupilot
 from gmwm.readers.formats.frame import is_frame, open_feather, open_frame, open_parquet
 from gmwm.readers.formats.hdf5 import open_hdf5, open_mat
+from gmwm.readers.formats.messages import Wanted, open_ardupilot, open_bag, open_ulog
 from gmwm.readers.formats.numpy_file import open_numpy
-from gmwm.readers.formats.rosbag import open_bag
-from gmwm.readers.formats.ulog import open_ulog
 from gmwm.readers.table import Table
 
 CLOCKS = ("header", "log")
@@ -30,7 +28,7 @@ class Kind:
     """A kind of file.
 
     magic: What its files begin with, if they begin alike.
-    open: Path, topics, clock -> tables.
+    open: Gives its tables.
     has_topics: Whether there may be several series of messages to choose from.
     has_clocks: Whether messages have the stamp of their header and that of their recording.
     """
@@ -38,13 +36,13 @@ class Kind:
     name: str
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
-    open: Callable[[Path, Sequence[str], str], tuple[Table, ...]]
+    open: Callable[[Path, Wanted], tuple[Table, ...]]
     has_topics: bool = False
     has_clocks: bool = False
 
 
 def _alone(open_table: Callable[[Path], Table]) -> Callable[..., tuple[Table, ...]]:
-    return lambda path, topics, clock: (open_table(path),)
+    return lambda path, wanted: (open_table(path),)
 
 
 _TEXT = Kind("text", (), (), _alone(CsvTable.open))
@@ -72,19 +70,16 @@ NAMES = (*(kind.name for kind in KINDS), _TEXT.name)
 """Of kinds of files, as ``format`` of `gmwm.read` has them."""
 
 
-def open_tables(
-    data: Any, topics: Sequence[str] = (), clock: str = "header", form: str | None = None
-) -> tuple[Table, ...]:
+def open_tables(data: Any, wanted: Wanted, form: str | None = None) -> tuple[Table, ...]:
     """Open a file or a table in memory, whatever it is.
 
-    topics: Those to read, of a log that has several.
-    clock: {"header", "log"}, which stamps of messages count.
+    wanted: Of a log.
     form: One of `NAMES`, in place of what its first bytes and its name show.
     Returns: several if its sensors have rates of their own.
     Raises InputError if it cannot be used.
     """
-    if clock not in CLOCKS:
-        raise InputError(f"clock = {clock!r}: give one of {', '.join(CLOCKS)}")
+    if wanted.clock not in CLOCKS:
+        raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")
     if form is not None and form not in NAMES:
         raise InputError(f"format = {form!r}: give one of {', '.join(NAMES)}")
     path = None if is_frame(data) else Path(data)
@@ -92,13 +87,13 @@ def open_tables(
         raise InputError("a table in memory has no format: format is for files, leave it out")
     kind = _TEXT if path is None else _kind(path, form)
     source = path.name if path else "a table"
-    if topics and not kind.has_topics:
+    if wanted.topics and not kind.has_topics:
         raise InputError(f"{source} has no topics: topic is for bags and flight logs, leave it out")
-    if clock != CLOCKS[0] and not kind.has_clocks:
+    if wanted.clock != CLOCKS[0] and not kind.has_clocks:
         raise InputError(f"{source} has one clock: clock is for bags, leave it out")
     if path is None:
         return (open_frame(data),)
-    return kind.open(path, topics, clock)
+    return kind.open(path, wanted)
 
 
 def is_text(path: Path) -> bool:

@@ -6,9 +6,9 @@ from importlib.util import find_spec
 collect_ignore = [
     file
     for file, modules in {
-        "test_read_rosbag.py": ("rosbags",),
+        "messages/test_read_rosbag.py": ("rosbags",),
         "test_read_frames.py": ("rosbags", "h5py", "polars"),
-        "test_read_flight_logs.py": ("rosbags", "pyulog", "pymavlink"),
+        "messages/test_read_flight_logs.py": ("rosbags", "pyulog", "pymavlink"),
     }.items()
     if not all(map(find_spec, modules))
 ]

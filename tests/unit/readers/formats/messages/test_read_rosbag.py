@@ -174,23 +174,37 @@ def test_topics_of_two_rates(d435):
     assert set(only) == {"gyro_x", "gyro_y", "gyro_z", "temperature"}
 
 
+@pytest.mark.parametrize("storage", ["ROS1", "SQLITE3", "MCAP"])
 @pytest.mark.parametrize(
-    ("absent", "word"), [("gyro", "angular rates"), ("accel", "accelerations")]
+    ("absent", "there", "word"),
+    [("gyro", "accel", "angular rates"), ("accel", "gyro", "accelerations")],
 )
-def test_a_bag_of_one_sensor_says_which_is_absent(tmp_path, absent, word):
-    samples = at_rest(400, 3)
+def test_a_bag_of_one_sensor_is_read_by_the_name_of_it_only(tmp_path, storage, absent, there, word):
+    samples = X.copy()
     samples[:, slice(0, 3) if absent == "gyro" else slice(3, 6)] = 0.0
-    path = write2(tmp_path / "one", {"/imu": imu_topic(ROS2, samples, 100.0)}, "MCAP")
-    found = gmwm.read(path)
-    assert not any(name.startswith(absent) for name in found)
-    (notice,) = [each for each in found.notices if each.code == "sensor-absent"]
-    assert f"the bag has no {word}" in notice.text
+    # That another IMU has both sensors does not mend the one that is chosen.
+    whole = {"/whole": imu_topic(ROS1 if storage == "ROS1" else ROS2, X)}
+    for others, options in (({}, {}), (whole, {"topic": "/imu"})):
+        path = tmp_path / f"one{len(others)}.bag"
+        if storage == "ROS1":
+            write1(path, {"/imu": imu_topic(ROS1, samples), **others})
+        else:
+            write2(path, {"/imu": imu_topic(ROS2, samples), **others}, storage)
+        for reading in (gmwm.read, lambda *args, **named: next(read_blocks(*args, **named))):
+            with pytest.raises(
+                gmwm.InputError, match=f"no {word}.* in /imu: .*channels="
+            ) as caught:
+                reading(path, **options)
+            assert caught.value.values == {"sensor": there}
+            found = reading(path, channels=there, **options)
+            assert {name.partition("_")[0] for name in found} == {there}
+            assert not [each for each in found.notices if each.severity != "note"]
 
 
-def test_sensors_of_two_topics_are_there(d435):
-    for options in ({}, {"topic": "/gyro/sample"}, {"channels": "accel"}):
-        found = gmwm.read(d435[0], **options)
-        assert "sensor-absent" not in {each.code for each in found.notices}
+@pytest.mark.parametrize("options", [{}, {"topic": "/gyro/sample"}, {"channels": "accel"}])
+def test_sensors_of_two_topics_are_there(d435, options):
+    found = gmwm.read(d435[0], **options)
+    assert not [each for each in found.notices if each.severity != "note"]
 
 
 def test_one_calibration_of_two_rates(d435):

@@ -23,9 +23,9 @@ from gmwm.readers.formats.arrays import (
     array_of,
     damage_named,
 )
-from gmwm.readers.formats.dataflash import Messages, messages
-from gmwm.readers.formats.parts import MessageTable
-from gmwm.readers.formats.topics import Topic, choose_first, left_out
+from gmwm.readers.formats.messages.dataflash import Messages, messages
+from gmwm.readers.formats.messages.parts import MessageTable
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
 from gmwm.readers.table import Table
 
@@ -49,22 +49,22 @@ class _Series:
     def name(self) -> str:
         return self.kind if self.instance is None else f"{self.kind}[{self.instance}]"
 
+    def fields_of(self, sensor: str) -> list[str]:
+        """Those of its axes."""
+        names = [f"{_SENSORS[sensor][0]}{axis.upper()}" for axis in AXES]
+        return [name for name in names if name in self.fields]
+
     @property
     def columns(self) -> dict[str, str]:
         """Stamps, axes and temperature: column -> field."""
         # The stamp of the sample where there is one: TimeUS is when it was logged.
         found = {_TIME: "SampleUS" if "SampleUS" in self.fields else "TimeUS"}
-        for sensor, (part, unit) in _SENSORS.items():
-            for axis in AXES:
-                if f"{part}{axis.upper()}" in self.fields:
-                    found[f"{sensor}_{axis} [{unit}]"] = f"{part}{axis.upper()}"
+        for sensor, (_, unit) in _SENSORS.items():
+            for field in self.fields_of(sensor):
+                found[f"{sensor}_{field[-1].lower()} [{unit}]"] = field
         if "T" in self.fields:
             found["temperature [degC]"] = "T"
         return found
-
-    @property
-    def sensors(self) -> frozenset[str]:
-        return frozenset(s for s, (part, _) in _SENSORS.items() if f"{part}X" in self.fields)
 
 
 @dataclass(frozen=True)
@@ -100,26 +100,25 @@ class DataflashTable(MessageTable):
                 yield part
 
 
-def open_ardupilot(path: Path, topics: Sequence[str], clock: str) -> tuple[Table, ...]:
+def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
     """Open a binary log of ArduPilot.
 
-    topics: Those to read, e.g. ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of
-        `IMU`, else those of `GYR` and `ACC`, else the batches, if there is one IMU.
-    clock: Not used: messages have one stamp.
-    Raises InputError if it is damaged, holds no IMU, or topics have to be chosen.
+    wanted: Topics as ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else
+        those of `GYR` and `ACC`, else the batches, if there is one IMU.
+    Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     with damage_named(path.name, _damage):
-        counts, batches = _contents(path)
+        counts, sensors, batches = _contents(path)
     ranks: list[list[Topic]] = [[], [], []]
     for series, count in counts.items():
-        ranks[_RANKS[series.kind]].append(Topic(series.name, count, series.sensors))
+        ranks[_RANKS[series.kind]].append(Topic(series.name, count, sensors[series]))
     for name, (sensor, columns) in batches.items():
         ranks[2].append(Topic(name, columns[_TIME].size, frozenset((sensor,))))
     if not any(ranks):
         raise InputError(
             f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
         )
-    chosen = choose_first(path.name, ranks, topics)
+    chosen = choose_first(path.name, ranks, wanted)
     by_name = {series.name: series for series in counts}
     tables: list[Table] = []
     for topic in chosen:
@@ -144,9 +143,10 @@ def _damage(error: Exception) -> str:
 _Batches = dict[str, tuple[str, dict[str, AnyArray]]]
 
 
-def _contents(path: Path) -> tuple[dict[_Series, int], _Batches]:
-    """How many messages there are of each series, and the batches."""
+def _contents(path: Path) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches]:
+    """How many messages there are of each series, its sensors, and the batches."""
     counts: Counter[_Series] = Counter()
+    sensors: dict[_Series, frozenset[str]] = {}
     headers: list[Messages] = []
     data: list[Messages] = []
     held = 0
@@ -156,13 +156,17 @@ def _contents(path: Path) -> tuple[dict[_Series, int], _Batches]:
             held += 4 * found.rows.nbytes  # as float64
             memory.require(held, path.name)
         elif "TimeUS" in found.fields:
-            numbers: AnyArray = found["I"] if "I" in found.fields else np.zeros(0)
-            for number, count in zip(*np.unique(numbers, return_counts=True), strict=True):
-                counts[_Series(found.kind, int(number), found.fields)] += int(count)
-            if "I" not in found.fields:
-                counts[_Series(found.kind, None, found.fields)] += found.rows.size
+            for number in np.unique(found["I"]).tolist() if "I" in found.fields else [None]:
+                mine = slice(None) if number is None else found["I"] == number
+                series = _Series(found.kind, number, found.fields)
+                counts[series] += found.rows[mine].size
+                sensors[series] = sensors.get(series, frozenset()) | {
+                    sensor
+                    for sensor in _SENSORS
+                    if any(np.any(found[field][mine]) for field in series.fields_of(sensor))
+                }
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
-    return {each: counts[each] for each in order}, _batches(headers, data)
+    return {each: counts[each] for each in order}, sensors, _batches(headers, data)
 
 
 def _field(parts: Sequence[Messages], name: str) -> AnyArray:

@@ -23,8 +23,8 @@ from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers.formats.arrays import damage_named
 from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.parts import MessageTable
-from gmwm.readers.formats.ros_messages import (
+from gmwm.readers.formats.messages.parts import MessageTable
+from gmwm.readers.formats.messages.ros_messages import (
     CDR,
     COVARIANCE_OF,
     IMU,
@@ -34,7 +34,7 @@ from gmwm.readers.formats.ros_messages import (
     Serialization,
     decode,
 )
-from gmwm.readers.formats.topics import Topic, choose
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds
@@ -139,15 +139,12 @@ class BagTable(MessageTable):
         return f"{self.source}, {self.where(first + row)}"
 
 
-def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, ...]:
+def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
     """Open a bag.
 
     path: A file, or the folder of a bag of ROS 2.
-    topics: Those to read; by default the only one of `sensor_msgs/Imu`, or two of which one has
-        gyros and the other accelerometers.
-    clock: {"header", "log"}.
     Returns: one for each topic, those of thermometers last.
-    Raises InputError if it is damaged, holds no IMU, or topics have to be chosen.
+    Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():
@@ -166,15 +163,15 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
             )
         of_imu = counts["sensor_msgs/msg/Imu"]
         heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
-        found = {
-            topic: Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
+        found = [
+            Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
             for topic, count in of_imu.items()
-        }
-        chosen = choose(path.name, list(found.values()), topics)
+        ]
+        chosen = choose(path.name, found, wanted)
         warmth = counts["sensor_msgs/msg/Temperature"]
-        is_log = clock == "log"
+        is_log = wanted.clock == "log"
         origin = _first_stamp(heads[chosen[0].name], bag, is_log)
-    tables = [_table(bag, topic, is_log, origin, found) for topic in chosen]
+    tables = [_table(bag, topic, is_log, origin) for topic in chosen]
     for name, count in warmth.items():
         # By the topic if there are several.
         prefix = "" if len(warmth) == 1 else name.strip("/").replace("/", "_") + "_"
@@ -184,19 +181,12 @@ def open_bag(path: Path, topics: Sequence[str], clock: str) -> tuple[BagTable, .
     return tuple(tables)
 
 
-def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int, found: dict[str, Topic]) -> BagTable:
+def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int) -> BagTable:
     sensors = topic.sensors or frozenset(SI_UNIT)
     names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
     text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
-    notices = [Notice("topic", "note", "", text, {"topic": topic.name})]
-    known = frozenset[str]().union(*(each.sensors for each in found.values()))
-    if topic.sensors and (absent := set(SI_UNIT) - known):
-        words = {"gyro": "angular rates", "accel": "accelerations"}
-        what = words[absent.pop()]
-        text = f"the bag has no {what}: those of {topic.name} are zeros, and only the rest is read"
-        action = "record the other sensor too, if you want a model of it"
-        notices.append(Notice("sensor-absent", "warning", "", text, {"topic": topic.name}, action))
-    return BagTable(topic, (_STAMPS, *names), bag, IMU, is_log, origin, notices=tuple(notices))
+    notice = Notice("topic", "note", "", text, {"topic": topic.name})
+    return BagTable(topic, (_STAMPS, *names), bag, IMU, is_log, origin, notices=(notice,))
 
 
 def _is_ros1(path: Path) -> bool:

@@ -9,13 +9,30 @@ from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 
+_MEASURED = {"gyro": "angular rates", "accel": "accelerations"}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the caller asks of a log.
+
+    topics: Those to read; by default the only one of an IMU, or one of gyros and one of
+        accelerometers.
+    clock: {"header", "log"}, which stamps of messages count.
+    by_channel: Whether channels are named, of which one sensor may have all.
+    """
+
+    topics: Sequence[str] = ()
+    clock: str = "header"
+    by_channel: bool = False
+
 
 @dataclass(frozen=True)
 class Topic:
     """A series of messages of one IMU, or of one sensor of it.
 
     count: Number of its messages.
-    sensors: "gyro", "accel" or both.
+    sensors: "gyro", "accel" or both: those that are not zeros all the time.
     """
 
     name: str
@@ -27,13 +44,31 @@ class Topic:
         return f"{self.name} ({self.count:,} messages{only})"
 
 
-def choose(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
+def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
     source: Name of the file, for messages.
     topics: One at least.
-    Raises InputError with the code "topic", if one is not there, or it cannot be decided.
+    Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
+        "sensor-absent", if the log has one sensor and not the other, and no channel is named.
     """
+    chosen = _chosen(source, topics, wanted.topics)
+    there = frozenset[str]().union(*(topic.sensors for topic in chosen))
+    absent = frozenset(SI_UNIT) - there
+    # One topic of two was chosen where the other has the other sensor.
+    is_part = absent in [topic.sensors for topic in topics]
+    if there and absent and not (is_part or wanted.by_channel):
+        (sensor,), (other,) = there, absent
+        raise InputError(
+            f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}",
+            "sensor-absent",
+            f'record them too, or read the rest alone, channels="{sensor}"',
+            {"sensor": sensor},
+        )
+    return chosen
+
+
+def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
     if wanted:
         chosen = tuple(_named(source, topics, name) for name in dict.fromkeys(wanted))
         if len(chosen) > 1 and not _are_parts(chosen):
@@ -69,15 +104,15 @@ def _are_parts(topics: Sequence[Topic]) -> bool:
 
 
 def choose_first(
-    source: str, ranks: Sequence[Sequence[Topic]], wanted: Sequence[str]
+    source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted
 ) -> tuple[Topic, ...]:
     """As `choose`, of the first rank that has any topic unless others are wanted.
 
     Raises InputError as `choose` does.
     """
-    if wanted:
+    if wanted.topics:
         return choose(source, [topic for rank in ranks for topic in rank], wanted)
-    return choose(source, next(rank for rank in ranks if rank), ())
+    return choose(source, next(rank for rank in ranks if rank), wanted)
 
 
 def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:

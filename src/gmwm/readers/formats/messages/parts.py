@@ -15,7 +15,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.formats.arrays import check_usable
-from gmwm.readers.formats.topics import Topic
+from gmwm.readers.formats.messages.topics import Topic
 from gmwm.readers.table import label
 
 

@@ -23,7 +23,7 @@ from flight_logs import (
     write_ulog,
 )
 from gmwm.readers import read_blocks
-from gmwm.readers.formats import dataflash
+from gmwm.readers.formats.messages import dataflash
 from gmwm.readers.names import CANONICAL
 
 
@@ -39,6 +39,54 @@ def refusal(path, **arguments):
         gmwm.read(path, **arguments)
     assert "\n" not in str(caught.value)
     return str(caught.value)
+
+
+def kept(sensor, samples=X):
+    return samples * np.float32([sensor == "gyro"] * 3 + [sensor == "accel"] * 3)
+
+
+def three(sensor, samples=X):
+    return samples[:, :3] if sensor == "gyro" else samples[:, 3:]
+
+
+def raw(sensor):
+    """Messages of raw logging, and their format."""
+    name, part = {"gyro": ("GYR", "Gyr"), "accel": ("ACC", "Acc")}[sensor]
+    form = (name, "QBQfff", f"TimeUS,I,SampleUS,{','.join(f'{part}{axis}' for axis in 'XYZ')}")
+    times = 10**6 + 2500 * np.arange(len(X))
+    return form, [
+        (name, t, 0, t, *map(float, v)) for t, v in zip(times, three(sensor), strict=True)
+    ]
+
+
+HALVES = {
+    "combined": lambda path, sensor: write_ulog(path, combined(kept(sensor))),
+    "fifo": lambda path, sensor: write_ulog(
+        path, fifo(sensor, three(sensor, fifo_counts()), 0.001 if sensor == "gyro" else 0.0024)
+    ),
+    "single": lambda path, sensor: write_ulog(path, single(sensor, three(sensor))),
+    "IMU": lambda path, sensor: write_dataflash(path, [IMU], imu_messages(kept(sensor))),
+    "raw": lambda path, sensor: write_dataflash(path, [raw(sensor)[0]], raw(sensor)[1]),
+}
+
+
+@pytest.mark.parametrize("kind", HALVES)
+@pytest.mark.parametrize(("there", "word"), [("accel", "angular rates"), ("gyro", "accelerations")])
+def test_a_log_of_one_sensor_is_read_by_the_name_of_it_only(tmp_path, kind, there, word):
+    path = HALVES[kind](tmp_path / "a.log", there)
+    message = refusal(path)
+    assert f"a.log has no {word}, or only zeros, in " in message
+    assert f'channels="{there}"' in message
+    found = gmwm.read(path, channels=there)
+    assert {each.name.partition("_")[0] for each in found.inertial} == {there}
+    assert not [each for each in found.notices if each.severity != "note"]
+
+
+def test_one_sensor_of_a_log_that_has_both_may_be_chosen(tmp_path):
+    forms, messages = zip(raw("gyro"), raw("accel"), strict=True)
+    path = write_dataflash(tmp_path / "a.bin", forms, [*messages[0], *messages[1]])
+    assert exact(gmwm.read(path))
+    assert list(gmwm.read(path, topic="GYR[0]")) == ["gyro_x", "gyro_y", "gyro_z"]
 
 
 # -- PX4 ------------------------------------------------------------------------------------------
@@ -185,7 +233,7 @@ def test_fields_of_hundredths(tmp_path):
     form = ("IMU", "QBccccccIIfBBHH", IMU[2])
     messages = [
         (name, t, i, *(int(100 * v) for v in six), *rest)
-        for name, t, i, *six_rest in imu_messages(X)
+        for name, t, i, *six_rest in imu_messages(X + np.float32([0.05, 0, 0, 0, 0, 0]))
         for six, rest in [(six_rest[:6], six_rest[6:])]
     ]
     found = gmwm.read(write_dataflash(tmp_path / "a.bin", [form], messages))

@@ -21,10 +21,11 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
 from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.topics import Topic, choose_first, left_out
+from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
 
 _COMBINED = "sensor_combined"
+_FIELDS = {"gyro": "gyro_rad", "accel": "accelerometer_m_s2"}
 _FIFO = {"sensor_gyro_fifo": "gyro", "sensor_accel_fifo": "accel"}
 _SINGLE = {"sensor_gyro": "gyro", "sensor_accel": "accel"}
 _UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -40,28 +41,27 @@ _MEND = (
 _Columns = dict[str, AnyArray]
 
 
-def open_ulog(path: Path, topics: Sequence[str], clock: str) -> tuple[ArrayTable, ...]:
+def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     """Open a ULog.
 
-    topics: Those to read, e.g. ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the
-        FIFO topics.
-    clock: Not used: messages have one stamp.
-    Raises InputError if it is damaged, holds no IMU at its own rate, or topics have to be chosen.
+    wanted: Topics as ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO topics.
+    Raises InputError if it is damaged, holds no IMU at its own rate or half of one, or topics have
+        to be chosen.
     """
     with damage_named(path.name, _damage):  # formats that are damaged lack fields
-        return _tables(path, topics)
+        return _tables(path, wanted)
 
 
-def _tables(path: Path, topics: Sequence[str]) -> tuple[ArrayTable, ...]:
+def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     sets, notices = _data_sets(path)
     ranks = [
-        [_topic(each, frozenset(_UNITS)) for each in sets if each.name == _COMBINED],
+        [_topic(each, _not_zero(each.data)) for each in sets if each.name == _COMBINED],
         [_topic(each, frozenset((_FIFO[each.name],))) for each in sets if each.name in _FIFO],
         [_topic(each, frozenset((_SINGLE[each.name],))) for each in sets if each.name in _SINGLE],
     ]
     if not any(ranks):
         raise InputError(f"{path.name} has no samples of an IMU: {_MEND}")
-    chosen = choose_first(path.name, ranks, topics)
+    chosen = choose_first(path.name, ranks, wanted)
     notices += left_out(ranks[:2], chosen)
     by_name = {_name(each): each for each in sets}
     tables: list[tuple[str, _Columns]] = []
@@ -124,6 +124,15 @@ def _topic(data_set: Any, sensors: frozenset[str]) -> Topic:
     return Topic(_name(data_set), int(data_set.data["timestamp"].size), sensors)
 
 
+def _not_zero(data: Mapping[str, AnyArray]) -> frozenset[str]:
+    """Sensors of which `sensor_combined` holds something else than zeros."""
+    return frozenset(
+        sensor
+        for sensor, field in _FIELDS.items()
+        if any(np.any(data[f"{field}[{i}]"]) for i in range(3))
+    )
+
+
 def _columns(stamps: AnyArray, sensor: str, axes: Sequence[AnyArray]) -> _Columns:
     named = {
         f"{sensor}_{axis} [{_UNITS[sensor]}]": values
@@ -134,8 +143,8 @@ def _columns(stamps: AnyArray, sensor: str, axes: Sequence[AnyArray]) -> _Column
 
 def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:
     """Gyros, and accelerometers by their own stamps if these do not advance with each row."""
-    gyro = _columns(data["timestamp"], "gyro", [data[f"gyro_rad[{i}]"] for i in range(3)])
-    axes = [data[f"accelerometer_m_s2[{i}]"] for i in range(3)]
+    rates, axes = ([data[f"{field}[{i}]"] for i in range(3)] for field in _FIELDS.values())
+    gyro = _columns(data["timestamp"], "gyro", rates)
     offset = data["accelerometer_timestamp_relative"].astype(np.int64)
     stamps = data["timestamp"].astype(np.int64) + offset
     valid = offset != _NO_TIME
