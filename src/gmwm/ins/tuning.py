@@ -150,10 +150,10 @@ is worth a closer look."""
 LEAP_SECONDS = 18.0
 """s, by which GPS time is ahead of UTC since 2017."""
 
-FARTHEST_OFFSET, FAR_STEP, FAR_NEAR = 60.0, 2.0, 0.25
+FARTHEST_OFFSET, FAR_STEP, FAR_NEAR = 60.0, 2.0, 0.0625
 """s, of larger errors of the stamps, which are looked for where the filter is lost: the farthest
 (TAI is ahead of UTC by 37 s), the steps in which all are tried (a vehicle does not turn much
-faster), and the last step, which leaves an error that the innovations show in proportion."""
+faster), and the last step: a start that is as much off must not make the heading a fault."""
 
 STEP_PARTS = 16
 """Parts of a log between which a step of a clock is looked for before the best is refined."""

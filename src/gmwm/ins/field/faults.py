@@ -114,8 +114,10 @@ class Faults:
         later: By how much the filter started later, s.
         """
         near = [each for each in self.found if each.code == "time-offset"]
-        by = offset + sum(each.values["time offset"] for each in near)
-        error = near[0].errors if near else {"time offset": self.resolution["time offset"]}
+        # What is left counts also where it is no fault of its own.
+        left = near or next(constant_errors(self.replay)).refined()
+        by = offset + sum(each.values["time offset"] for each in left)
+        error = left[0].errors if left else {"time offset": self.resolution["time offset"]}
         stamps = Explanation(
             "time-offset", "", lambda log: log.later(lambda time: np.full_like(time, -by)),
             self.replay, np.inf, cost(1), {"time offset": by}, error,
@@ -277,7 +279,7 @@ def _time(fault: Explanation) -> tuple[str, str]:
         f"the fixes are stamped {abs(offset):.3g} s too {'late' if offset > 0.0 else 'early'} "
         f"(standard error {fault.errors['time offset']:.1g} s)"
     )
-    if abs(abs(offset) - tuning.LEAP_SECONDS) < tuning.FAR_NEAR:
+    if round(abs(offset)) == tuning.LEAP_SECONDS:
         text += f", as GPS time is ahead of UTC by {tuning.LEAP_SECONDS:g} s"
     return text, "subtract it from their times" if offset > 0.0 else "add it to their times"
 
