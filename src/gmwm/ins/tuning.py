@@ -144,7 +144,7 @@ LARGEST_OFFSET, OFFSET_MARGIN = 1.5, 0.1
 no fix near; and of the fixes left out at both ends beside it."""
 
 FAR_BETTER = 0.5
-"""Mean square of the innovations, of that with the stamps as they are, below which another offset
+"""Square of the innovations, of that with the stamps as they are, below which another offset
 is worth a closer look."""
 
 LEAP_SECONDS = 18.0

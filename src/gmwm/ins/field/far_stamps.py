@@ -49,7 +49,9 @@ class FarStamps:
 
 
 def _size(measured: Measured, offset: float) -> float:
-    """Mean square of the innovations; infinite if the filter cannot start, or diverges."""
+    """Square of the innovations, by a mean to which a few outliers add little; infinite if the
+    filter cannot start, or diverges.
+    """
     earlier = _earlier(measured, offset)
     try:
         replay = Replay.of(earlier, alignment_of(earlier))
@@ -58,7 +60,9 @@ def _size(measured: Measured, offset: float) -> float:
     replay = replay.within(0.0, tuning.DIAGNOSED)
     if 2 * replay.standard.shape[0] < sum(each.time.size for each in measured.aiding.fixes):
         return np.inf  # too few are left to be compared with the others
-    return float(np.nanmean(replay.standard**2)) if np.isfinite(replay.log_likelihood) else np.inf
+    if not np.isfinite(replay.log_likelihood):
+        return np.inf
+    return float(np.expm1(np.nanmean(np.log1p(replay.standard**2))))
 
 
 def _earlier(measured: Measured, offset: float) -> Measured:
