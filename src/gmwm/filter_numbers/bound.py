@@ -151,7 +151,7 @@ def bound_of(
                 *target.notices,
                 *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
                 *loose,
-                *stands_for(axis, target, model),
+                *stands_for(axis, target, model, problem.targets),
                 *about(axis, level),
             ),
             quantity=axis.quantity,
@@ -220,11 +220,17 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
     return (Notice("loose-form", "note", "", text, values, mend),)
 
 
-def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
-    """What N and K are for beside white noise and a random walk: terms, where they are needed."""
+def stands_for(
+    axis: Axis, target: Target, model: Model, sharing: Sequence[Target]
+) -> tuple[Notice, ...]:
+    """What N and K are for beside white noise and a random walk: terms, where they are needed.
+
+    sharing: Targets of the axes that share the numbers; what another needs is not explained.
+    """
     f = target.frequencies(tuning.POINTS)
     need, believed = target.psd(f), model.psd(f, axis.dt)
     alike = np.minimum(need / believed, believed / need)
+    is_needed = (alike >= tuning.NEEDED) & (need >= np.max([each.psd(f) for each in sharing], 0))
     labels = dict(zip(map(id, axis.model.terms), axis.model.term_labels(), strict=True))
     white, filtered, walks = (
         [term for term in axis.model.terms if getattr(term, kind)]
@@ -241,9 +247,9 @@ def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
             sum(float(term.psd(f[:1], axis.dt)[0]) for term in terms) / unit[0]
             for terms in ([*own, *explained], own)
         )
-        needed = np.where(alike >= tuning.NEEDED, alike * square * unit / believed, 0.0)
+        needed = np.where(is_needed, alike * square * unit / believed, 0.0)
         at = int(np.argmax(needed))
-        # Where they are alike without it, too, it is there for another axis that shares it.
+        # Where they are alike without it, too, it is not there for these.
         if tuning.ABOVE**2 * known >= square or needed[at] <= 1.0 - tuning.NEEDED:
             continue
         shares = {

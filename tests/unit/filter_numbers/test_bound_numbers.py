@@ -391,9 +391,10 @@ def test_an_axis_does_not_explain_what_another_needs():
     numbers = gmwm.bound(models, shared=True)
     assert pytest.approx(5e-3, rel=0.05) == numbers["accel_x"].N
     assert not any(n.code == "more-than-white-noise" for n in numbers.notices)
-    walking = {name: WhiteNoise(1e-4) + RandomWalk(K) for name, K in (("a", 1e-6), ("b", 5e-6))}
-    numbers = gmwm.bound(walking, shared=True)
-    assert not any(n.code == "more-than-random-walk" for n in numbers.notices)
+    models = {name: WhiteNoise(1e-4) + GaussMarkov(sigma, 20.0)
+              for name, sigma in (("accel_x", 3e-4), ("accel_y", 3.1e-4))}  # fmt: skip
+    numbers = gmwm.bound(models, shared=True)
+    assert {n.where for n in numbers.notices if n.code == "more-than-random-walk"} == {"accel_y"}
 
 
 @pytest.mark.parametrize("horizon", [1.0, 10.0, 60.0])
