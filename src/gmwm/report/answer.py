@@ -193,7 +193,7 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         rows = [_of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads]
         title = "One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"
         if any(row["invalid"] for row in rows):
-            title += "; it covers axes that are not valid too, at worst too large for the others"
+            title += ": from all models, also not valid ones; for the valid at worst too large"
         groups[title] = rows
     rows = groups.setdefault("Each axis by itself", [])
     for name, fit in calibration.items():
@@ -212,7 +212,7 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         "problem": certified.problem,
         "notes": certified.notes,
         "covers": [
-            f"{name}: {'; '.join(texts)}"
+            (name, "; ".join(texts))
             for name, axis in certified.axes.items()
             if (texts := [n.text for n in axis.notices if n.code in _COVERS])
         ],
