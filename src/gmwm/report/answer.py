@@ -193,7 +193,9 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         rows = [_of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads]
         title = "One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"
         if any(row["invalid"] for row in rows):
-            title += ": from all models, also not valid ones; for the valid at worst too large"
+            title += (
+                ": made from all models, also those not valid; at worst too large for valid axes"
+            )
         groups[title] = rows
     rows = groups.setdefault("Each axis by itself", [])
     for name, fit in calibration.items():
