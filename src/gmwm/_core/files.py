@@ -7,7 +7,7 @@ import signal
 import stat
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
@@ -116,13 +116,35 @@ def _check_regular(path: Path, mode: int) -> None:
         raise InputError(f"{path} is a pipe or a device: write its content to a file first")
 
 
+def writable_file(path: Path) -> Path:
+    """The path, if a file can be written there.
+
+    Raises InputError if a folder stands there, or none that can be written is around it.
+    """
+    _check_new_files(replaceable(path).parent, path)
+    return path
+
+
+def writable_folder(path: Path, names: Iterable[str] = ()) -> Path:
+    """The path, if it is or can become a folder with files of these names.
+
+    Raises InputError if it cannot be made or written, or a folder is in the way of a file.
+    """
+    for name in names:
+        replaceable(path / name)
+    _check_new_files(next(each for each in (path, *path.parents) if os.path.exists(each)), path)
+    return path
+
+
 def replaceable(path: Path) -> Path:
     """The path, if a file can take its place.
 
     Raises InputError if a folder stands there.
     """
-    if path.is_dir():
-        raise InputError(f"{path}: a folder of that name is in the way, move it")
+    if os.path.isdir(path):
+        raise InputError(
+            f"{path}: a folder of that name is in the way: move it, or choose another place with -o"
+        )
     return path
 
 
@@ -134,11 +156,19 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(_sentence(folder, error)) from None
+    _check_new_files(folder, folder)
+    return folder
+
+
+def _check_new_files(folder: Path, output: Path) -> None:
+    """Raise InputError, which names an output, if a folder takes no new file."""
+    try:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(_sentence(folder, error)) from None
-    return folder
+        raise InputError(_sentence(output, error)) from None
 
 
 @contextmanager

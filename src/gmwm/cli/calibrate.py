@@ -22,6 +22,7 @@ from gmwm.cli.options import (
     memory_option,
     models_of_channels,
     needs_the_whole,
+    output_folder,
     part_options,
     printing_options,
     read_recording,
@@ -63,15 +64,11 @@ _EXPORTED = {
 """Names of the files of programs that want something else than NAME.yaml."""
 
 
+_FILES = ("calibration.json", "report.html", "imu.yaml")
+
+
 def output_option(default: str) -> Callable[[Any], Any]:
-    return click.option(
-        "-o",
-        "--output",
-        type=click.Path(path_type=Path),
-        default=Path(default),
-        show_default=True,
-        help="Folder for calibration.json, report.html, imu.yaml.",
-    )
+    return output_folder(default, f"Folder for {', '.join(_FILES)}.", _FILES)
 
 
 @click.command()
@@ -139,7 +136,7 @@ def calibrate(
         # Started first, so that it has imported what it needs when there is work for it.
         others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
         click.get_current_context().with_resource(others)
-    from gmwm._core.files import folder_to_fill
+    from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
     from gmwm.report import read_datasheet
 
@@ -149,6 +146,7 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
+        replaceable(output / _EXPORTED.get(target, f"{target}.yaml"))
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"):
             recordings, in_blocks = _recordings(files, memory, reading)
@@ -319,13 +317,11 @@ def write_files(
     target: str | None = None,
 ) -> str:
     """Write the files, all or none, then that of another program; returns what to say of them."""
-    from gmwm._core.files import moved_together, replaceable
+    from gmwm._core.files import moved_together
     from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
 
-    names = ["calibration.json", "report.html"]
-    for name in (*names, "imu.yaml"):
-        replaceable(folder / name)
+    names = [*_FILES[:2]]
     quantities = {fit.wv.quantity for fit in result.fits.values()}
     lines = []
     with moved_together(folder) as new:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.numbers import show, units_option
-from gmwm.cli.options import seconds
+from gmwm.cli.options import output_file, seconds
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ _GRAVITY = 9.80665
 @click.option(
     "--vibration", type=float, default=0.0, metavar="G", help="Vibration, root mean square."
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
-              help="File to save the certificate in.")  # fmt: skip
+@output_file("File to save the certificate in.", "JSON")
 @units_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def certify(

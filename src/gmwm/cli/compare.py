@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import part_options, printing_options, read_recording, reading_options
+from gmwm.cli.options import (
+    output_file,
+    part_options,
+    printing_options,
+    read_recording,
+    reading_options,
+)
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -21,8 +27,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("files", metavar="FILE FILE...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="HTML",
-              help="Page to write, of two printed ones.")  # fmt: skip
+@output_file("Page to write, of two printed ones.", "HTML")
 @click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
               help="Time without aiding that the filter numbers are for, in seconds.")  # fmt: skip
 @click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from gmwm.cli.options import output_file
 from gmwm.errors import InputError
 
 
@@ -17,8 +18,7 @@ from gmwm.errors import InputError
                    "(keyframes, scans) or 60, see --list.")  # fmt: skip
 @click.option("--form", metavar="FORM",
               help="N+K, N+GM, ...: most programs hold one; state-space holds any.")  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path),
-              help="File to write instead of printing; .npz for state-space.")  # fmt: skip
+@output_file("File to write instead of printing; .npz for state-space.")
 @click.option("--list", "listed", is_flag=True, help="List the programs.")
 def export(
     files: tuple[Path, ...],

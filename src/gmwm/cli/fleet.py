@@ -16,6 +16,7 @@ from gmwm.cli.hints import with_hint
 from gmwm.cli.options import (
     arguments_of_read,
     estimating_options,
+    output_folder,
     part_options,
     printing_options,
     reading_options,
@@ -25,9 +26,7 @@ from gmwm.cli.options import (
 
 @click.command()
 @click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-fleet"),
-              show_default=True,
-              help="Folder for calibrations, fleet.parquet, fleet.html, fleet.json.")  # fmt: skip
+@output_folder("gmwm-fleet", "Folder for calibrations, fleet.parquet, fleet.html, fleet.json.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
 @click.option("--cluster", metavar="ADDRESS",
               help="Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read "

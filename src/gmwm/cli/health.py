@@ -12,6 +12,7 @@ from gmwm.cli.options import (
     arguments_of_blocks,
     memory_option,
     needs_the_whole,
+    output_file,
     part_options,
     printing_options,
     read_recording,
@@ -22,8 +23,7 @@ from gmwm.errors import InputError
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="PATH",
-              help="Write all findings with their numbers, in SI units, to this file.")  # fmt: skip
+@output_file("Write all findings with their numbers, in SI units, to this file.")
 @reading_options
 @part_options
 @memory_option
@@ -47,12 +47,9 @@ def health(
     Example:
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
-    from gmwm._core.files import replaceable
     from gmwm._core.memory import limited
     from gmwm.diagnosis import health as examine, health_stream
 
-    if output is not None:
-        replaceable(output)
     try:
         with limited(memory):
             recording = read_recording(file, **reading)

@@ -15,7 +15,7 @@ import click
 
 from gmwm.cli.console import progress_bar
 from gmwm.cli.hints import with_option
-from gmwm.cli.options import arguments_of_read, reading_options
+from gmwm.cli.options import arguments_of_read, output_folder, reading_options
 from gmwm.errors import InputError
 
 _NEEDED = (
@@ -33,6 +33,10 @@ _OF_FILE = (
     "velocity_sd",
 )  # fmt: skip
 """Options that are keys of the file of a study; paths are relative to where one is."""
+
+_OF_STUDY, _OF_LOG = ("validation.txt", "validation.html"), ("solution.csv", "report.html")
+_OF_SENSORS = "comparison.html"
+"""What is written."""
 
 
 def _as(convert: Callable[[Any], Any]) -> Callable[[Any, Any, Any], Any]:
@@ -124,8 +128,8 @@ def _named(option: str, texts: tuple[str, ...]) -> dict[str, str]:
 @click.option("--runs", type=click.IntRange(min=1), help="Number of runs.  [default: 100]")
 @click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-navigate"),
-              show_default=True, help="Folder for the report, the table and the runs.")  # fmt: skip
+@output_folder("gmwm-navigate", "Folder for the report, the table and the runs.",
+               [*_OF_STUDY, *_OF_LOG, _OF_SENSORS])  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
 @click.option("--cluster", metavar="ADDRESS",
               help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
@@ -263,7 +267,7 @@ def _validate(
     place: Path | None,
 ) -> None:
     """Do the runs of a study."""
-    from gmwm._core.files import folder_to_fill, replaceable, written
+    from gmwm._core.files import folder_to_fill, written
     from gmwm.ins.montecarlo import Validation
     from gmwm.ins.spec import experiment_from
 
@@ -271,7 +275,7 @@ def _validate(
         experiment = experiment_from(content, base)
     with folder_to_fill(output) as folder:
         store = folder / "runs"
-        table, page = (replaceable(folder / f"validation.{end}") for end in ("txt", "html"))
+        table, page = (folder / name for name in _OF_STUDY)
         with progress_bar("navigating", "runs") as bar:
             validation = Validation.of(
                 experiment, jobs=jobs, cluster=cluster, folder=store,
@@ -289,14 +293,14 @@ def _filter(
     content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
 ) -> None:
     """Filter real data."""
-    from gmwm._core.files import folder_to_fill, replaceable
+    from gmwm._core.files import folder_to_fill
     from gmwm.ins.field import Measured, Navigated
 
     with _named_in_messages(place):
         measured = Measured.of(content, base)
     measured = replace(measured, notices=tuple(map(with_option, measured.notices)))
     with folder_to_fill(output) as folder:
-        paths = [replaceable(folder / name) for name in ("solution.csv", "report.html")]
+        paths = [folder / name for name in _OF_LOG]
         navigated = Navigated.of(measured)
         navigated.write_solution(paths[0])
         navigated.report(paths[1])
@@ -311,14 +315,14 @@ def _compare(
     content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
 ) -> None:
     """Compare sensor models on real data."""
-    from gmwm._core.files import folder_to_fill, replaceable
+    from gmwm._core.files import folder_to_fill
     from gmwm.ins.field import Comparison
 
     with _named_in_messages(place):
         comparison = Comparison.of(content, base)
     comparison = replace(comparison, notices=tuple(map(with_option, comparison.notices)))
     with folder_to_fill(output) as folder:
-        page = comparison.report(replaceable(folder / "comparison.html"))
+        page = comparison.report(folder / _OF_SENSORS)
     if as_json:
         click.echo(json.dumps(comparison.to_dict(), allow_nan=False))
         return

@@ -10,7 +10,7 @@ import click
 
 from gmwm._core.text import bullets
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import seconds, together
+from gmwm.cli.options import output_file, seconds, together
 
 if TYPE_CHECKING:
     from gmwm.filter_numbers import Certificate, SensorNumbers
@@ -32,8 +32,7 @@ _number_options = together(
                  help="Standard deviation of the turn-on bias of a gyro."),
     click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
                  help="Standard deviation of the turn-on bias of an accelerometer."),
-    click.option("-o", "--output", type=click.Path(path_type=Path), metavar="JSON",
-                 help="File to save the numbers in."),
+    output_file("File to save the numbers in.", "JSON"),
     units_option,
     click.option("--json", "as_json", is_flag=True, help="Print JSON."),
 )  # fmt: skip

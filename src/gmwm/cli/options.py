@@ -40,6 +40,30 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return decorated
 
 
+def output_file(text: str, metavar: str = "FILE") -> Callable[[Any], Any]:
+    """The option of a file to write, which is refused before any work if it cannot be."""
+
+    def checked(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+        from gmwm._core.files import writable_file
+
+        return path and writable_file(path)
+
+    return click.option("-o", "--output", type=click.Path(path_type=Path), metavar=metavar,
+                        help=text, callback=checked)  # fmt: skip
+
+
+def output_folder(default: str, text: str, names: Sequence[str] = ()) -> Callable[[Any], Any]:
+    """The option of a folder to fill with files of some names, which is refused likewise."""
+
+    def checked(_: click.Context, __: click.Parameter, path: Path) -> Path:
+        from gmwm._core.files import writable_folder
+
+        return writable_folder(path, names)
+
+    return click.option("-o", "--output", type=click.Path(path_type=Path), default=Path(default),
+                        show_default=True, help=text, callback=checked)  # fmt: skip
+
+
 reading_options = together(
     click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
     click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import read_recording, reading_options
+from gmwm.cli.options import output_folder, read_recording, reading_options
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,8 +32,7 @@ ROTATED = ("fig8", "fig9")
 
 @click.command()
 @click.argument("experiment", type=click.Choice(EXPERIMENTS), metavar="EXPERIMENT")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("gmwm-study"),
-              show_default=True, help="Folder for tables, figures and raw estimates.")  # fmt: skip
+@output_folder("gmwm-study", "Folder for tables, figures and raw estimates.")
 @click.option("--runs", type=click.IntRange(min=2), help="Number of simulated series.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")

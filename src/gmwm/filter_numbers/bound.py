@@ -28,7 +28,7 @@ from gmwm.filter_numbers.spectra import (
     region_targets,
     standard_errors,
 )
-from gmwm.process import Model
+from gmwm.process import Model, RandomWalk, WhiteNoise
 
 
 @per_axis
@@ -151,7 +151,7 @@ def bound_of(
                 *target.notices,
                 *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
                 *loose,
-                *stands_for(axis, target, model),
+                *stands_for(axis, target, model, problem.targets),
                 *about(axis, level),
             ),
             quantity=axis.quantity,
@@ -220,37 +220,59 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
     return (Notice("loose-form", "note", "", text, values, mend),)
 
 
-def stands_for(axis: Axis, target: Target, model: Model) -> tuple[Notice, ...]:
-    """What N is for beside white noise: the terms where the model needs N, not a slow term."""
-    own, N2 = axis.model.white_density(), model.white_density()
+def stands_for(
+    axis: Axis, target: Target, model: Model, sharing: Sequence[Target]
+) -> tuple[Notice, ...]:
+    """What N and K are for beside white noise and a random walk: terms, where they are needed.
+
+    sharing: Targets of the axes that share the numbers; what another needs is not explained.
+    """
     f = target.frequencies(tuning.POINTS)
-    # White noise behind a low-pass is that of the sensor, too, and nothing to be explained.
-    filtered = [term for term in axis.model.terms if term.is_band_limited]
-    if tuning.ABOVE**2 * (own + sum(term.psd(f[:1], axis.dt)[0] for term in filtered)) >= N2:
-        return ()
     need, believed = target.psd(f), model.psd(f, axis.dt)
     alike = np.minimum(need / believed, believed / need)
-    at = int(np.argmax(alike * N2 / believed))
-    if alike[at] < tuning.NEEDED:
-        return ()  # It is there for another axis that shares it.
+    is_needed = (alike >= tuning.NEEDED) & (need >= np.max([each.psd(f) for each in sharing], 0))
     labels = dict(zip(map(id, axis.model.terms), axis.model.term_labels(), strict=True))
-    shares = {
-        labels[id(term)]: float((density[0] + foot) / need[at])
-        for (term, density), foot in zip(target.densities(f[at : at + 1]), target.feet, strict=True)
-        if not term.is_white
-    }
-    large = {
-        key: share
-        for share, key in sorted(((share, key) for key, share in shares.items()), reverse=True)
-        if share > tuning.MENTIONED
-    }
-    parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
-    if own > 0.0:
-        text = f"N is {np.sqrt(N2 / own):.3g} times that of the model's white noise: it"
-    else:
-        text = "the model has no white noise: N"
-    text += f" has to cover {parts}"
-    return (Notice("more-than-white-noise", "note", "", text, large),)
+    white, filtered, walks = (
+        [term for term in axis.model.terms if getattr(term, kind)]
+        for kind in ("is_white", "is_band_limited", "is_walk")
+    )
+    found = []
+    # White noise behind a low-pass is that of the sensor, too, and nothing to be explained.
+    for letter, name, one, own, explained, others in (
+        ("N", "white noise", WhiteNoise(1.0), white, filtered, white),
+        ("K", "random walk", RandomWalk(1.0), walks, [], [*walks, *white, *filtered]),
+    ):
+        unit, square = one.psd(f, axis.dt), (model.params.get(letter) or 0.0) ** 2
+        known, alone = (
+            sum(float(term.psd(f[:1], axis.dt)[0]) for term in terms) / unit[0]
+            for terms in ([*own, *explained], own)
+        )
+        needed = np.where(is_needed, alike * square * unit / believed, 0.0)
+        at = int(np.argmax(needed))
+        # Where they are alike without it, too, it is not there for these.
+        if tuning.ABOVE**2 * known >= square or needed[at] <= 1.0 - tuning.NEEDED:
+            continue
+        shares = {
+            labels[id(term)]: float((density[0] + foot) / need[at])
+            for (term, density), foot in zip(
+                target.densities(f[at : at + 1]), target.feet, strict=True
+            )
+            if not any(term is other for other in others)
+        }
+        large = {
+            key: share
+            for share, key in sorted(((share, key) for key, share in shares.items()), reverse=True)
+            if share > tuning.MENTIONED
+        }
+        parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
+        if alone > 0.0:
+            text = f"{letter} is {np.sqrt(square / alone):.3g} times that of the model's {name}: it"
+        else:
+            text = f"the model has no {name}: {letter}"
+        text += f" has to cover {parts}"
+        code = f"more-than-{name.replace(' ', '-')}"
+        found.append(Notice(code, "note", "", text, large))
+    return tuple(found)
 
 
 def _fit(axis: Axis) -> Fit:

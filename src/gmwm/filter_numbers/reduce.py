@@ -144,7 +144,7 @@ class _Search:
                     *(each for each in target.notices if each.code == "ramp-as-constant"),
                     *_optimistic(found, longest),
                     *_below(axis, model),
-                    *stands_for(axis, target, model),
+                    *stands_for(axis, target, model, targets),
                     *about(axis, None),
                 ),
                 quantity=axis.quantity,

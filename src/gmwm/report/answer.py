@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Triad
-from gmwm.report.health import findings_of_fits
+from gmwm.report.health import counted, findings
 from gmwm.report.numbers import SHOWN, Certified
 from gmwm.report.text import duration_text
 
@@ -55,6 +55,8 @@ _WHY = {
 
 _AIM = 0.1  # relative standard error of the deviation that is well enough known
 
+_COVERS = ("more-than-white-noise", "more-than-random-walk")
+
 
 def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict[str, Any]:
     """Content of the first screen."""
@@ -72,37 +74,37 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
 
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line."""
-    found = gathered(calibration.notices)
-    severe = [n for n in found if n.severity == "bad"]
-    of_fits = findings_of_fits(calibration)
-    warnings = [n for n in (*of_fits, *found) if n.severity == "warning"]
-    removed = dict.fromkeys(n.where for n in of_fits if n.values.get("removed"))
-    invalid = [name for name, fit in calibration.items() if not fit.valid]
-    out = [*invalid, *calibration.skipped]
-    parts = [f"{', '.join(invalid)} not valid"] if invalid else []
+    found = findings(calibration)
+    is_severe = any(n.severity == "bad" for n in gathered(calibration.notices))
+    removed = dict.fromkeys(n.where for n in found if n.values.get("removed"))
+    causes: dict[str, list[str]] = {}
+    for name, fit in calibration.items():
+        if not fit.valid:
+            causes.setdefault(trust(name, fit, calibration)[1], []).append(name)
+    parts = [f"{', '.join(names)} not valid: {cause}" for cause, names in causes.items()]
     parts += [f"{', '.join(calibration.skipped)} without a model"] if calibration.skipped else []
-    if severe:
-        parts.append(_counted(severe, "severe issue"))
-    if warnings:
-        parts.append(_counted(warnings, "warning"))
+    parts += [_counted(found, severity, calibration) for severity in ("bad", "warning")]
     if removed:
         parts.append(f"departures from noise taken off ({', '.join(removed)})")
-    if severe or out:
+    text = "; ".join(filter(None, parts))
+    if is_severe or causes or calibration.skipped:
         all_out = not any(fit.valid for fit in calibration.values())
-        state, word = ("bad", "Not healthy") if all_out or severe else ("care", "Usable in part")
-        return {"state": state, "word": word, "text": "; ".join(parts)}
+        state, word = ("bad", "Not healthy") if all_out or is_severe else ("care", "Usable in part")
+        return {"state": state, "word": word, "text": text}
     if not calibration.is_examined:
         return {"state": "care", "word": "Not examined", "text": "the fits are valid"}
-    if parts:
-        return {"state": "care", "word": "Healthy, with care", "text": "; ".join(parts)}
+    if text:
+        return {"state": "care", "word": "Healthy, with care", "text": text}
     text = "nothing was found that spoils the estimates"
     return {"state": "good", "word": "Healthy", "text": text}
 
 
-def _counted(notices: list[Notice], word: str) -> str:
-    places = (place for notice in notices for place in notice.where.split(", ") if place)
-    where = ", ".join(dict.fromkeys(places))
-    count = f"{len(notices)} {word}{'s' if len(notices) > 1 else ''}"
+def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) -> str:
+    """How many of a severity, and where: in which channels, of which parameters or not."""
+    texts = ", ".join(each.where for each in notices if each.severity == severity).split(", ")
+    places = (next((c for c in channels if f"{text} ".startswith(f"{c} ")), text) for text in texts)
+    where = ", ".join(filter(None, dict.fromkeys(places)))
+    count = counted(notices, severity)
     return f"{count} ({where})" if where else count
 
 
@@ -188,9 +190,13 @@ def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str,
 def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
     groups: dict[str, list[dict[str, Any]]] = {}
     if certified.triads:
-        groups["One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"] = [
-            _of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads
-        ]
+        rows = [_of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads]
+        title = "One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"
+        if any(row["invalid"] for row in rows):
+            title += (
+                ": made from all models, also those not valid; at worst too large for valid axes"
+            )
+        groups[title] = rows
     rows = groups.setdefault("Each axis by itself", [])
     for name, fit in calibration.items():
         if name in certified.axes:
@@ -208,10 +214,9 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         "problem": certified.problem,
         "notes": certified.notes,
         "covers": [
-            f"{name}: {notice.text}"
+            (name, "; ".join(texts))
             for name, axis in certified.axes.items()
-            for notice in axis.notices
-            if notice.code == "more-than-white-noise"
+            if (texts := [n.text for n in axis.notices if n.code in _COVERS])
         ],
     }
 

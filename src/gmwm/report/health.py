@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from gmwm._core.notices import Notice, worst_first
 from gmwm.calibration import AMBIGUITY, DEPARTURES, LONGEST_PART, Calibration
 from gmwm.diagnosis import gathered
 
-_COUNTED = (("bad", "severe issue"), ("warning", "warning"), ("note", "note"))
+_COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
 _LABELS = {"bad": "severe"}
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
@@ -17,15 +18,8 @@ _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 
 def health(calibration: Calibration) -> dict[str, Any]:
     """Content of the section: notices, worst first, and the good ones apart."""
-    examined = calibration.is_examined
-    notices = [
-        notice
-        for notice in gathered(calibration.notices)
-        if notice.code not in (AMBIGUITY, LONGEST_PART)
-        and not (examined and notice.code in _COUNTED_ELSEWHERE)
-    ]
-    found = findings_of_fits(calibration)
-    found += [notice for notice in notices if examined and notice.severity != "good"]
+    examined, notices = calibration.is_examined, _of_recording(calibration)
+    found = findings(calibration)
     return {
         "examined": examined,
         "advice": [
@@ -37,6 +31,29 @@ def health(calibration: Calibration) -> dict[str, Any]:
         "rows": _rows(found),
         "good": _rows([notice for notice in notices if notice.severity == "good"]),
     }
+
+
+def findings(calibration: Calibration) -> list[Notice]:
+    """What the section counts and lists, and the line above the page counts."""
+    found = findings_of_fits(calibration)
+    if calibration.is_examined:
+        found += [each for each in _of_recording(calibration) if each.severity != "good"]
+    return found
+
+
+def counted(notices: Sequence[Notice], severity: str) -> str:
+    """How many notices have a severity, in words; empty if none has."""
+    count, word = sum(notice.severity == severity for notice in notices), _COUNTED[severity]
+    return f"{count} {word}{'s' if count > 1 else ''}" if count else ""
+
+
+def _of_recording(calibration: Calibration) -> list[Notice]:
+    return [
+        notice
+        for notice in gathered(calibration.notices)
+        if notice.code not in (AMBIGUITY, LONGEST_PART)
+        and not (calibration.is_examined and notice.code in _COUNTED_ELSEWHERE)
+    ]
 
 
 def findings_of_fits(calibration: Calibration) -> list[Notice]:
@@ -75,14 +92,10 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
 
 
 def _summary(notices: list[Notice]) -> str:
-    counts = {
-        words: sum(notice.severity == severity for notice in notices)
-        for severity, words in _COUNTED
-    }
-    parts = [f"{n} {words}{'s' if n > 1 else ''}" for words, n in counts.items() if n]
-    if counts["severe issue"] or counts["warning"]:
-        return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
-    return "Nothing was found that spoils the estimates."
+    if all(notice.severity not in ("bad", "warning") for notice in notices):
+        return "Nothing was found that spoils the estimates."
+    parts = [part for severity in _COUNTED if (part := counted(notices, severity))]
+    return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
 
 
 def _begun(text: str) -> str:

@@ -244,7 +244,7 @@ def test_a_spectrum_alone_is_dominated_without_a_prediction():
     assert np.min(ratio) > 1.0 - 1e-5
     assert np.isnan(numbers.nees[60.0])
     codes = [notice.code for notice in numbers.notices]
-    assert codes == ["more-than-white-noise", "not-predicted"]
+    assert codes == ["more-than-white-noise", "more-than-random-walk", "not-predicted"]
 
 
 # ---- The length of the record does not matter ----
@@ -359,6 +359,26 @@ def test_white_noise_says_what_else_it_stands_for(solve):
     assert "the model has no white noise: N has to cover Gauss-Markov 1" in str(notice)
 
 
+@pytest.mark.parametrize("solve", [gmwm.bound, gmwm.reduce])
+def test_a_random_walk_says_what_else_it_stands_for(solve):
+    given = {} if solve is gmwm.reduce else {"horizon": 60.0}
+
+    def why(truth):
+        found = solve({"accel_x": truth}, "N+K", **given)["accel_x"]
+        return found, [n for n in found.notices if n.code == "more-than-random-walk"]
+
+    drift = GaussMarkov(1e-3, 50.0)
+    found, (notice,) = why(WhiteNoise(2e-4) + RandomWalk(1e-5) + drift)
+    assert f"K is {found.K / 1e-5:.3g} times that of the model's random walk: it has to" in str(
+        notice
+    )
+    assert notice.values.keys() == {"Gauss-Markov"}
+    assert 0.5 < notice.values["Gauss-Markov"] < 1.0
+    _, (notice,) = why(WhiteNoise(2e-4) + drift)
+    assert "the model has no random walk: K has to cover Gauss-Markov (" in str(notice)
+    assert not why(WhiteNoise(2e-4) + RandomWalk(1e-5))[1]
+
+
 def test_white_noise_behind_a_low_pass_is_nothing_to_be_explained():
     """It was said that the model had no white noise."""
     truth = LowPassNoise(2e-4, 20.0, 2.0, 0.7) + SLOW
@@ -371,6 +391,10 @@ def test_an_axis_does_not_explain_what_another_needs():
     numbers = gmwm.bound(models, shared=True)
     assert pytest.approx(5e-3, rel=0.05) == numbers["accel_x"].N
     assert not any(n.code == "more-than-white-noise" for n in numbers.notices)
+    models = {name: WhiteNoise(1e-4) + GaussMarkov(sigma, 20.0)
+              for name, sigma in (("accel_x", 3e-4), ("accel_y", 3.1e-4))}  # fmt: skip
+    numbers = gmwm.bound(models, shared=True)
+    assert {n.where for n in numbers.notices if n.code == "more-than-random-walk"} == {"accel_y"}
 
 
 @pytest.mark.parametrize("horizon", [1.0, 10.0, 60.0])
@@ -551,8 +575,9 @@ def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
     slow = Resonance(1e-3, 0.01, 0.003)
     found = gmwm.bound(ONE + slow, "N+K", 60.0)
     # No form is better; what this one costs is there to read all the same.
-    (notice,) = found.notices
+    notice, why = found.notices
     assert (notice.code, notice.action) == ("loose-form", "")
+    assert (why.code, list(why.values)) == ("more-than-random-walk", ["resonance"])
     assert notice.values["tightness"] == found.tightness[60.0] > 1.2
     assert notice.values["with_state"] > 1.2
     f = np.geomspace(1e-8, 50.0, 3000)

@@ -144,6 +144,8 @@ def test_a_report_is_self_contained_and_names_are_no_markup(outputs):
     assert "default-src &#39;none&#39;; script-src &#39;none&#39;" in text
     assert "&lt;b&gt;damaged.npz is not an NPZ file" in text
     assert "<b>damaged" not in text
+    assert "<b>still</b>: yes</span>" in text
+    assert "[&#39;" not in text
     assert "http" not in text.replace("http-equiv", "")
     assert len(text) < 100_000
 

@@ -223,6 +223,10 @@ def test_numbers_that_are_not_valid_are_marked(calibration):
     marked = {row["name"]: row["invalid"] for row in chain(*box["groups"].values())}
     assert marked["gyro_x"] == marked["gyro"] == []
     assert marked["accel_x"] == marked["accel"] == ["accel_x"]
+    assert "also those not valid" in next(iter(box["groups"]))
+    fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
+    (right,) = answer(right := replace(calibration, fits=fits), certified(right))["boxes"]
+    assert "not valid" not in next(iter(right["groups"]))
     as_yaml, as_python = (found[60.0].texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
     for text in (as_yaml, as_python):
         (line,) = [line for line in text.splitlines() if "# not valid" in line]
@@ -445,15 +449,16 @@ def test_what_is_copied_is_what_is_exported(calibration):
         assert found.texts[title] == expected
 
 
-def test_the_box_says_what_white_noise_stands_for(calibration):
-    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 0.1)
+def test_the_box_says_what_white_noise_and_random_walk_stand_for(calibration):
+    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 0.1) + gmwm.GaussMarkov(1e-3, 20.0)
     samples = Channel("gyro_x", truth.simulate(40_000, 0.01, 5), 0.01, "gyro", "rad/s")
     fit = gmwm.fit(truth.opened(), gmwm.wavelet_variance(samples))
     one = replace(calibration, fits={"gyro_x": fit})
-    (notice,) = (n for n in gmwm.bound(fit).notices if n.code == "more-than-white-noise")
+    texts = [n.text for n in gmwm.bound(fit).notices if n.code.startswith("more-than-")]
     (box,) = answer(one, certified(one))["boxes"]
-    assert box["covers"] == [f"gyro_x: {notice.text}"]
-    assert notice.text in unescape(page(one))
+    assert box["covers"] == [("gyro_x", "; ".join(texts))]
+    assert [text.split(" has to cover ")[0][-1] for text in texts] == ["t", "K"]
+    assert "; ".join(texts) in unescape(page(one))
 
 
 def test_shared_numbers_stand_beside_those_of_the_axes(calibration):
@@ -659,9 +664,11 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
     shown = Page(page(replace(calibration, notices=notices)))
     assert shown.text.startswith("Sensor error")
     (first,) = re.findall(r"Not healthy: .*? Length", shown.text)
-    assert "; 1 severe issue (accel_x); 1 warning (gyro_x)." in first
+    (why,) = (trust(n, fit, calibration)[1] for n, fit in calibration.items() if not fit.valid)
+    assert f"Not healthy: accel_x not valid: {why}; " in first
     # With those for which fits are not valid.
     severe = 1 + sum(n.severity == "bad" for fit in calibration.values() for n in fit.notices)
+    assert f"; {severe} severe issues (accel_x); 1 warning (gyro_x)." in first
     assert f"{severe} severe issues, 1 warning and" in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)

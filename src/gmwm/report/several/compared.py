@@ -94,10 +94,11 @@ def _notices(comparison: SensorComparison) -> list[dict[str, Any]]:
     """Without those that the verdicts repeat."""
     return [
         {
-            "is_remark": notice.severity in ("warning", "bad") and notice.code not in _ASIDE,
+            "is_aside": notice.code in _ASIDE,
+            "is_remark": notice.severity in ("warning", "bad"),
             "text": notice.sentence,
         }
-        for notice in sorted(worst_first(list(comparison.notices)), key=lambda n: n.code in _ASIDE)
+        for notice in worst_first(list(comparison.notices))
         if notice.code not in ("curves-differ", "curves-close")
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.text import brief, per_cent
-from gmwm.errors import printable
 from gmwm.fleet import (
     CONFIDENCE,
     CONTENT,
@@ -23,7 +22,7 @@ from gmwm.fleet import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.page import write_page
+from gmwm.report.page import origin, write_page
 from gmwm.report.text import duration_text
 
 _TITLES = {
@@ -74,7 +73,7 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
             for each in fleet.structures
         ],
         troubled=_troubled(fleet),
-        options=_options(fleet),
+        provenance=origin(_options(fleet), "report of", None),
     )
 
 
@@ -226,9 +225,22 @@ def _named(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _options(fleet: Fleet) -> str:
-    shown = {key: each for key, each in fleet.options.items() if each not in (None, {}, [])}
-    return printable("; ".join(f"{key}: {each}" for key, each in shown.items()))
+def _options(fleet: Fleet) -> dict[str, str]:
+    """Those that say something, without those that the page has elsewhere."""
+    shown = fleet.options.items()
+    return {
+        key: _in_words(each)
+        for key, each in shown
+        if key not in ("horizon", "version") and (each or each is False)
+    }
+
+
+def _in_words(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_in_words(each)}" for key, each in value.items())
+    return ", ".join(map(_in_words, value)) if isinstance(value, list | tuple) else str(value)
 
 
 # -- pictures -------------------------------------------------------------------------------------
