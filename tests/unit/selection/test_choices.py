@@ -13,7 +13,6 @@ from gmwm import (
     LowPassNoise,
     QuantizationNoise,
     RandomWalk,
-    RateRamp,
     Sinusoid,
     WhiteNoise,
 )
@@ -21,7 +20,7 @@ from gmwm.estimate.moments import dictionary_fit
 from gmwm.process import as_model
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import Bandwidth, _Beside
-from gmwm.selection.ranking import Candidate, Choices, candidate_of, rank_key
+from gmwm.selection.ranking import Candidate, Choices, candidate_of
 from gmwm.selection.select import Selection, _simplest_of_ties
 
 FILTER = Bandwidth(
@@ -74,12 +73,6 @@ def test_a_probability_needs_degrees_of_freedom():
     assert np.isnan(replace(candidate(3.0), dof=0).p_value)
     # Of one degree of freedom, 3.8415 is exceeded with a chance of 5 %.
     assert replace(candidate(3.8415), dof=1).p_value == pytest.approx(0.05, rel=1e-3)
-
-
-def test_a_ramp_pays_its_margin_in_the_ranking():
-    ramped = WhiteNoise() + RateRamp()
-    assert rank_key(candidate(1.0, model=ramped)) == 1.0 + tuning.RAMP_MARGIN
-    assert rank_key(candidate(1.0)) == 1.0
 
 
 def test_the_smallest_of_those_within_two_comes_first_and_the_rest_stays():
