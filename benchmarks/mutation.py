@@ -130,8 +130,8 @@ def tests_of(mutant: Mutant, tree: Path, data: CoverageData) -> list[str]:
     return [name for _, name in sorted(set(found))] or [str(own)]
 
 
-def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> bool:
-    """Whether no test fails."""
+def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> bool | None:
+    """Whether no test fails; None if they take too long, by the change or by the machine's load."""
     file = tree / mutant.path
     source = file.read_text()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
@@ -144,7 +144,7 @@ def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> 
         else:
             result = pytest(tree, *tests, timeout=longest)
     except subprocess.TimeoutExpired:
-        return False
+        return None
     finally:
         file.write_text(source)
     return result.returncode == 0
@@ -155,7 +155,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--mutants", type=int, default=304)
     parser.add_argument("--seed", type=int, default=0)
-    longest = "s, after which the tests of a change are stopped: it hangs, and is noticed"
+    longest = "s, after which the tests of a change are stopped, which then counts for nothing"
     parser.add_argument("--longest", type=float, default=240.0, help=longest)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
@@ -175,13 +175,14 @@ def main() -> None:
     report({Mutant(**json.loads(key)): alive for key, alive in results.items()}, tree)
 
 
-def report(results: dict[Mutant, bool], tree: Path) -> None:
-    """Caught by room, and the survivors."""
+def report(results: dict[Mutant, bool | None], tree: Path) -> None:
+    """Caught by room, of those whose tests ended, and the survivors."""
     print(f"{'room':<28}caught   of")
     for room in (*ROOMS, " ".join(ROOMS)):
         alive = [a for m, a in results.items() if Path(m.path).parts[2] in room.split()]
         name = "all" if room == " ".join(ROOMS) else room
-        print(f"{name:<28}{alive.count(False):>6}{len(alive):>5}")
+        print(f"{name:<28}{alive.count(False):>6}{len(alive) - alive.count(None):>5}")
+    print(f"{list(results.values()).count(None)} were stopped")
     print("\nSurvivors")
     for mutant in sorted((m for m, a in results.items() if a), key=lambda m: (m.path, m.line)):
         line = (tree / mutant.path).read_text().splitlines()[mutant.line - 1]

@@ -117,7 +117,10 @@ def _day(text: str) -> date:
         return date.fromisoformat(text)
     plain = re.sub("[-/]", "", text)
     if len(plain) == 7 and len(text) <= 8:
-        return datetime.strptime(plain, "%Y%j").date()
+        found = datetime.strptime(plain, "%Y%j").date()
+        if found.year != int(plain[:4]):  # it takes a 366th day of any year
+            raise ValueError("no day")
+        return found
     parts = re.split("[-/]", text) if text != plain else (text[:4], text[4:6], text[6:])
     return date(*map(int, parts))
 

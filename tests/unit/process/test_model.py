@@ -16,7 +16,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.process import model_from_list
+from gmwm.process import as_model, model_from_list
 
 
 def test_repr_is_readable_and_evaluates_back():
@@ -80,6 +80,8 @@ def test_moments_of_a_sum_are_sums_of_moments():
         (lambda: ARIMA(0, 3), "d = 3"),
         (lambda: AR("two"), "give an order"),
         (lambda: 0 * WhiteNoise(), "must be 1 or more"),
+        (lambda: True * WhiteNoise(), "must be 1 or more"),
+        (lambda: 1 + WhiteNoise(), "not|no "),
         (lambda: WhiteNoise().simulate(10, 1.0), "free parameters"),
         (lambda: WhiteNoise(1.0).simulate(0, 1.0), "positive integer"),
         (lambda: WhiteNoise(1.0).simulate(5, -1.0), "positive sampling interval"),
@@ -93,6 +95,12 @@ def test_moments_of_a_sum_are_sums_of_moments():
 def test_what_is_wrong_is_said(build, words):
     with pytest.raises(gmwm.InputError, match=words):
         build()
+
+
+def test_the_least_that_is_right():
+    noise = WhiteNoise(1.0)
+    assert 1 * noise == as_model(noise) == sum([noise])
+    assert noise.simulate(1, 1.0, 3).shape == (1,)
 
 
 def test_instances_do_not_change():

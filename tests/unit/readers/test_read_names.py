@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gmwm.readers.names import meaning
+from gmwm.readers.names import meaning, of_dates
 
 GYRO = """gyro_{} g{} w{} omega_{} angular_velocity.{} angular_velocity_{} gyr_{} rate_{} ang_vel_{}
     imu.angular_velocity.{} /imu/data/angular_velocity/{} gyro{} {}gyro {}_gyro_out RAW_IMU.{}gyro
@@ -15,6 +15,7 @@ ACCEL = """accel_{} a{} acc_{} f{} linear_acceleration.{} acceleration_{} a_RS_S
 NEITHER = """qx qw orientation.x mag_x x y z w a g flag index seq max
     acc_max
     gyro_bias_x bias_gyro_x linear_velocity_x yaw_rate pitch_rate gyro_integral_dt delta_angle_x
+    hours minutes days t_min sample_time_coarse time_of_flight
     accelerometer_timestamp_relative angular_velocity_covariance[0] error_rate s dates times
     3 col3 [] [deg/s]"""
 
@@ -57,6 +58,11 @@ def test_anything_else(name):
         *[(name, 1e-3) for name in ("ms", "time_ms", "t [ms]", "millis", "timestamp_msec")],
         *[(name, 1e-6) for name in ("TimeUS", "timestamp_us", "time [µs]", "time(μs)", "micros")],
         *[(name, 1e-9) for name in ("#timestamp [ns]", "time_ns", "t_nsec", "timens")],
+        *[(name, 60.0) for name in ("time [min]", "time_minutes")],
+        *[(name, 3600.0) for name in ("time [h]", "time_hours")],
+        *[(name, 86400.0) for name in ("time [days]", "time_days")],
+        ("SampleTimeFine", 1e-4),
+        ("time_ms [s]", 1.0),
     ],
 )
 def test_time(name, seconds):
@@ -96,3 +102,21 @@ def test_time(name, seconds):
 )
 def test_unit(name, unit):
     assert meaning(name).unit == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "stated"),
+    [("time [ticks]", "ticks"), ("t [s]", "s"), ("time", ""), ("stamp (UTC)", "UTC")],
+)
+def test_what_a_name_states_of_its_time(name, stated):
+    assert meaning(name).stated == stated
+
+
+@pytest.mark.parametrize(
+    ("name", "dates"),
+    [("UTC", "UTC time [s]"), ("", "time [s]"), ("date (UTC)", "date time [s]"),
+     ("time", "time [s]"), ("stamp [local]", "stamp [s]")],
+)  # fmt: skip
+def test_columns_of_dates_are_times_in_seconds(name, dates):
+    assert of_dates(name) == dates
+    assert meaning(dates).seconds == 1.0

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from gmwm._core.distributions import chi2
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss, standstills
 from gmwm.ins.geometry.earth import ned_difference
 from gmwm.ins.geometry.rotation import matrix_from_rpy
@@ -169,3 +171,55 @@ def test_what_cannot_be_used_is_said_in_one_sentence(make, words):
 def test_wrong_options_of_gnss(car, options, words):
     with pytest.raises(InputError, match=words):
         gnss(car, **options)
+
+
+def test_the_least_and_the_most_that_can_be_used():
+    assert Outage(0.0, 1.0).end == 1.0
+    same = fixes([1.0, 1.0], sd=0.0)
+    assert same.time.tolist() == [1.0, 1.0]
+    Aiding(coloured_sd=(0.0, 0.0, 1.0), barometer_sd=0.0, gate=0.999)
+    for gate in (0.0, 1.0, -0.1, "no"):
+        with pytest.raises(InputError, match="gate = "):
+            Aiding(gate=gate)
+    for wrong in (-1.0, np.inf, None):
+        with pytest.raises(InputError, match="barometer_sd = "):
+            Aiding(barometer_sd=wrong)
+    events = Aiding((fixes([-0.004, 0.0, 9.996, 10.004]),)).events(0.01, 1000)
+    assert events.epoch.tolist() == [0, 0, 1000, 1000]
+    np.testing.assert_allclose(events.offset, [-0.004, 0.0, -0.004, 0.004], atol=1e-12)
+    for late in (-0.006, 10.006):
+        with pytest.raises(InputError, match="the IMU record goes from 0 to 10 s"):
+            Aiding((fixes([late]),)).events(0.01, 1000)
+
+
+def test_a_gate_has_the_degrees_of_freedom_of_its_fix():
+    flat = fixes([1.0])
+    flat.sd[0, 2] = 0.0
+    height = fixes([2.0], "height", sd=0.0)
+    height.sd[0, 0] = 1.0
+    still = fixes([3.0], "standstill")
+    given = (flat, fixes([1.5]), height, still)
+    found = Aiding(given, gate=0.01).events(1.0, 10).gate
+    np.testing.assert_allclose(found, chi2.isf(0.01, np.array([2, 3, 1, 3])))
+    found = Aiding(given).events(1.0, 10).gate
+    np.testing.assert_allclose(found[[0, 1, 2]], np.inf)
+    assert found[3] == pytest.approx(float(chi2.isf(tuning.GATE, 3)))
+
+
+def test_the_first_fixes_of_a_kind_and_both_barometers():
+    none, some = fixes([]), fixes([1.0])
+    assert Aiding((none, some)).of("position") is some
+    assert Aiding((none,)).of("position") is None and Aiding((some,)).of("velocity") is None
+    one, other = Aiding((some,), barometer_sd=3.0, barometer_tau=7.0), Aiding((none,))
+    for both in (one + other, other + one):
+        assert (both.barometer_sd, both.barometer_tau) == (3.0, 7.0)
+        assert len(both.fixes) == 2
+
+
+def test_fixes_of_a_kind_are_moved_in_their_own_units():
+    by = np.array([[1.0, -2.0, 3.0]])
+    start = np.array([[0.8, 0.2, 100.0]])
+    moved = fixes([1.0], value=start).moved(by)
+    np.testing.assert_allclose(ned_difference(moved, start), by, atol=1e-6)
+    np.testing.assert_allclose(fixes([1.0], "velocity", start).moved(by), start + by)
+    np.testing.assert_allclose(fixes([1.0], "height", start).moved(by), [[1.8, 0.2, 100.0]])

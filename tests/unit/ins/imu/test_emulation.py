@@ -157,12 +157,3 @@ def test_errors_are_added() -> None:
     gyro[3, 1] = np.nan
     with pytest.raises(InputError, match="gyro_errors is not finite at index 3"):
         imu.with_errors(gyro, accel)
-
-
-def test_increments_of_other_shapes_are_refused() -> None:
-    with pytest.raises(InputError, match="velocity has shape"):
-        Imu(0.01, np.zeros((4, 3)), np.zeros((5, 3)))
-    with pytest.raises(InputError, match="dt ="):
-        Imu(0.0, np.zeros((4, 3)), np.zeros((4, 3)))
-    with pytest.raises(InputError, match="rotation has shape"):
-        Imu(0.01, np.zeros(3), np.zeros(3))

@@ -1,0 +1,250 @@
+"""Counts of samples that are missing, held, at an end or on a value, from counts made by hand."""
+
+import numpy as np
+import pytest
+
+from gmwm import Channel
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.repeated import held_share, leaves_runs, repetition, thinned
+from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
+from gmwm.diagnosis.samples import (
+    gap_notices,
+    hole_notice,
+    is_dithered,
+    length_notice,
+    repeated_value_notice,
+    run_lengths,
+    saturation_notice,
+)
+
+
+def channel(values, name="gyro_x", dt=0.01):
+    return Channel(name, np.asarray(values, dtype=float), dt, "gyro", "rad/s")
+
+
+def shuffled(counts, seed=1, first=0):
+    """Samples of whole values from ``first`` on, of each as many as counted."""
+    values = np.repeat(np.arange(first, first + len(counts), dtype=float), counts)
+    return np.random.default_rng(seed).permutation(values)
+
+
+def test_gaps_are_counted():
+    values = np.ones(100)
+    values[[0, 1, 2, 50, 98, 99]] = np.nan
+    (found,) = gap_notices([channel(values)], 0.1)
+    assert found.values == pytest.approx(
+        {"missing": 6.0, "share": 0.06, "gaps": 3.0, "longest": 0.3}
+    )
+    assert (found.where, found.severity) == ("gyro_x", "note")
+    assert "6 of 100 samples missing (0.06 of all) in 3 gaps, the longest 0.3 s" in found.text
+    values[:] = 1.0
+    values[7] = np.nan
+    assert "in 1 gap," in gap_notices([channel(values)], 0.1)[0].text
+
+
+@pytest.mark.parametrize(
+    ("missing", "severity"),
+    [(0, None), (10, "note"), (11, "warning"), (50, "warning"), (51, "bad"), (100, "bad")],
+)
+def test_many_gaps_are_worse(missing, severity):
+    values = np.ones(100)
+    values[:missing] = np.nan
+    assert [each.severity for each in gap_notices([channel(values)], 1.0)] == (
+        [severity] if severity else []
+    )
+
+
+def test_gaps_of_all_channels_are_those_of_the_recording():
+    one, other = np.ones(10), np.ones(10)
+    one[3] = other[3] = np.nan
+    pair = [channel(one, "gyro_x"), channel(other, "gyro_y")]
+    assert [each.where for each in gap_notices(pair, 1.0)] == [""]
+    assert [each.where for each in gap_notices(pair[:1], 1.0)] == ["gyro_x"]
+    other[4] = np.nan
+    assert [each.where for each in gap_notices(pair, 1.0)] == ["gyro_x", "gyro_y"]
+    assert [each.where for each in gap_notices([*pair, channel(np.ones(10), "gyro_z")], 1.0)] == [
+        "gyro_x", "gyro_y",
+    ]  # fmt: skip
+
+
+def test_an_hour_is_long():
+    assert length_notice(360_000, 100.0).severity == "good"
+    short = length_notice(359_999, 100.0)
+    assert short.severity == "note"
+    assert short.values == {"duration": 3599.99, "rate": 100.0}
+
+
+def test_runs_of_equal_samples():
+    assert run_lengths(np.array([5.0, 5, 1, 2, 2, 2])).tolist() == [2, 1, 3]
+    assert run_lengths(np.array([5.0])).tolist() == [1]
+
+
+def test_noise_is_as_wide_as_its_steps_between_runs():
+    noise = np.tile([0.0, 2.0, 0.0, 1.0], 16)
+    assert is_dithered(noise[: tuning.LONG_RUN + 1], 0.0)
+    assert not is_dithered(noise[: tuning.LONG_RUN], 0.0)
+    assert is_dithered(noise, 1.0) and not is_dithered(noise, 1.4)
+    held = np.concatenate([noise, np.full(tuning.LONG_RUN - 2, 1.0), noise])
+    assert is_dithered(held, 1.0)
+    few = np.tile([0.0, 1.0], 1000)
+    for far, dithered in ((49, False), (50, True)):  # each makes two steps, of 1999
+        few[1 : 2 * far : 2] = 2.0
+        assert is_dithered(few, 1.0) is dithered
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("last", "found"), [(7, False), (28, False), (34, True), (2000, True)])
+def test_more_samples_at_the_end_than_before_it(sign, last, found):
+    values = sign * shuffled([last, 20, 60, 400, 2000, 5000, 2000, 400, 60, 20, 4])
+    notice = saturation_notice("gyro_x", "rad/s", values, values, 1.0)
+    assert (notice is not None) is found
+    if found:
+        assert notice.values == pytest.approx({
+            "samples": last, "share": last / values.size,
+            "lowest": np.min(values), "highest": np.max(values),
+        })  # fmt: skip
+        assert notice.severity == ("bad" if last > 1e-3 * values.size else "warning")
+        quiet = values[np.abs(values) > 0.0]
+        assert saturation_notice("x", "rad/s", values, quiet, 1.0).severity == "warning"
+
+
+def test_both_ends_are_counted():
+    values = shuffled([80, 20, 60, 400, 2000, 400, 60, 20, 90])
+    notice = saturation_notice("gyro_x", "rad/s", values, values, 1.0)
+    assert notice.values["samples"] == 170.0
+    assert "170 samples" in notice.text and " and " in notice.text
+
+
+@pytest.mark.parametrize(
+    ("counts", "found"),
+    [
+        ([5, 20, 40, 0, 0, 0, 40, 20, 9], False),  # edges of three
+        ([9, 20, 40, 0, 0, 0, 40, 20, 9], True),
+        ([9, 20, 40, 0, 0, 0, 40, 20, 8], True),
+        ([9, 20, 40, 0, 0, 0, 40, 20, 7], False),
+        ([9, 20, 40, 0, 0, 40, 20, 9], False),  # a hole of two
+        ([9, 41, 20, 0, 0, 0, 40, 20, 9], False),  # falls towards it
+        ([9, 40, 20, 0, 0, 0, 40, 20, 9], True),
+        ([9, 20, 0, 40, 0, 0, 0, 40, 20, 9], False),
+    ],
+)
+def test_steps_that_never_come(counts, found):
+    values = shuffled(counts, first=-3)
+    notice = hole_notice("gyro_x", "rad/s", values, 1.0, 3.0)
+    assert (notice is not None) is found
+    if found:
+        assert notice.values == {"lowest": -1.0, "highest": 3.0, "holes": 1.0}
+        assert notice.severity == "bad"
+        assert hole_notice("x", "rad/s", values, 1.0, 8.5).severity == "warning"
+        assert hole_notice("x", "rad/s", values, 1.0, 1.0) is not None
+        assert hole_notice("x", "rad/s", values, 1.0, 0.99) is None
+        assert hole_notice("x", "rad/s", values, 0.0, 3.0) is None
+
+
+@pytest.mark.parametrize(
+    ("most", "severity"), [(431, None), (433, "warning"), (600, "bad"), (1500, "bad")]
+)
+def test_a_value_that_comes_far_more_often_than_those_beside_it(most, severity):
+    counts = np.array([10, 50, 100, 80, most, 100, 60, 30, 20])
+    # No two of it in a row, so that runs are counted one by one.
+    rest = shuffled([*counts[:4], 0, *counts[5:]])
+    values = np.full(2 * most + 9550, np.nan)
+    values[: 2 * most : 2] = 4.0
+    free = np.flatnonzero(np.isnan(values))
+    values[free] = np.resize(rest[rest != 4.0], free.size)
+    often = np.unique(values[np.diff(values, prepend=-1) != 0], return_counts=True)[1]
+    scale = np.max(np.delete(often, 4)[2:6]) / 100.0
+    notice = repeated_value_notice("gyro_x", "rad/s", values, 1.0, 2.0)
+    enough = most - 4.0 * 100.0 * scale >= tuning.LONG_RUN
+    assert (notice is not None) is bool(enough)
+    if enough:
+        assert notice.values["value"] == 4.0
+        assert notice.values["samples"] == most
+        assert notice.severity == ("bad" if most > 0.05 * values.size else "warning")
+
+
+@pytest.mark.parametrize(("zeros", "found"), [(1000, False), (1300, False), (2000, True)])
+def test_numbers_cut_towards_zero(zeros, found):
+    # Of a wide law: one step hardly falls, zero comes twice.
+    counts = [300, 600, 900, 1000, zeros, 1000, 900, 600, 300]
+    values = shuffled(counts, first=-4)
+    notice = repeated_value_notice("gyro_x", "rad/s", values, 1.0, 2.0)
+    assert (notice is not None) is found
+    if found:
+        share = zeros / values.size
+        assert notice.values == pytest.approx({"value": 0.0, "samples": zeros, "share": share})
+        assert "cut towards zero" in notice.text and notice.severity == "bad"
+
+
+@pytest.mark.parametrize(("times", "first"), [(2, 0), (2, 1), (3, 2), (5, 0)])
+def test_samples_that_are_repeated_are_counted(times, first):
+    own = np.random.default_rng(5).normal(size=200)
+    values = np.repeat(own, times)[times - first if first else 0 :]
+    found = repetition(channel(values))
+    assert (found.times, found.first) == (times, first)
+    thin = thinned(channel(values), found)
+    assert thin.dt == pytest.approx(0.01 * times)
+    np.testing.assert_array_equal(thin.values, own[1 if first else 0 :])
+    assert repetition(channel(own)) is None
+    last = (first or times) + (tuning.FEWEST_KNOWN - 1) * times
+    assert repetition(channel(values[:last])) is None
+    assert repetition(channel(values[: last + 1])) is not None
+
+
+def test_samples_left_between_those_that_are_held():
+    values = np.arange(100.0)
+    values[17::17] = values[16::17][: values[17::17].size]
+    assert leaves_runs(values)
+    values = np.arange(100.0)
+    values[16::16] = values[15::16][: values[16::16].size]
+    assert not leaves_runs(values)
+    values[16::16] = np.nan
+    assert not leaves_runs(values)
+
+
+@pytest.mark.parametrize("held", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize("step", [0.0, 0.25])
+def test_the_share_of_samples_that_are_held(held, step):
+    rng = np.random.default_rng(6)
+    values = rng.normal(size=40_000)
+    values = np.rint(values / step) * step if step else values
+    again = np.flatnonzero(rng.random(values.size) < held)[1:]
+    values[again] = values[again - 1]
+    share, chance = held_share(values, step, 1.0)
+    assert share == pytest.approx(held, rel=0.25, abs=1e-9)
+    by_chance = 0.0 if step == 0.0 or held == 0.0 else 0.25 / np.sqrt(4.0 * np.pi)
+    assert chance == pytest.approx(by_chance, rel=0.2)
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0 / 3.0, 2e-6, 7.0])
+@pytest.mark.parametrize("digits", [None, 2])
+def test_the_step_of_samples(step, digits):
+    values = step * np.random.default_rng(7).integers(-50, 50, 3000)
+    if digits:
+        values = np.round(values / step, digits) * step
+    assert step_size(values) == pytest.approx(step, rel=1e-6)
+    coarse = values[np.rint(values / step) % 3 != 1]  # places that never come
+    assert step_size(coarse) == pytest.approx(step, rel=1e-6)
+    assert step_size(np.random.default_rng(8).normal(size=3000)) == 0.0
+    assert step_size(np.full(10, step)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("scatter", "severity"),
+    [(1.5 * 3.0, "good"), (2.05, "good"), (1.95, "note"), (1.05, "note"), (0.95, "warning"),
+     (0.34, "warning"), (0.32, "bad")],
+)  # fmt: skip
+def test_how_coarse_a_step_is_beside_the_noise(scatter, severity):
+    found = rounding_notice("gyro_x", "rad/s", 1.0, float(np.hypot(scatter, 12**-0.5)))
+    assert found.severity == severity
+    assert found.values == pytest.approx({"lsb": 1.0, "noise": scatter})
+    assert rounding_notice("gyro_x", "rad/s", 0.0, 1.0) is None
+
+
+def test_two_levels_are_coarse_wherever_they_are():
+    rng = np.random.default_rng(9)
+    for noise, coarse in ((0.15, True), (0.5, False)):
+        for mean in (0.0, 0.5, 7.3):
+            values = np.rint(mean + noise * rng.normal(size=5000))
+            assert is_coarse(values, 1.0) is coarse
+    assert not is_coarse(np.zeros(0), 1.0)

@@ -1,0 +1,65 @@
+"""The level of discrepancy: when it starts, what it is, when it is forgotten."""
+
+import numpy as np
+import pytest
+
+from gmwm.estimate.moments import discrepancy as room
+from gmwm.estimate.moments.discrepancy import Discrepancy, _moment_estimate
+
+LEVELS = 12
+TARGET = 2.0 ** -np.arange(LEVELS)
+COVARIANCE = np.diag((0.01 * TARGET) ** 2)
+
+
+@pytest.mark.parametrize("delta", [0.02, 0.1, 1.0])
+def test_it_is_what_makes_the_sum_of_squares_its_degrees_of_freedom(delta):
+    # Residuals of one size in units of the error that the discrepancy would give.
+    dof = 9
+    size = np.sqrt(dof / LEVELS) * np.hypot(0.01, delta)
+    residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
+    found = _moment_estimate(residual, COVARIANCE, TARGET, dof)
+    assert found == pytest.approx(delta, rel=1e-4)
+
+
+def test_none_where_chance_explains_the_residuals():
+    residual = 0.01 * TARGET * np.sqrt(9 / LEVELS)
+    assert _moment_estimate(0.999 * residual, COVARIANCE, TARGET, 9) == 0.0
+    assert 0.0 < _moment_estimate(1.01 * residual, COVARIANCE, TARGET, 9) < 0.01
+    assert _moment_estimate(1e3 * TARGET, COVARIANCE, TARGET, 9) == pytest.approx(10.0)
+
+
+def update(each, size):
+    residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
+    return each.update(residual, COVARIANCE, TARGET, TARGET)
+
+
+def test_it_starts_where_the_residuals_are_no_chance_and_settles():
+    each = Discrepancy(None, 9)
+    assert not update(each, 0.01) and each.value == 0.0
+    assert update(each, 0.1)
+    first = each.value
+    assert first == pytest.approx(np.sqrt(LEVELS / 9) * 0.1, rel=0.01)
+    assert not update(each, 0.1) and each.value == pytest.approx(first)
+    np.testing.assert_allclose(
+        each.added_to(COVARIANCE, TARGET), COVARIANCE + np.diag((first * TARGET) ** 2)
+    )
+    each.restart()
+    assert each.value == 0.0
+
+
+@pytest.mark.parametrize(("given", "dof"), [(0.05, 9), (0.0, 9), (None, 0)])
+def test_one_that_is_given_or_not_known_stays(given, dof):
+    each = Discrepancy(given, dof)
+    assert not update(each, 0.3)
+    each.start_at(0.5)
+    assert each.value == (given or 0.0)
+    each.restart()
+    assert each.value == (given or 0.0)
+
+
+def test_it_starts_at_what_was_found_elsewhere_if_that_is_notable():
+    least = room.tuning.DISCREPANCY_NOTABLE
+    for value, taken in ((0.99 * least, 0.0), (1.01 * least, 1.01 * least)):
+        each = Discrepancy(None, 1)
+        each.start_at(value)
+        assert each.value == taken

@@ -1,0 +1,132 @@
+"""Jumps, changes and shifts of a clock, where they are and of what size."""
+
+import numpy as np
+import pytest
+
+from gmwm.readers import tuning
+from gmwm.readers.clock.jumps import Jumps, find_change, find_jumps, find_shifts
+
+DT = 0.004
+
+
+def stamps(n=3000, lost=(), late=(), dt=DT):
+    """An even clock from which (row, rows) are lost, and (row, steps) come late."""
+    place = np.arange(n, dtype=float)
+    for row, rows in lost:
+        place[row:] += rows
+    for row, steps in late:
+        place[row] += steps
+    return 100.0 + dt * place
+
+
+@pytest.mark.parametrize(
+    "lost", [(), ((1, 1),), ((2999, 1),), ((700, 1), (701, 2)), ((10, 40), (1500, 1), (2000, 9))]
+)
+def test_rows_that_are_lost_are_counted_where_they_are(lost):
+    found = find_jumps(stamps(lost=lost))
+    assert found.interval == pytest.approx(DT, rel=1e-9)
+    assert found.rows.tolist() == [row for row, _ in lost]
+    assert found.missing.tolist() == [rows for _, rows in lost]
+    assert found.total == sum(rows for _, rows in lost)
+    np.testing.assert_allclose(found.steps, [1.0 + rows for _, rows in lost], atol=1e-6)
+    assert found.off_grid == 0
+    if lost:
+        assert found.missing[found.longest] == max(rows for _, rows in lost)
+
+
+@pytest.mark.parametrize("steps", [0.4, 0.8, -0.4, 3.0])
+def test_a_stamp_that_is_late_loses_nothing(steps):
+    found = find_jumps(stamps(late=[(1000, min(steps, 0.99))]))
+    assert found.total == 0
+    assert find_jumps(stamps(lost=[(900, 2)], late=[(1000, 0.8)])).rows.tolist() == [900]
+
+
+@pytest.mark.parametrize(("rows", "off"), [(5.0, False), (5.1, False), (5.4, True), (4.6, True)])
+def test_a_jump_that_is_no_whole_number_of_steps(rows, off):
+    found = find_jumps(stamps(lost=[(1500, rows)]))
+    assert found.missing.tolist() == [5.0]
+    assert found.is_off_grid.tolist() == [off]
+    assert found.interval == pytest.approx(DT, rel=1e-6 if off else 1e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rows_are_put_where_their_numbers_say(seed):
+    rng = np.random.default_rng(seed)
+    n = 60
+    rows = np.sort(rng.choice(np.arange(1, n), 6, replace=False))
+    repeated = np.setdiff1d(np.sort(rng.choice(np.arange(1, n), 8, replace=False)), rows)
+    missing = rng.integers(1, 5, rows.size).astype(float)
+    jumps = Jumps(rows, 1.0 + missing, missing, DT, repeated)
+    expected, number = [], -1
+    for row in range(n):
+        if row not in repeated:
+            number += 1 + int(np.sum(missing[rows == row]))
+        expected.append(number)
+    assert jumps.sample(np.arange(n)).tolist() == expected
+    assert jumps.sample(np.array([-1])).tolist() == [-1]
+    values = rng.normal(size=n)
+    spread = jumps.spread(values)
+    kept = np.setdiff1d(np.arange(n), repeated)
+    whole = np.full(expected[-1] + 1, np.nan)
+    whole[np.array(expected)[kept]] = values[kept]
+    np.testing.assert_array_equal(spread, whole)
+
+
+def bursts(length, count, missing=3.0):
+    rows = np.arange(1, count + 1) * length
+    return Jumps(rows, np.full(count, 1.0 + missing), np.full(count, missing), DT)
+
+
+@pytest.mark.parametrize(
+    ("length", "count", "are"), [(8, 20, False), (8, 21, True), (32, 21, True), (33, 21, False)]
+)
+def test_bursts_are_alike_and_short(length, count, are):
+    assert bursts(length, count).are_bursts is are
+
+
+@pytest.mark.parametrize(("odd", "are"), [(9, True), (10, False)])
+def test_nine_of_ten_bursts_are_alike(odd, are):
+    jumps = bursts(8, 101)
+    jumps.missing[1 : 1 + odd] = 4.0
+    assert jumps.are_bursts is are
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "row"), [(0.01, 0.0101, None), (0.01, 0.0103, 1600), (0.0103, 0.01, 800)]
+)
+def test_a_change_of_the_rate_has_a_place(first, second, row):
+    n = 3201
+    at = row or 1600
+    steps = np.where(np.arange(n - 1) < at, first, second)
+    found = find_change(np.cumsum(np.append(0.0, steps)))
+    if row is None:
+        assert found is None
+        return
+    assert found.row == row
+    assert found.rates == pytest.approx((1.0 / first, 1.0 / second))
+
+
+def test_a_change_of_the_rate_needs_two_parts():
+    least = tuning.LEAST_PART
+    steps = np.repeat([0.01, 0.02], least)
+    assert find_change(np.cumsum(np.append(0.0, steps))).row == least
+    assert find_change(np.cumsum(steps)) is None
+    rng = np.random.default_rng(1)
+    noisy = np.repeat([0.01, 0.0103], 400) * (1.0 + 0.3 * rng.normal(size=800))
+    assert find_change(np.cumsum(noisy)) is None
+
+
+@pytest.mark.parametrize(("by", "found"), [(0.5 * tuning.LEAST_SHIFT, False), (3.0, True)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_clock_that_is_late_from_some_row_on(by, found, sign):
+    size = tuning.ROWS_OF_SHIFT
+    n, row = 12 * size, 5 * size + size // 3
+    shifted = stamps(n) + DT * sign * by * (np.arange(n) >= row)
+    even = Jumps(np.array([], dtype=int), np.array([]), np.array([]), DT)
+    shifts = find_shifts(shifted, even)
+    assert len(shifts) == found
+    if found:
+        assert shifts[0] == (row, pytest.approx(sign * by))
+    reported = Jumps(even.rows, even.steps, even.missing, DT, set_at=np.array([row]))
+    assert find_shifts(shifted, reported) == []
+    assert find_shifts(shifted[-5 * size + 1 :], even) == []

@@ -1,0 +1,114 @@
+"""Hot loops of series with gaps against plain loops, and what a filling is made of."""
+
+import numpy as np
+import pytest
+
+from gmwm import RandomWalk, WhiteNoise
+from gmwm.variance.gaps.filling import _deviation
+from gmwm.variance.gaps.kernels import fill, neighbours
+from gmwm.variance.kernels import cumulative
+from gmwm.variance.streaming.window_kernels import (
+    COUNT,
+    FINE,
+    LOST_MEAN,
+    LOST_SQUARE,
+    MEAN,
+    SCARCITY,
+    SQUARE,
+    complete_windows,
+    gappy_windows,
+    total,
+)
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.3])
+def test_a_gap_gets_the_weighted_mean_of_its_boxes_and_a_line(slope):
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=60) + slope * np.arange(60.0)
+    edges = np.array([[12, 17], [30, 31], [40, 44]])
+    block, boxes = np.array([1, 1, 2]), np.array([4, 3, 2])
+    weights = rng.random((3, 4))
+    for row, count in zip(weights, boxes, strict=True):
+        row[:count] /= np.sum(row[:count])
+    for start, stop in edges:
+        values[start:stop] = np.nan
+    given = values.copy()
+    fill(values, cumulative(given, 0.0), edges, block, boxes, weights, slope)
+    for (start, stop), size, count, row in zip(edges, block, boxes, weights, strict=True):
+        mean, near, far = 0.0, 0, size
+        for i in range(count):
+            left, right = given[start - far : start - near], given[stop + near : stop + far]
+            # Of a box with a gap in it, the sum of what is there is taken.
+            mean += row[i] * (np.nansum(left) + np.nansum(right)) / (2.0 * (far - near))
+            near, far = far, 2 * far
+        place = np.arange(start, stop) - 0.5 * (start + stop - 1)
+        np.testing.assert_allclose(values[start:stop], mean + slope * place)
+    there = ~np.isnan(given)
+    np.testing.assert_array_equal(values[there], given[there])
+
+
+def test_pairs_of_gaps_are_counted_by_kind_and_distance():
+    rng = np.random.default_rng(2)
+    centre, kind = np.sort(rng.integers(0, 200, 40)), rng.integers(-1, 3, 40)
+    found = neighbours(centre, kind, 3, 25)
+    expected = np.zeros((3, 3, 25), dtype=int)
+    for g in range(40):
+        for other in range(g + 1, 40):
+            apart = centre[other] - centre[g]
+            if apart < 25 and kind[g] >= 0 and kind[other] >= 0:
+                expected[kind[g], kind[other], apart] += 1
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize(("length", "width"), [(1, 1), (5, 8), (30, 64)])
+@pytest.mark.parametrize("block", [1, 4])
+def test_means_on_both_sides_of_a_gap_differ_by_what_the_noise_makes(length, width, block):
+    dt = 0.5
+    white = WhiteNoise(2.0)  # each sample has a variance of 8
+    found = _deviation(white.psd, dt, block, length, width)
+    assert found == pytest.approx(np.sqrt(2.0 * 8.0 / (width * block)), rel=0.02)
+    walk = RandomWalk(3.0)
+    found = _deviation(walk.psd, dt, block, length, width)
+    # Of a walk: what it goes between two means of w steps with a gap of L between them.
+    expected = 9.0 * dt * block * (length + 2.0 * width / 3.0)
+    assert found == pytest.approx(np.sqrt(expected), rel=0.1)
+
+
+def windows_of(values, present, m):
+    """Haar coefficients of neighbouring means of what is there, by a loop."""
+    for t in range(values.size - 2 * m + 1):
+        first, second = slice(t, t + m), slice(t + m, t + 2 * m)
+        yield t, values[first], present[first], values[second], present[second]
+
+
+@pytest.mark.parametrize(("number", "new"), [(70, 0), (70, 40), (9, 3), (3, 0)])
+def test_windows_of_a_complete_row(number, new):
+    values = np.random.default_rng(3).normal(size=number)
+    sums, totals = np.zeros((FINE + 3, 6)), np.zeros(7)
+    complete_windows(values, new, 0, sums, totals, np.empty((2, number)))
+    for level in range(FINE):
+        m = 2**level
+        w = np.array([
+            0.5 * (np.mean(b) - np.mean(a))
+            for t, a, _, b, _ in windows_of(values, values, m) if t + 2 * m - 1 >= new
+        ])  # fmt: skip
+        assert sums[level, COUNT] == w.size
+        found = sums[level, MEAN] + sums[level, LOST_MEAN]
+        assert found == pytest.approx(np.sum(w), abs=1e-12)
+        found = sums[level, SQUARE] + sums[level, LOST_SQUARE]
+        assert found == pytest.approx(np.sum(w**2), rel=1e-12)
+    assert total(values) == pytest.approx(np.sum(values))
+
+
+def test_windows_of_single_samples_with_gaps():
+    rng = np.random.default_rng(4)
+    values, present = rng.normal(5.0, 1.0, 50), (rng.random(50) < 0.7).astype(float)
+    sums, totals = np.zeros((FINE + 3, 6)), np.zeros(7)
+    gappy_windows(values, present, 10, 0, (0, 1), sums, totals, np.empty((2, 51)))
+    both = (present[1:] > 0.0) & (present[:-1] > 0.0)
+    both[:9] = False
+    w = 0.5 * np.diff(values)[both]
+    assert sums[0, COUNT] == w.size and sums[0, SCARCITY] == 0.0
+    assert sums[0, MEAN] + sums[0, LOST_MEAN] == pytest.approx(np.sum(w))
+    assert sums[0, SQUARE] + sums[0, LOST_SQUARE] == pytest.approx(np.sum(w**2))
+    assert totals[5] + totals[6] == pytest.approx(np.sum(w**4))

@@ -1,0 +1,94 @@
+"""Hot loops of the wavelet variance against plain numpy, at sizes about those of their pieces."""
+
+import numpy as np
+import pytest
+
+from gmwm.variance.kernels import (
+    CHUNK,
+    cumulative,
+    difference_powers,
+    fine_moments,
+    haar_coefficients,
+    slope,
+    survey,
+)
+from gmwm.variance.levels import haar_moments
+
+SIZES = [1, 2, 3, 255, 1023, 1024, 1025, 2600]
+
+
+def series(n, gaps=True):
+    rng = np.random.default_rng(n)
+    values = rng.normal(3.0, 1.0, n)
+    if gaps and n > 2:
+        values[rng.random(n) < 0.2] = np.nan
+    return values
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_a_survey_is_the_count_sum_and_range_of_what_exists(n):
+    values = series(n)
+    found = survey(values)
+    there = values[~np.isnan(values)]
+    expected = (n - there.size, np.sum(there), np.min(there), np.max(there))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_powers_of_first_differences(n):
+    values = series(n)
+    steps = np.diff(values)
+    steps = steps[~np.isnan(steps)]
+    expected = (steps.size, np.sum(steps**2), np.sum(steps**4))
+    np.testing.assert_allclose(difference_powers(values), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_a_cumulative_sum_passes_over_what_is_missing(n):
+    values = series(n)
+    expected = np.concatenate([[0.0], np.nancumsum(values - 2.0)])
+    np.testing.assert_allclose(cumulative(values, 2.0), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("parts", [[0], [0, 700], [0, 1, 1300, 2599]])
+def test_one_slope_through_parts_of_levels_of_their_own(parts):
+    values = series(2600)
+    place = np.arange(values.size, dtype=float)
+    own = np.searchsorted(parts, place, side="right")
+    regressors = np.column_stack([place, *(own == k for k in range(1, len(parts) + 1))])
+    there = ~np.isnan(values)
+    expected = np.linalg.lstsq(regressors[there], values[there], rcond=None)[0][0]
+    assert slope(values, np.array(parts)) == pytest.approx(expected, rel=1e-9)
+    assert slope(values[:1], np.array([0])) == 0.0
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [[(0, 2 * CHUNK + 5)], [(3, 40), (47, CHUNK + 46), (CHUNK + 50, 4 * CHUNK)], [(7, 8), (9, 73)]],
+)
+def test_moments_are_those_of_the_coefficients_of_each_run(ends):
+    runs = np.array(ends)
+    values = series(runs[-1, 1] + 9, gaps=False) - 3.0
+    integral = cumulative(values, 0.0)
+    longest = int(np.max(runs[:, 1] - runs[:, 0]))
+    averaging = 2 ** np.arange(longest.bit_length() - 1)
+    expected = []
+    for m in averaging.tolist():
+        w = np.concatenate([haar_coefficients(integral, a, b, m) for a, b in ends])
+        expected.append((np.mean(w), np.mean(w**2)))
+    found = haar_moments(values, integral, runs, averaging.astype(float))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(
+        haar_moments(values, integral, runs, averaging[1:].astype(float)), expected[1:],
+        rtol=1e-9, atol=1e-14,
+    )  # fmt: skip
+
+
+def test_moments_of_parts_add_up():
+    values, levels = series(3 * CHUNK, gaps=False), 9
+    whole, parts = np.zeros((2, levels, 3))
+    fine_moments(values, 0, values.size, values.size, levels, whole)
+    for start, stop in ((0, 1), (1, CHUNK + 3), (CHUNK + 3, values.size)):
+        fine_moments(values, start, stop, values.size, levels, parts)
+    np.testing.assert_allclose(parts, whole, rtol=1e-12)
+    assert whole[:, 0].tolist() == [values.size - 2 * 2**j + 1 for j in range(levels)]
