@@ -61,13 +61,17 @@ def with_one_remedy(
     )
     action = "calibrate that part"
     if removable:
-        action += ", or take them off, which keeps all (remove_departures=True)"
+        action += ", or subtract them (remove_departures=True)"
 
     def together(notice: Notice) -> Notice:
         if notice not in departed:
             return notice
         values = {**notice.values, "together": True}
-        return replace(notice, values=values, action="as advised for the whole recording")
+        return replace(
+            notice,
+            values=values,
+            action="calibrate the longest part without them, or subtract them",
+        )
 
     alike = {
         name: each

@@ -80,7 +80,7 @@ def with_option(notice: Notice) -> Notice:
     if notice.code == LONGEST_PART:
         ends = {"start": 0.0, "stop": values["of"]}
         cut = " ".join(f"--{k} {values[k]:.6g}" for k, end in ends.items() if values[k] != end)
-        action = cut + ", or --remove-departures, which keeps all" * values["removable"]
+        action = cut + ", or --remove-departures, which subtracts them" * values["removable"]
         return replace(notice, action=action)
     if notice.severity == "note" or not values.get("evident") or values.get("together"):
         return notice

@@ -284,9 +284,11 @@ def test_several_steps_have_one_remedy_for_the_whole_recording():
         (b[0] - a[1], a[1], b[0]) for a, b in pairwise([(0, 0.0), *edges, (found.duration, 0)])
     )
     assert (advice.values["start"], advice.values["stop"]) == pytest.approx(kept[1:])
-    assert {n.action for n in steps} == {"as advised for the whole recording"}
+    assert {n.action for n in steps} == {
+        "calibrate the longest part without them, or subtract them"
+    }
     action = with_option(advice).action
-    assert action.endswith("or --remove-departures, which keeps all")
+    assert action.endswith("or --remove-departures, which subtracts them")
     assert f"--start {kept[1]:.6g}" in action or f"--stop {kept[2]:.6g}" in action
     assert with_option(steps[0]) == steps[0]
 
