@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import Channel
+from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.repeated import held_share, leaves_runs, repetition, thinned
 from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
@@ -238,6 +239,9 @@ def test_how_coarse_a_step_is_beside_the_noise(scatter, severity):
     found = rounding_notice("gyro_x", "rad/s", 1.0, float(np.hypot(scatter, 12**-0.5)))
     assert found.severity == severity
     assert found.values == pytest.approx({"lsb": 1.0, "noise": scatter})
+    if scatter > 1.0:
+        share = per_cent(1.0 / 12.0 / (scatter**2 + 1.0 / 12.0))
+        assert found.action == f"counted as white noise: {share} of it"
     assert rounding_notice("gyro_x", "rad/s", 0.0, 1.0) is None
 
 

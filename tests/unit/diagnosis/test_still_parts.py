@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gmwm import Channel
+from gmwm import Channel, Recording
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.still.loudness import _changes, _split, loudness
 from gmwm.diagnosis.still.stretches import (
@@ -14,6 +14,7 @@ from gmwm.diagnosis.still.stretches import (
     _quiet,
     _runs,
     _vibrates,
+    find_still,
 )
 
 LONG = tuning.BLOCKS_OF_FLOOR
@@ -169,3 +170,19 @@ def test_loud_blocks_are_those_between_two_changes():
     few = loudness(scatter[:116], np.zeros(3))  # less than thirty times four blocks
     assert not few.loud.any() and few.ratio == 1.0
     assert not loudness(scatter, np.full(3, 10.0)).loud.any()  # below the step
+
+
+def test_stretches_end_a_block_before_motion_and_with_the_recording():
+    rng = np.random.default_rng(4)
+    n = 12_007
+    values = rng.normal(size=(6, n)) * np.array([[1e-3]] * 3 + [[1e-2]] * 3)
+    values[5] += 9.80665
+    values[2, 4000:6000] += 0.5 + rng.normal(size=2000)
+    names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+    recording = Recording.from_arrays(
+        dict(zip(names, values, strict=True)), 100.0, {"gyro": "rad/s", "accel": "m/s^2"}
+    )
+    (begin, stop), (start, end) = find_still(recording).stretches
+    assert (begin, end) == (0.0, recording.duration)
+    # The block after a turn has another mean than the one before it.
+    assert (stop, start) == (40.0 - tuning.STILL_BLOCK, 60.0 + 2 * tuning.STILL_BLOCK)

@@ -15,7 +15,7 @@ ACCEL = """accel_{} a{} acc_{} f{} linear_acceleration.{} acceleration_{} a_RS_S
 NEITHER = """qx qw orientation.x mag_x x y z w a g flag index seq max
     acc_max
     gyro_bias_x bias_gyro_x linear_velocity_x yaw_rate pitch_rate gyro_integral_dt delta_angle_x
-    hours minutes days t_min sample_time_coarse time_of_flight
+    hours minutes days t_min sample_time_coarse time_of_flight g_force_x a_gain_y
     accelerometer_timestamp_relative angular_velocity_covariance[0] error_rate s dates times
     3 col3 [] [deg/s]"""
 

@@ -1,10 +1,13 @@
 """Means and noise of sensors at rest, on either side of what contradicts a unit or the columns."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from gmwm import InputError, Recording
-from gmwm.readers.at_rest.sensors import _Sensor, rest_notices
+from gmwm.readers import tuning
+from gmwm.readers.at_rest.sensors import _by_earth, _Sensor, rest_notices
 
 G, RATE, N = 9.80665, 100.0, 2000
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -110,3 +113,17 @@ def test_gravity_in_the_columns_of_the_gyro(size, noise, swapped):
     assert found.values["gyro"] == pytest.approx(size, rel=0.01)
     both = recorded((0.0, size, 0.0), (0.0, 0.0, G), (noise * size, 1e-2))
     assert all(each.code != "swapped" for each in notices(both))
+
+
+@pytest.mark.parametrize(
+    ("density", "off", "found"),
+    [(0.99, 0.0, True), (1.01, 0.0, False), (0.0, 0.0, False), (0.5, 0.99, True),
+     (0.5, -0.99, True), (0.5, 1.01, False)],
+)  # fmt: skip
+def test_the_rate_of_the_earth_in_another_unit_of_a_quiet_gyro(density, off, found):
+    ratio = 57.0
+    size = 7.292115e-5 * (1.0 + off * tuning.EARTH_AGREES) / ratio
+    rate = SimpleNamespace(density=density * tuning.EARTH_SEEN / ratio, size=size)
+    said = _by_earth(rate, {"deg/h": 1e-3, "rad/s": ratio})
+    assert (said is not None) is found
+    assert said is None or said == ("the mean rate is that of the earth in rad/s", ["rad/s"])

@@ -112,6 +112,8 @@ def test_a_candidate_of_a_fit_has_its_statistic_and_price():
     assert found.chi_square == fit.chi_square_allowed > 0.0
     price = 2 * 3.0 * np.log(np.log(2000))
     assert found.criterion == pytest.approx(fit.chi_square_allowed + price)
+    for dof, statistic in ((1, fit.chi_square_allowed), (0, 0.0)):
+        assert candidate_of(replace(fit, dof=dof)).chi_square == statistic
 
 
 # -- the sensor's low-pass ------------------------------------------------------------------------

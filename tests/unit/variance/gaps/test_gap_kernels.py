@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.variance.gaps.filling import _deviation
+from gmwm.process import haar_gain
+from gmwm.variance.gaps.filling import _deviation, _gain, _nodes
 from gmwm.variance.gaps.kernels import fill, neighbours
 from gmwm.variance.kernels import cumulative
 from gmwm.variance.streaming.window_kernels import (
@@ -112,3 +113,13 @@ def test_windows_of_single_samples_with_gaps():
     assert sums[0, MEAN] + sums[0, LOST_MEAN] == pytest.approx(np.sum(w))
     assert sums[0, SQUARE] + sums[0, LOST_SQUARE] == pytest.approx(np.sum(w**2))
     assert totals[5] + totals[6] == pytest.approx(np.sum(w**4))
+
+
+def test_lobes_that_are_not_resolved_are_replaced_by_their_mean():
+    f, _ = _nodes()
+    for m in (2.0, 5000.0):
+        found = _gain(m)
+        for place in np.searchsorted(f, [0.07, 0.2, 0.3]):
+            # Twenty lobes about the node, or the node itself.
+            near = f[place] + np.linspace(-10.0, 10.0, 20_001) / m * (m > 100.0)
+            assert found[place] == pytest.approx(np.mean(haar_gain(m, near)), rel=0.05)

@@ -1,0 +1,50 @@
+"""Which terms are offered for what a recording shows, and what is said of them."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from gmwm import Resonance, Sinusoid, WhiteNoise
+from gmwm._core.notices import Notice
+from gmwm.calibration import tuning
+from gmwm.calibration.screening import _is_much, terms_of, with_outcomes
+from gmwm.process import as_model
+
+LINES = [(10.0 + k, 1.0 - 0.1 * k) for k in range(tuning.MOST_TERMS + 2)]
+BUMPS = [(50.0, 0.1), (70.0, 0.2)]
+FOUND = SimpleNamespace(lines=lambda _: LINES, resonances=lambda _: BUMPS)
+
+
+@pytest.mark.parametrize("chosen", [(), ("lines",), ("resonances",), ("lines", "resonances")])
+def test_terms_are_offered_for_what_is_chosen(chosen):
+    lines = [Sinusoid(frequency=f) for f, _ in LINES] if "lines" in chosen else []
+    bumps = [Resonance(frequency=f, damping=d) for f, d in BUMPS] if "resonances" in chosen else []
+    expected = [*bumps[:1], *lines, *bumps[1:]][: tuning.MOST_TERMS]
+    assert terms_of(FOUND, "gyro_x", chosen) == tuple(expected)
+
+
+@pytest.mark.parametrize(("off", "near"), [(0.99, True), (1.01, False), (-0.99, True)])
+def test_what_became_of_a_line(off, near):
+    frequency = 10.0 * (1.0 + off * tuning.SAME_FREQUENCY)
+    line = Notice("line", "warning", "gyro_x", "", {"frequency": 10.0}, "find it")
+    other = Notice("line", "warning", "gyro_y", "", {"frequency": 10.0}, "find it")
+    with_it = {"gyro_x": WhiteNoise(1.0) + Sinusoid(1.0, frequency)}
+    plain = {"gyro_x": as_model(WhiteNoise(1.0))}
+    offered = {"gyro_x": (Sinusoid(frequency=frequency),)}
+
+    def said(models, *arguments):
+        first, second = with_outcomes((line, other), models, *arguments)
+        assert second is other
+        return first.action
+
+    assert (said(with_it, {}) == "a term of the model") is near
+    assert (said(plain, offered) == "tried as a term of the model, which does not need it") is near
+    assert said(plain, {}) == "not tried as a term of the model"
+    resonance = {"gyro_x": WhiteNoise(1.0) + Resonance(1.0, 10.0, 0.1)}
+    assert said(resonance, {}) == "not tried as a term of the model"
+
+
+def test_events_are_much_beyond_a_share():
+    most = round(tuning.MOST_LEFT_OUT * 1000)
+    assert not _is_much([(0, most - 5), (100, 105)], 1000)
+    assert _is_much([(0, most - 5), (100, 106)], 1000)
