@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
+
+_CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
+_DEFINED = re.compile(rb"^[A-Z][A-Z0-9_, ]*(?=[:=])", re.MULTILINE)
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -45,11 +49,14 @@ def _stamped(loop: Any) -> Any:
 
 @lru_cache(maxsize=1)
 def digest_of(package: Path) -> bytes:
-    """Of the version, of the constants and of each file with a compiled function."""
-    digest = hashlib.sha256()
-    for file in sorted(package.rglob("*.py")):
-        text = file.read_bytes()
-        if b"@compiled" in text or file.name == "tuning.py" or file == package / "__init__.py":
+    """Of the version, and of each file with a compiled function or a constant that one may hold."""
+    texts = {file: file.read_bytes() for file in sorted(package.rglob("*.py"))}
+    loops = {file: text for file, text in texts.items() if b"@compiled" in text}
+    named = set(_CONSTANT.findall(b"".join(loops.values())))
+    digest = hashlib.sha256(texts[package / "__init__.py"])
+    for file, text in texts.items():
+        defined = _CONSTANT.findall(b" ".join(_DEFINED.findall(text)))
+        if file in loops or not named.isdisjoint(defined):
             digest.update(text)
     return digest.digest()
 

@@ -80,8 +80,12 @@ def test_a_loop_is_compiled_anew_after_what_it_calls_changed(tmp_path, monkeypat
     assert sum(hits.values()) == 1  # the third time from the disk
 
 
-def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants(tmp_path):
-    texts = {"__init__.py": "1", "a.py": "@compiled()", "b/tuning.py": "X = 1", "b/other.py": "y"}
+def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants_that_one_names(tmp_path):
+    texts = {
+        "__init__.py": "1", "a.py": "@compiled()\ndef f():\n    return tuning.LEAST * HALF",
+        "b/tuning.py": "MOST, LEAST = 2, 1", "b/half.py": "_ALL = 4\nHALF: float = _ALL / 2",
+        "b/other.py": "OTHER = 1\ny = HALF",
+    }  # fmt: skip
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -89,6 +93,6 @@ def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants(tmp_pa
     first = digest(tmp_path)
     for name, text in texts.items():
         (tmp_path / name).write_text(text + " ")
-        assert (digest(tmp_path) != first) == (name != "b/other.py")
+        assert (digest(tmp_path) != first) == (name != "b/other.py"), name
         (tmp_path / name).write_text(text)
     assert digest(tmp_path) == first
