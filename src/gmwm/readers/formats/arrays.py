@@ -108,7 +108,9 @@ class ArrayTable:
         notices: Sequence[Notice],
     ) -> ArrayTable:
         if not columns:
-            raise InputError(f"{source} holds no columns: save arrays of samples in it")
+            raise InputError(
+                f"{source} holds no column of more than one sample: save arrays of samples in it"
+            )
         names, arrays = tuple(name for name, _ in columns), tuple(a for _, a in columns)
         return cls(source, names, arrays, rate, notices=tuple(notices))
 
