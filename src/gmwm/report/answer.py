@@ -194,7 +194,8 @@ def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
         title = "One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"
         if any(row["invalid"] for row in rows):
             title += (
-                ": made from all models, also those not valid; at worst too large for valid axes"
+                ": made from all models, also those not valid; at worst too large for a valid "
+                "axis, as good as its model for another"
             )
         groups[title] = rows
     rows = groups.setdefault("Each axis by itself", [])

@@ -35,9 +35,24 @@ def test_rows_of_one_stamp_are_counted(stamps, burst, of_row):
 def test_rows_that_follow_at_the_same_stamp():
     stamps = np.array([1.0, 1, 1, 2, 3, 3])
     same = np.zeros(6, dtype=bool)
-    assert _rows_that_follow(stamps, same).tolist() == [2, 1, 0, 0, 1, 0]
+    assert _rows_that_follow(stamps, same, 3, 10).tolist() == [2, 1, 0, 0, 1, 0]
     same[1] = True  # a copy is no row
-    assert _rows_that_follow(stamps, same).tolist() == [1, 1, 0, 0, 1, 0]
+    assert _rows_that_follow(stamps, same, 3, 10).tolist() == [1, 1, 0, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("burst", "extent", "later", "follow"),
+    [
+        (3, 10, 84.0, [2, 1, 0, 2, 1, 0]),  # the clock was set within three rows
+        (3, 10, -4.0, [2, 1, 0, 2, 1, 0]),
+        (3, 84, 84.0, [2, 1, 0, 0, 1, 0]),  # rows may have been lost
+        (2, 10, 84.0, [2, 1, 0, 0, 1, 0]),  # they are more than a burst
+    ],
+)
+def test_rows_of_a_burst_in_which_the_clock_is_set(burst, extent, later, follow):
+    stamps = np.array([3.0, 3, 3, 6, 6 + later, 6 + later])
+    same = np.zeros(6, dtype=bool)
+    assert _rows_that_follow(stamps, same, burst, extent).tolist() == follow
 
 
 @pytest.mark.parametrize("burst", [1, 4])
