@@ -10,6 +10,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.replay import Replay, alignment_of
+from gmwm.ins.imu import Imu
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,7 @@ class FarStamps:
         the filter of the stamps as they are tells the way: the filter is aligned and run with
         offsets all over, then nearer and nearer to the best.
         """
+        measured = _begun(measured)
         step = tuning.FAR_STEP
         steps = round(tuning.FARTHEST_OFFSET / step)
         sizes = {each * step: _size(measured, each * step) for each in range(-steps, steps + 1)}
@@ -57,12 +59,20 @@ def _size(measured: Measured, offset: float) -> float:
         replay = Replay.of(earlier, alignment_of(earlier))
     except InputError:
         return np.inf
-    replay = replay.within(0.0, tuning.DIAGNOSED)
+    replay = replay.within(0.0, tuning.DIAGNOSED)  # no fix is rejected
     if 2 * replay.standard.shape[0] < sum(each.time.size for each in measured.aiding.fixes):
         return np.inf  # too few are left to be compared with the others
     if not np.isfinite(replay.log_likelihood):
         return np.inf
     return float(np.expm1(np.nanmean(np.log1p(replay.standard**2))))
+
+
+def _begun(measured: Measured) -> Measured:
+    """The part in which faults are looked for; what follows would be read for each offset."""
+    imu = measured.imu
+    n = min(imu.n, round(tuning.DIAGNOSED / imu.dt))
+    part = Imu(imu.dt, imu.rotation[:n], imu.velocity[:n])
+    return _earlier(replace(measured, imu=part), 0.0)
 
 
 def _earlier(measured: Measured, offset: float) -> Measured:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gmwm.ins import Fixes, Navigated, Straight, emulate, gnss, perform
+from gmwm.ins import Fixes, Navigated, Straight, emulate, gnss, perform, tuning
 from gmwm.ins.field.explanations import LEVEL, TESTS, Explanation
 from gmwm.ins.field.far_stamps import FarStamps
 from gmwm.ins.field.faults import Faults, fault_notice, resolution_notice
@@ -74,6 +74,16 @@ def test_stamps_that_are_off_by_seconds_in_circles(offset):
     (fault,) = Navigated.of(late).fault_notices
     assert fault.code == "time-offset"
     assert within(fault, "time offset", offset) < 0.3
+
+
+def test_the_offset_is_looked_for_at_the_beginning_of_a_long_log(monkeypatch):
+    """Fixes after that part do not count as missing."""
+    log, _ = emulated_log(1, duration=300.0, rate=5.0, faults=("leap seconds",))
+    monkeypatch.setattr(tuning, "DIAGNOSED", 120.0)
+    far = FarStamps.of(log)
+    assert far is not None
+    assert far.offset == pytest.approx(18.0, abs=0.2)
+    assert far.replay.imu.n * log.imu.dt <= 120.0
 
 
 def test_right_stamps_have_no_other_offset():
