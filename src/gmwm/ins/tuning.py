@@ -147,6 +147,9 @@ FAR_BETTER = 0.5
 """Square of the innovations, of that with the stamps as they are, below which another offset
 is worth a closer look."""
 
+FAR_LEFT = 0.75
+"""Of the fixes, which have to be in the time of the IMU with another offset."""
+
 LEAP_SECONDS = 18.0
 """s, by which GPS time is ahead of UTC since 2017."""
 

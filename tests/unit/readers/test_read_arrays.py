@@ -152,7 +152,7 @@ def test_entries_that_are_not_wanted_may_be_anything(save, samples):
         (np.zeros((80, 5)), "5 columns without names that are known"),
         (np.zeros((63, 6)), "63 samples where at least 64 are needed"),
         (np.zeros((0, 6)), "0 samples"),
-        (np.zeros((80, 0)), "no columns"),
+        (np.zeros((80, 0)), "no column"),
         (np.zeros(80, [("gx", "f8", (2, 2))]), "column 'gx' has shape (80, 2, 2)"),
         (np.zeros(80, [("p", "f8"), ("q", "f8")]), "columns are 'p', 'q'"),
     ],
@@ -211,10 +211,10 @@ def test_rate_in_the_file_is_bad(save, samples, entry, value):
 
 def test_npz_of_objects_only_or_empty(save, tmp_path):
     assert "holds Python objects" in problem(save(gx=np.array([None, {}])))
-    assert "no columns" in problem(save(a=np.float64(1)))
+    assert "no column" in problem(save(a=np.float64(1)))
     with (tmp_path / "b.npz").open("wb") as stream:
         np.savez(stream)
-    assert "no columns" in problem(tmp_path / "b.npz")
+    assert "no column" in problem(tmp_path / "b.npz")
 
 
 def test_time_in_a_row_message(save, samples):

@@ -28,7 +28,7 @@ class FarStamps:
 
     @classmethod
     def of(cls, measured: Measured) -> FarStamps | None:
-        """Look for the smallest innovations; ``None`` if no offset makes them much smaller.
+        """Look for the smallest innovations; ``None`` if no offset makes them as small as expected.
 
         Level, heading and velocity at the start are as wrong as the stamps, so that nothing near
         the filter of the stamps as they are tells the way: the filter is aligned and run with
@@ -43,8 +43,8 @@ class FarStamps:
             step *= 0.5
             sizes |= {each: _size(measured, each) for each in (best - step, best + step)}
             best = min(sizes, key=sizes.__getitem__)
-        if not sizes[best] < tuning.FAR_BETTER * sizes[0.0]:
-            return None
+        if not sizes[best] < min(tuning.FAR_BETTER * sizes[0.0], tuning.LOST):
+            return None  # as lost as before, or nearly
         earlier = _earlier(measured, best)
         alignment = alignment_of(earlier)
         return cls(best, Replay.of(earlier, alignment), alignment.epoch * measured.imu.dt)
@@ -60,8 +60,9 @@ def _size(measured: Measured, offset: float) -> float:
     except InputError:
         return np.inf
     replay = replay.within(0.0, tuning.DIAGNOSED)  # no fix is rejected
-    if 2 * replay.standard.shape[0] < sum(each.time.size for each in measured.aiding.fixes):
-        return np.inf  # too few are left to be compared with the others
+    fixes = sum(each.time.size for each in measured.aiding.fixes)
+    if replay.standard.shape[0] < tuning.FAR_LEFT * fixes:
+        return np.inf  # a part that shows less is explained by anything
     if not np.isfinite(replay.log_likelihood):
         return np.inf
     return float(np.expm1(np.nanmean(np.log1p(replay.standard**2))))
