@@ -15,7 +15,6 @@ from gmwm.estimate.problem import (
     Slope,
     chi_square,
     drift_key,
-    error_growth,
     in_model_order,
     slope_dof,
     weight_root,
@@ -131,7 +130,6 @@ def conclude(
     jacobian = found.coordinates.jacobian(found.processes)[np.ix_(found.present, found.present)]
     matrix = jacobian @ found.covariance @ jacobian.T
     upper = _upper_bounds(found, all_keys, wv)
-    growth = error_growth(model, keys, wv.n, wv.dt)
     dof = float("inf")
     if slope is not None:
         dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
@@ -164,7 +162,6 @@ def conclude(
         log_likelihood=log_likelihood,
         trace=tuple(trace),
         slope_dof=dof,
-        error_growth=growth,
     )
     shown = missed_level_notices(fit.goodness)
     if misfits or fit.goodness.is_poor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -19,7 +19,7 @@ from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import MissingNameError
-from gmwm.estimate.problem import FittedMoments, Scales, drift_key
+from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
 from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.estimate.result.interval import confidence_interval
@@ -87,9 +87,6 @@ class Fit(Document, Printed):
         Log-likelihood after each iteration of EM.
     slope_dof : float
         Degrees of freedom of the variance of a ramp's slope.
-    error_growth : dict
-        How the relative standard error of a positive parameter goes with its value: the exponent
-        of a power law, by key.
     regions : tuple of Region
         What ``method="allan"`` read the parameters from.
     """
@@ -112,12 +109,11 @@ class Fit(Document, Printed):
     log_likelihood: float = float("nan")
     trace: tuple[float, ...] = ()
     slope_dof: float = float("inf")
-    error_growth: Mapping[str, float] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
 
     def __post_init__(self) -> None:
         checks.choice("method", self.method, tuple(METHOD_NAMES))
-        freeze(self, "covariance", "upper_bounds", "error_growth")
+        freeze(self, "covariance", "upper_bounds")
 
     # -- can it be trusted ------------------------------------------------------------------------
 
@@ -167,6 +163,19 @@ class Fit(Document, Printed):
         """Standard errors of the estimated parameters, in SI units."""
         errors = np.sqrt(np.diag(self.covariance))
         return dict(zip(self.keys, map(float, errors), strict=True))
+
+    @cached_property
+    def error_growth(self) -> Mapping[str, float]:
+        """How the relative standard error of a positive parameter goes with its value.
+
+        The exponent of a power law, by key. Only intervals need it, and of the many fits among
+        which one is selected few are asked for theirs.
+        """
+        if self.method == "allan":
+            return {}
+        noise = [key for key in self.keys if key != drift_key(self.model)]
+        result: Mapping[str, float] = frozen(error_growth(self.model, noise, self.wv.n, self.wv.dt))
+        return result
 
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that keep to the parameters' ranges.

@@ -48,7 +48,6 @@ class FitForm(Form):
     log_likelihood: float | None
     trace: Annotated[Sequence[float], Field(max_length=1_000_000)]
     slope_dof: Positive | None
-    error_growth: dict[Text, float]
     regions: Sequence[RegionForm]
     wavelet_variance: dict[str, Any]
 

@@ -33,7 +33,6 @@ def fit_content(fit: Any) -> dict[str, Any]:
         "log_likelihood": plain(fit.log_likelihood),
         "trace": list(fit.trace),
         "slope_dof": plain(fit.slope_dof),
-        "error_growth": dict(fit.error_growth),
         "regions": [asdict(region) for region in fit.regions],
         "wavelet_variance": fit.wv.to_dict(),
     }
@@ -75,7 +74,6 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
         "log_likelihood": or_nan(content["log_likelihood"]),
         "trace": tuple(content["trace"]),
         "slope_dof": or_nan(content["slope_dof"], infinity),
-        "error_growth": content["error_growth"],
         "regions": tuple(Region(**region) for region in content["regions"]),
     }
 
