@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from hypothesis import settings
 # a test starts compiles the package. It stands in __pycache__ beside the compiled kernels.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A shell has what it runs in the background ignore interrupts, and so would what tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # A suite that fails one day in fifty teaches people to run it again; the bounds of statistical
 # properties hold with a probability. `pytest --hypothesis-profile explore` draws examples anew.
