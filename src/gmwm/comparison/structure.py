@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import noise_density, random_walk
@@ -15,6 +14,7 @@ from gmwm.comparison import tuning
 from gmwm.errors import InputError
 from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.problem import Scales
+from gmwm.estimate.result import between
 from gmwm.filter_numbers import FilterNumbers, bound
 from gmwm.process import Process
 from gmwm.selection import select
@@ -28,7 +28,7 @@ class ParameterSpread:
     joint: Of all recordings together.
     each: Of each recording that is compared, with the same structure; ``None`` where it has none.
     spread: Standard deviation between recordings beyond their standard errors, relative; NaN where
-        fewer than two determine it.
+        fewer than two determine it, or one has all the weight.
     p_value: That it is the same in all of them; NaN likewise.
     """
 
@@ -110,21 +110,17 @@ def spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
 
 
 def _spread(own: Estimate, each: Sequence[Estimate | None]) -> ParameterSpread:
-    """Of the recordings that determine it; the moment estimate of DerSimonian & Laird (1986)."""
+    """Of the recordings that determine it; positive values by their logarithm."""
     known = [e for e in each if e is not None and e.kind == "estimated" and e.stderr]
     if len(known) < 2:
         return ParameterSpread(own, tuple(each), float("nan"), float("nan"))
     values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
-    is_relative = bool(np.all(values > 0.0))
-    if is_relative:
-        values, errors = np.log(values), errors / values
-    weight = errors**-2.0
-    square = float(np.sum(weight * (values - np.average(values, weights=weight)) ** 2))
-    dof = len(known) - 1
-    scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
-    spread = float(np.sqrt(max((square - dof) / scale, 0.0)))
-    spread = spread if is_relative else spread / abs(float(np.mean(values)) or 1.0)
-    return ParameterSpread(own, tuple(each), spread, float(chi2.sf(square, dof)))
+    if np.all(values > 0.0):
+        found, p_value = between(np.log(values), (errors / values) ** 2.0)
+    else:
+        found, p_value = between(values, errors**2.0)
+        found /= abs(float(np.mean(values)) or 1.0)
+    return ParameterSpread(own, tuple(each), found, p_value)
 
 
 def axis_numbers(

@@ -2,7 +2,9 @@
 
 import json
 import re
+import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
 from gmwm.comparison import labelled
 from gmwm.comparison.compare import _labelled, _members
+from gmwm.comparison.structure import spreads
 from gmwm.estimate import estimate
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
@@ -101,6 +104,22 @@ def test_one_structure_with_its_spread(compared):
     assert rows["N"].p_value < 1e-3 < rows["K"].p_value
     assert 0.05 < rows["N"].spread < 0.3
     assert gyro.curve_inflation > 1.05
+
+
+def test_the_spread_beside_a_recording_of_all_the_weight_is_unknown(compared, tmp_path):
+    axis = compared["gyro_x"]
+    parts = [SimpleNamespace(estimates=list(fit.estimates)) for fit in axis.joint.parts]
+    parts[0].estimates[0] = replace(parts[0].estimates[0], stderr=1e-15)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rows = spreads(SimpleNamespace(estimates=axis.joint.estimates, parts=parts))
+    assert np.isnan([rows[0].spread, rows[0].p_value]).all()
+    assert rows[1].spread == axis.parameters[1].spread
+    one = replace(compared, axes={"gyro_x": replace(axis, parameters=rows)})
+    assert json.loads(json.dumps(one.to_dict(), allow_nan=False))
+    text = one.report(tmp_path / "c.html").read_text()
+    assert '<td class="num" data-label="spread">–</td><td class="num" data-label="p">–</td>' in text
+    assert ">nan" not in text
 
 
 def test_covering_numbers_bound_every_recording(compared):

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gmwm._core.forms import Form
 
 _CELLS = 4  # numbers in a line of the table
+_LEAST_SHARE = 1e-9  # of the weight in all but one recording, below which they say nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +43,8 @@ class JointFit(Fit):
         model, to within the discrepancy allowed for; it judges the model too.
     spread : dict
         Standard deviation of each parameter between recordings beyond their standard errors, by
-        key: relative for positive parameters, in its SI unit for others.
+        key: relative for positive parameters, in its SI unit for others. Without those of which
+        one recording has all the weight.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.joint-fit"
@@ -178,7 +180,7 @@ def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
 
 
 def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:
-    """Test of equality, and the spread of each parameter (DerSimonian & Laird 1986).
+    """Test of equality, and the spread of each parameter.
 
     Positive parameters are compared by their logarithm. Only recordings that determine all
     parameters of the joint fit take part.
@@ -201,7 +203,7 @@ def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, fl
     if len(points) < 2 or not keys:
         return float("nan"), {}
     spread = {
-        key: _between(np.array([p[k] for p in points]), np.array([m[k, k] for m in matrices]))
+        key: between(np.array([p[k] for p in points]), np.array([m[k, k] for m in matrices]))[0]
         for k, key in enumerate(keys)
     }
     information = [np.linalg.inv(matrix) for matrix in matrices]
@@ -211,13 +213,19 @@ def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, fl
     )
     away = [point - centre for point in points]
     statistic = sum(a @ i @ a for a, i in zip(away, information, strict=True))
-    return float(chi2.sf(statistic, (len(points) - 1) * len(keys))), spread
+    known = {key: value for key, value in spread.items() if np.isfinite(value)}
+    return float(chi2.sf(statistic, (len(points) - 1) * len(keys))), known
 
 
-def _between(values: FloatArray, variances: FloatArray) -> float:
-    """Standard deviation between recordings beyond their standard errors."""
+def between(values: FloatArray, variances: FloatArray) -> tuple[float, float]:
+    """Standard deviation between recordings beyond their errors, and p-value that there is none.
+
+    The moment estimate of DerSimonian & Laird (1986). NaN where one recording has all the weight.
+    """
     weight = 1.0 / variances
+    if not np.max(weight) < (1.0 - _LEAST_SHARE) * np.sum(weight):
+        return float("nan"), float("nan")
     centre = np.sum(weight * values) / np.sum(weight)
-    excess = np.sum(weight * (values - centre) ** 2) - (values.size - 1)
+    square, dof = float(np.sum(weight * (values - centre) ** 2)), values.size - 1
     scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
-    return float(np.sqrt(max(excess / scale, 0.0)))
+    return float(np.sqrt(max((square - dof) / scale, 0.0))), float(chi2.sf(square, dof))

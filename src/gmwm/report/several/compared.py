@@ -149,8 +149,8 @@ def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...])
         "unit": spread.joint.usual.unit,
         "joint": _cell(spread.joint),
         "cells": cells,
-        "spread": "" if np.isnan(spread.spread) else _share(spread.spread),
-        "p": _p(spread.p_value),
+        "spread": "–" if np.isnan(spread.spread) else _share(spread.spread),
+        "p": _p(spread.p_value) or "–",
         "differs": spread.p_value < 0.01,
     }
 

@@ -1,6 +1,7 @@
 """One model for several recordings."""
 
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.stats import kstest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.result import fit_joint
+from gmwm.estimate.result import between, fit_joint
 from gmwm.variance.pooled import PooledVariance
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)
@@ -140,3 +141,19 @@ def test_a_recording_may_determine_more_than_all_of_them_together():
     assert all("K" not in part.upper_bounds for part in joint.parts)
     assert 0.0 < joint.equality_p <= 1.0
     assert joint.spread.keys() == {"N"}
+
+
+@pytest.mark.parametrize("small", [1e-3, 1e-6, 1e-9, 1e-12, 1e-40])
+@pytest.mark.parametrize("others", [[2.0], [2.0, 5.0], [2.0, 5.0, 3.0]])
+def test_where_one_recording_has_all_the_weight_the_spread_is_unknown(small, others):
+    values = np.array([1.0, *others])
+    errors = np.array([small, *np.full(len(others), 0.5)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spread, p_value = between(values, errors**2)
+    if small < 1e-4:
+        assert np.isnan(spread)
+        assert np.isnan(p_value)
+    else:
+        assert 0.5 < spread < 5.0
+        assert p_value < 0.1
