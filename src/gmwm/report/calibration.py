@@ -10,7 +10,7 @@ from operator import call
 from pathlib import Path
 from typing import Any
 
-from gmwm._core.files import written
+from gmwm._core.files import writable_file, written
 from gmwm._core.notices import worst_first
 from gmwm._core.runs import shared
 from gmwm._core.text import brief, per_cent
@@ -64,10 +64,11 @@ def write_report(
     InputError
         If the file cannot be written, or the data sheet not be read.
     """
+    path = writable_file(path)
     text = page(calibration, recording, datasheet=datasheet, provenance=provenance)
     with written(path) as stream:
         stream.write(text)
-    return Path(path)
+    return path
 
 
 def page(

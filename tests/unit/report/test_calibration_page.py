@@ -510,6 +510,14 @@ def test_data_sheets_that_cannot_be_used(calibration, tmp_path, text, what):
     path.write_text(text)
     with pytest.raises(InputError, match=what):
         read_datasheet(path, {name: fit.wv.quantity or "" for name, fit in calibration.items()})
+    with pytest.raises(InputError, match=what):
+        read_datasheet(path)
+
+
+def test_a_data_sheet_is_read_before_there_are_channels(tmp_path):
+    path = tmp_path / "sheet.yaml"
+    path.write_text("gyro_z: {N: 1 deg/sqrt(h)}\naccel: {B: 1 g}\n")
+    assert set(read_datasheet(path).entries) == {"gyro_z", "accel"}
 
 
 def test_series_and_spectrum_leave_out_what_was_masked(calibration, recording):
@@ -790,9 +798,25 @@ def test_the_file(calibration, tmp_path):
     assert calibration.report(tmp_path / "again.html").read_bytes() == path.read_bytes()
 
 
-def test_a_folder_that_is_not_there(calibration, tmp_path):
+WRITERS = [
+    write_report,
+    gmwm.report.write_comparison_report,
+    gmwm.report.write_fleet_report,
+    gmwm.report.write_navigated_report,
+    gmwm.report.write_sensor_comparison_report,
+    gmwm.report.write_validation_report,
+    lambda nothing, path: gmwm.export(nothing, "kalibr", path=path),
+]
+
+
+@pytest.mark.parametrize("write", WRITERS)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(write, tmp_path):
+    (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match=r"report\.html: cannot be written"):
-        write_report(calibration, tmp_path / "nowhere" / "report.html")
+        write(None, tmp_path / "nowhere" / "report.html")
+    with pytest.raises(InputError, match="folder of that name is in the way"):
+        write(None, str(tmp_path / "folder"))
+    assert [each.name for each in tmp_path.iterdir()] == ["folder"]
 
 
 # -- words ----------------------------------------------------------------------------------------
