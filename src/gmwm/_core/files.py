@@ -116,13 +116,14 @@ def _check_regular(path: Path, mode: int) -> None:
         raise InputError(f"{path} is a pipe or a device: write its content to a file first")
 
 
-def writable_file(path: Path) -> Path:
-    """The path, if a file can be written there.
+def writable_file(path: str | os.PathLike[str]) -> Path:
+    """The path, if a file can be written there: to be asked before the work of filling it.
 
     Raises InputError if a folder stands there, or none that can be written is around it.
     """
-    _check_new_files(replaceable(path).parent, path)
-    return path
+    file = replaceable(Path(path))
+    _check_new_files(file.parent, file)
+    return file
 
 
 def writable_folder(path: Path, names: Iterable[str] = ()) -> Path:

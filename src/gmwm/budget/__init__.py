@@ -10,4 +10,8 @@ from gmwm.budget.budget import (
     per_si as per_si,
     root_sum as root_sum,
 )
-from gmwm.budget.coasting import TIMES as TIMES, error_budget as error_budget
+from gmwm.budget.coasting import (
+    TIMES as TIMES,
+    error_budget as error_budget,
+    is_steep as is_steep,
+)

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from gmwm._core.typing import BoolArray
 from gmwm._core.units import factor
 from gmwm.budget.budget import HORIZONTAL, QUANTITIES, ErrorBudget, ErrorRow, axis
 from gmwm.budget.integrals import integral_rms
@@ -181,12 +182,7 @@ def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -
     missing = [name for name in _HORIZONTAL_CHANNELS if name not in present]
     if HORIZONTAL in budget.groups and missing:
         notes.append(f"the horizontal total lacks {', '.join(missing)}")
-    tilts = [
-        budget.total(of)["attitude"]
-        for of in budget.groups
-        if axis(of) != "z" and "attitude" in budget.quantities(of)
-    ]
-    steep = np.max(tilts, axis=0, initial=0.0) > _SMALL_ANGLE
+    steep = is_steep(budget)
     if np.any(steep):
         notes.append(
             f"at {budget.times[int(np.argmax(steep))]:g} s the tilt exceeds "
@@ -232,3 +228,14 @@ def _channel_rows(
             unit, cut = QUANTITIES[quantity], len(times)
             rows.append(ErrorRow(name, label, quantity, unit, values[:cut], values[cut:]))
     return rows
+
+
+def is_steep(budget: ErrorBudget) -> BoolArray:
+    """At which of its times the tilt is beyond a small angle: orders of magnitude from there on."""
+    tilts = [
+        budget.total(of)["attitude"]
+        for of in budget.groups
+        if axis(of) != "z" and "attitude" in budget.quantities(of)
+    ]
+    largest = np.max(tilts, axis=0, initial=0.0) * np.ones(len(budget.times))
+    return np.maximum.accumulate(largest) > _SMALL_ANGLE

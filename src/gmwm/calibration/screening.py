@@ -213,7 +213,8 @@ def with_outcomes(
 
 def _outcome(notice: Notice, model: Model, offered: Sequence[Process]) -> str:
     if _holds(model.terms, notice):
-        return "a term of the model"
+        left = ", which N and K of a filter leave out" if notice.code == "line" else ""
+        return f"a term of the model{left}"
     if _holds(offered, notice):
         return "tried as a term of the model, which does not need it"
     return "not tried as a term of the model"

@@ -59,8 +59,10 @@ def compare(
     from gmwm.comparison import compare as run, labelled
     from gmwm.report import read_datasheet
 
-    calibrations = [_calibration(file, reading, quiet) for file in files]
     if datasheet is not None:  # what is wrong with it is known before the work
+        read_datasheet(datasheet)
+    calibrations = [_calibration(file, reading, quiet) for file in files]
+    if datasheet is not None:
         read_datasheet(
             datasheet,
             {name: fit.wv.quantity or "" for each in calibrations for name, fit in each.items()},

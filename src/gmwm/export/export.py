@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from gmwm._core import checks
+from gmwm._core.files import writable_file
 from gmwm.calibration import Calibration
 from gmwm.export.programs.gtsam import GTSAM
 from gmwm.export.programs.json_targets import JSON_TARGETS
@@ -75,4 +76,4 @@ def export(
     given: list[Any] = [numbers] if alone else list(numbers)
     if path is None:
         return chosen.export(given, horizon, form)
-    return chosen.save(path, given, horizon, form)
+    return chosen.save(writable_file(path), given, horizon, form)

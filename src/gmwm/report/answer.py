@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,10 @@ from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
-from gmwm.export import Triad
+from gmwm.export import Axis, Triad
 from gmwm.report.health import counted, findings
-from gmwm.report.numbers import SHOWN, Certified
-from gmwm.report.text import duration_text
+from gmwm.report.length import length_sentence, parameters_sentence
+from gmwm.report.numbers import SHOWN, Certified, certified
 
 _WHY = {
     "misfit": "the model misses the data",
@@ -53,50 +53,59 @@ _WHY = {
 }
 """Code of a notice that makes a fit invalid -> why, in about five words."""
 
-_AIM = 0.1  # relative standard error of the deviation that is well enough known
-
 _COVERS = ("more-than-white-noise", "more-than-random-walk")
 
 
 def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict[str, Any]:
     """Content of the first screen."""
-    certified = numbers[SHOWN]
-    rows = [_row(name, fit, calibration, certified) for name, fit in calibration.items()]
+    boxes = [_box(each, calibration) for each in numbers.values()]
+    values = [row[letter] for box in boxes for row in box["axes"].values() for letter in "NK"]
+    rows = [_row(name, fit, calibration) for name, fit in calibration.items()]
     return {
         "health": verdict(calibration),
         "horizon": f"{SHOWN:g} s",
+        "trusted": [row["name"] for row in rows if row["valid"]],
+        "causes": [(", ".join(names), why) for why, names in _causes(calibration).items()],
         "rows": rows,
-        "bounds": {letter: any(_is_bound(row[letter]) for row in rows) for letter in "NKB"},
-        "length": length_sentence(calibration, SHOWN),
-        "boxes": [_box(each, calibration) for each in numbers.values()],
-    }
+        "bounds": {"B": any(map(_is_bound, (row["B"] for row in rows))),
+                   "N or K": any(map(_is_bound, values))},
+        "parameters": parameters_sentence(calibration),
+        "boxes": boxes,
+    }  # fmt: skip
 
 
-def verdict(calibration: Calibration) -> dict[str, str]:
-    """The health of sensor and recording in one line."""
-    found = findings(calibration)
-    is_severe = any(n.severity == "bad" for n in gathered(calibration.notices))
-    removed = dict.fromkeys(n.where for n in found if n.values.get("removed"))
+def _causes(calibration: Calibration) -> dict[str, list[str]]:
+    """Why fits are not valid -> of which channels."""
     causes: dict[str, list[str]] = {}
     for name, fit in calibration.items():
         if not fit.valid:
             causes.setdefault(trust(name, fit, calibration)[1], []).append(name)
+    return causes
+
+
+def verdict(calibration: Calibration) -> dict[str, str]:
+    """The health of sensor and recording in one line, and what of it no channel's validity says."""
+    found = findings(calibration)
+    is_severe = any(n.severity == "bad" for n in gathered(calibration.notices))
+    removed = dict.fromkeys(n.where for n in found if n.values.get("removed"))
+    causes = _causes(calibration)
     parts = [f"{', '.join(names)} not valid: {cause}" for cause, names in causes.items()]
     parts += [f"{', '.join(calibration.skipped)} without a model"] if calibration.skipped else []
-    parts += [_counted(found, severity, calibration) for severity in ("bad", "warning")]
+    others = [_counted(found, severity, calibration) for severity in ("bad", "warning")]
     if removed:
-        parts.append(f"departures from noise taken off ({', '.join(removed)})")
-    text = "; ".join(filter(None, parts))
+        others.append(f"departures from noise taken off ({', '.join(removed)})")
+    text, rest = ("; ".join(filter(None, each)) for each in ([*parts, *others], others))
     if is_severe or causes or calibration.skipped:
         all_out = not any(fit.valid for fit in calibration.values())
         state, word = ("bad", "Not healthy") if all_out or is_severe else ("care", "Usable in part")
-        return {"state": state, "word": word, "text": text}
+        return {"state": state, "word": word, "text": text, "rest": rest}
     if not calibration.is_examined:
-        return {"state": "care", "word": "Not examined", "text": "the fits are valid"}
+        text = "the fits are valid"
+        return {"state": "care", "word": "Not examined", "text": text, "rest": text}
     if text:
-        return {"state": "care", "word": "Healthy, with care", "text": text}
+        return {"state": "care", "word": "Healthy, with care", "text": text, "rest": text}
     text = "nothing was found that spoils the estimates"
-    return {"state": "good", "word": "Healthy", "text": text}
+    return {"state": "good", "word": "Healthy", "text": text, "rest": text}
 
 
 def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) -> str:
@@ -161,130 +170,90 @@ def slow_terms(fit: Fit) -> list[dict[str, str]]:
     return shown
 
 
-def _row(name: str, fit: Fit, calibration: Calibration, certified: Certified) -> dict[str, Any]:
+def _row(name: str, fit: Fit, calibration: Calibration) -> dict[str, Any]:
     is_valid, why = trust(name, fit, calibration)
     return {
         "name": name,
-        **{letter: _number(certified, name, letter, fit) for letter in "NK"},
         "B": bias_instability(fit),
         "slow": slow_terms(fit),
         "valid": is_valid,
         "why": why,
-        "known": known_at(fit, SHOWN),
     }
 
 
-def _is_bound(text: Mapping[str, str] | None) -> bool:
-    return text is not None and text["si"].startswith("≤")
+def _is_bound(text: Mapping[str, str]) -> bool:
+    return text["si"].startswith("≤")
 
 
-def _number(certified: Certified, name: str, letter: str, fit: Fit) -> dict[str, str] | None:
-    if name not in certified.axes:
-        return None
-    unit = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}[letter]
-    text = quantity_text(getattr(certified.axes[name], letter), unit, fit)
-    sign = "≤ " if letter in certified.axes[name].upper else ""
-    return {key: sign + each for key, each in text.items()}
+def _numbers(found: Axis | Triad, upper: Collection[str], fit: Fit) -> dict[str, dict[str, str]]:
+    """N, K and the bias at the start, each in two units."""
+    texts = {"start": quantity_text(found.initial_sd, "u", fit)}
+    for letter, unit in {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}.items():
+        sign = "≤ " if letter in upper else ""
+        text = quantity_text(getattr(found, letter), unit, fit)
+        texts[letter] = {key: sign + each for key, each in text.items()}
+    return texts
 
 
-def _box(certified: Certified, calibration: Calibration) -> dict[str, Any]:
-    groups: dict[str, list[dict[str, Any]]] = {}
-    if certified.triads:
-        rows = [_of_all_axes(triad, certified.horizon, calibration) for triad in certified.triads]
-        title = "One value for all axes of a sensor, as Kalibr, OpenVINS and VINS read it"
-        if any(row["invalid"] for row in rows):
-            title += (
-                ": made from all models, also those not valid; at worst too large for a valid "
-                "axis, as good as its model for another"
-            )
-        groups[title] = rows
-    rows = groups.setdefault("Each axis by itself", [])
-    for name, fit in calibration.items():
-        if name in certified.axes:
-            each = certified.axes[name]
-            row = {letter: _number(certified, name, letter, fit) for letter in "NK"}
-            start = quantity_text(each.initial_sd, "u", fit)
-            nees = _consistency([each.nees], certified.horizon)
-            invalid = [] if fit.valid else [name]
-            rows.append({"name": name, **row, "start": start, "nees": nees, "invalid": invalid})
+def _box(numbers: Certified, calibration: Calibration) -> dict[str, Any]:
+    """What a filter should believe for one time without aiding."""
+    horizon, axes = numbers.horizon, numbers.axes
+    covered = {
+        name: [n.text for n in axis.notices if n.code in _COVERS] for name, axis in axes.items()
+    }
     return {
-        "horizon": f"{certified.horizon:g}",
-        "shown": certified.horizon == SHOWN,
-        "groups": groups,
-        "texts": certified.texts,
-        "problem": certified.problem,
-        "notes": certified.notes,
-        "covers": [
-            (name, "; ".join(texts))
-            for name, axis in certified.axes.items()
-            if (texts := [n.text for n in axis.notices if n.code in _COVERS])
+        "horizon": f"{horizon:g}",
+        "shown": horizon == SHOWN,
+        "sensors": [_of_all_axes(triad, calibration) for triad in numbers.triads],
+        "axes": {
+            name: _numbers(axis, axis.upper, calibration[name]) for name, axis in axes.items()
+        },
+        "length": length_sentence(calibration, horizon),
+        "texts": numbers.texts,
+        "problem": numbers.problem,
+        "notes": numbers.notes,
+        "about": [
+            *(
+                (triad.quantity, _consistency(list((triad.shared_nees or {}).values()), horizon))
+                for triad in numbers.triads
+            ),
+            *(
+                (name, "; ".join([_consistency([axis.nees], horizon), *covered[name]]))
+                for name, axis in axes.items()
+            ),
         ],
     }
 
 
-def _of_all_axes(triad: Triad, horizon: float, calibration: Calibration) -> dict[str, Any]:
-    """A row of what files hold that have one value for the axes of a sensor."""
-    fit = calibration[triad.axes[0].name]
-    values = {"N": (triad.N, "u/sqrt(Hz)"), "K": (triad.K, "u/s/sqrt(Hz)")}
-    invalid = [axis.name for axis in triad.axes if not calibration[axis.name].valid]
-    row: dict[str, Any] = {"name": triad.quantity, "invalid": invalid}
-    for letter, (value, unit) in values.items():
-        sign = "≤ " if triad.is_upper(letter) else ""
-        row[letter] = {key: sign + each for key, each in quantity_text(value, unit, fit).items()}
-    row["start"] = quantity_text(triad.initial_sd, "u", fit)
-    row["nees"] = _consistency(list((triad.shared_nees or {}).values()), horizon)
-    return row
+def _of_all_axes(triad: Triad, calibration: Calibration) -> dict[str, Any]:
+    """What files hold that have one value for the axes of a sensor, and whether to use it."""
+    names = [axis.name for axis in triad.axes]
+    valid = [name for name in names if calibration[name].valid]
+    invalid = [name for name in names if name not in valid]
+    use = f"provisional for {', '.join(invalid)} (not valid)" if invalid else ""
+    if use and valid:
+        use = f"safe for {', '.join(valid)}, {use}"
+    upper = [letter for letter in "NK" if triad.is_upper(letter)]
+    return {
+        "name": triad.quantity,
+        "use": use,
+        **_numbers(triad, upper, calibration[names[0]]),
+    }
+
+
+def filter_sentence(calibration: Calibration) -> str:
+    """What a filter should believe of the sensors; empty without gyros and accelerometers."""
+    parts = []
+    for triad in certified(calibration, (SHOWN,))[SHOWN].triads:
+        found = _of_all_axes(triad, calibration)
+        use = f" ({found['use']})" if found["use"] else ""
+        parts.append(f"{found['name']} N {found['N']['si']}, K {found['K']['si']}{use}")
+    text = "; ".join(parts)
+    return text and f"Filter, for up to {SHOWN:g} s without aiding: {text}."
 
 
 def _consistency(found: Sequence[Mapping[float, float]], time: float) -> str:
     """NEES of axes at a time: their range."""
     values = [nees for each in found if np.isfinite(nees := each.get(time, float("nan")))]
     ends = dict.fromkeys(f"{each:.2g}" for each in (min(values), max(values))) if values else ()
-    return " to ".join(ends) or "not predicted"
-
-
-def known_at(fit: Fit, tau: float) -> float:
-    """Relative standard error of the model's Allan deviation at an averaging time."""
-    if not fit.keys or fit.wv.dt > tau:
-        return float("nan")
-    with np.errstate(all="ignore"):
-        value, _, upper = fit.deviation_interval(np.array([tau]), 0.6827)
-    return float(upper[0] / value[0] - 1.0) if value[0] > 0.0 else float("nan")
-
-
-def length_sentence(calibration: Calibration, horizon: float) -> str:
-    """Whether the recording is long enough for a horizon, and how long for all parameters."""
-    known = {name: known_at(fit, horizon) for name, fit in calibration.items()}
-    known = {name: each for name, each in known.items() if np.isfinite(each)}
-    parts = []
-    if known:
-        worst = max(known, key=lambda name: known[name])
-        need = calibration.duration * (known[worst] / _AIM) ** 2
-        # A curve that ends before the horizon is known there by the model alone.
-        covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
-        share = f"{per_cent(known[worst])} (1 sigma, {worst})"
-        if need <= calibration.duration and covered:
-            parts.append(
-                f"long enough for {horizon:g} s outages: every curve is known there to {share}"
-            )
-        else:
-            least = max(need, 4.0 * horizon)
-            parts.append(
-                f"too short for {horizon:g} s outages: the curve is known there to {share}; record "
-                f"{duration_text(least)} for {100.0 * _AIM:g} %"
-            )
-    lengths = [
-        (seconds, f"{key} of {name}")
-        for name, fit in calibration.items()
-        for key, seconds in fit.needed_length(_AIM).items()
-    ]
-    finite = [each for each in lengths if np.isfinite(each[0])]
-    if finite:
-        longest, what = max(finite)
-        parts.append(
-            f"every parameter is known to {100.0 * _AIM:g} %"
-            if longest <= calibration.duration
-            else f"every parameter to {100.0 * _AIM:g} % would take {duration_text(longest)} "
-            f"({what})"
-        )
-    return "; ".join(parts) + "." if parts else ""
+    return f"consistency {' to '.join(ends)}" if ends else "consistency not predicted"

@@ -14,6 +14,7 @@ from gmwm.budget import (
     ErrorBudget,
     axis,
     error_budget,
+    is_steep,
     per_si,
 )
 from gmwm.calibration import Calibration
@@ -58,6 +59,7 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
         ],
         "parts": _parts(known, invalid),
         "notes": known.notes,
+        "rough": any(is_steep(each)[-1] for each in (known, unknown)),
         "figure": figure,
     }
 
@@ -66,9 +68,10 @@ def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
     """The totals of the platform: tilt and horizontal errors, then what else there is."""
     together = [HORIZONTAL] if HORIZONTAL in budget.groups else []
     apart = [name for name in budget.channels if axis(name) not in ("x", "y")]
-    rows = []
+    rows, steep = [], is_steep(budget)
     for of in together + apart:
         for quantity, values in budget.total(of).items():
+            rough = steep & (quantity != "attitude")
             row, share = budget.largest(quantity, of)
             mostly = f"{row.channel} {row.component}, {100.0 * share:.0f} %"
             rows.append(
@@ -76,7 +79,10 @@ def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
                     "name": _name(of, quantity),
                     "quantity": quantity,
                     "unit": FIELD_UNITS[quantity],
-                    "values": [brief(value, 3) for value in values * per_si(quantity)],
+                    "values": [
+                        f"{'≈ ' if is_rough else ''}{brief(value, 3)}"
+                        for value, is_rough in zip(values * per_si(quantity), rough, strict=True)
+                    ],
                     "mostly": mostly if share > 0.0 else "",
                     "invalid": bool(invalid & {of, *budget.curves(of, quantity)}),
                 }

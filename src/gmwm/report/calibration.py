@@ -10,14 +10,22 @@ from operator import call
 from pathlib import Path
 from typing import Any
 
-from gmwm._core.files import written
+from gmwm._core.files import writable_file, written
 from gmwm._core.notices import worst_first
 from gmwm._core.runs import shared
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
 from gmwm.readers import Channel, Recording
-from gmwm.report.answer import answer, bias_instability, quantity_text, slow_terms, trust, verdict
+from gmwm.report.answer import (
+    answer,
+    bias_instability,
+    filter_sentence,
+    quantity_text,
+    slow_terms,
+    trust,
+    verdict,
+)
 from gmwm.report.budget import navigation
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.figure import (
@@ -29,6 +37,7 @@ from gmwm.report.figure import (
     series_figure,
 )
 from gmwm.report.health import ambiguity, health
+from gmwm.report.length import length_sentence, parameters_sentence
 from gmwm.report.numbers import SHOWN, Certified, certified
 from gmwm.report.page import origin, rendered, resource
 from gmwm.report.samples import Spans
@@ -64,10 +73,11 @@ def write_report(
     InputError
         If the file cannot be written, or the data sheet not be read.
     """
+    path = writable_file(path)
     text = page(calibration, recording, datasheet=datasheet, provenance=provenance)
     with written(path) as stream:
         stream.write(text)
-    return Path(path)
+    return path
 
 
 def page(
@@ -105,8 +115,9 @@ def page(
 
 
 def fragment(calibration: Calibration) -> str:
-    """The answer axis by axis as a table for a notebook, without what a filter should believe."""
+    """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
     found = verdict(calibration)
+    believed = filter_sentence(calibration)
     heads = ("channel", "model", "total white noise", "B", "slow terms", "")
     head = f"<tr>{''.join(f'<th>{each}</th>' for each in heads)}</tr>"
     rows = []
@@ -125,7 +136,10 @@ def fragment(calibration: Calibration) -> str:
         f"{calibration.source or 'a recording'}: {duration_text(calibration.duration)} at "
         f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
     )
-    return f"<p>{escape(title)}</p><table>{head}{''.join(rows)}</table>"
+    lengths = [length_sentence(calibration, SHOWN), parameters_sentence(calibration)]
+    lines = [title, believed, "Length: " + ". ".join(filter(None, lengths)) + "."]
+    shown = "".join(f"<p>{escape(line)}</p>" for line in lines if line)
+    return f"{shown}<table>{head}{''.join(rows)}</table>"
 
 
 def _side_by_side(
@@ -173,6 +187,7 @@ def _channel(
         "valid": is_valid,
         "why": why,
         "sentence": sentence(fit),
+        "noise": "" if own is None else _noise(fit, own.N),
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, fit, sheet),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
@@ -187,6 +202,18 @@ def _channel(
         "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),
         "fitness": _fitness(fit),
     }
+
+
+def _noise(fit: Fit, number: float) -> str:
+    """Which of the values of white noise is which, where they differ."""
+    density = white_density(fit)
+    if not abs(number - density) > 0.01 * density > 0.0:
+        return ""
+    text = quantity_text(number, "u/sqrt(Hz)", fit)["field"]
+    return (
+        f"The filter's N for {SHOWN:g} s, {text}, covers slower terms too; N of the table of "
+        "parameters is that of one term."
+    )
 
 
 def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, str]]:

@@ -51,14 +51,16 @@ class Datasheet:
         return np.asarray(np.sqrt(2.0 * np.sum(curves, axis=0)), dtype=float)
 
 
-def read_datasheet(path: str | os.PathLike[str], channels: dict[str, str]) -> Datasheet:
+def read_datasheet(
+    path: str | os.PathLike[str], channels: dict[str, str] | None = None
+) -> Datasheet:
     """Read a YAML file of N, B and K, each a number with its unit, by sensor or channel.
 
     Parameters
     ----------
     path : path-like
-    channels : dict of str to str
-        Channel name -> quantity.
+    channels : dict of str to str, optional
+        Channel name -> quantity. Without them a name may be of any axis, such as gyro_x.
 
     Raises
     ------
@@ -72,6 +74,9 @@ def read_datasheet(path: str | os.PathLike[str], channels: dict[str, str]) -> Da
         raise InputError(f"{path}: cannot be read as YAML ({what}): {_MEND}") from None
     if not isinstance(content, dict) or not content:
         raise InputError(f"{path}: holds no sensors: begin with 'gyro:' or 'accel:', and {_MEND}")
+    if channels is None:
+        kinds = {name: str(name).partition("_")[0] for name in content}
+        channels = {name: kind for name, kind in kinds.items() if kind in SI_UNIT}
     known = {**{quantity: quantity for quantity in SI_UNIT}, **channels}
     entries: dict[str, dict[str, float]] = {}
     for name, values in content.items():

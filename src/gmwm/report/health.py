@@ -6,11 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from gmwm._core.notices import Notice, worst_first
+from gmwm._core.text import per_cent
 from gmwm.calibration import AMBIGUITY, DEPARTURES, LONGEST_PART, Calibration
 from gmwm.diagnosis import gathered
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.filter_numbers import bound
+from gmwm.process import Model
+from gmwm.report.length import part_sentence
+from gmwm.report.numbers import SHOWN
 
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
+_LEAST_CHANGE = 1e-3
 _LABELS = {"bad": "severe"}
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
@@ -23,7 +33,10 @@ def health(calibration: Calibration) -> dict[str, Any]:
     return {
         "examined": examined,
         "advice": [
-            f"{_begun(n.text)}: {n.action}." for n in calibration.notices if n.code == LONGEST_PART
+            f"{_begun(n.text)}: {n.action}. "
+            + part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
+            for n in calibration.notices
+            if n.code == LONGEST_PART
         ],
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(found),
@@ -68,12 +81,29 @@ def findings_of_fits(calibration: Calibration) -> list[Notice]:
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:
-    """Which models describe a channel equally well."""
+    """Which models describe a channel equally well, and what that means for a filter."""
+    fit, rivals = calibration[channel], calibration.rivals.get(channel, ())
     return [
-        f"{notice.text} ({notice.action})"
+        f"{notice.text} ({notice.action}){_effect(fit, rivals)}"
         for notice in calibration.notices
         if notice.code == AMBIGUITY and notice.where == channel
     ]
+
+
+def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
+    """By how much what a filter should believe differs between models that fit alike."""
+    if not rivals:
+        return ""
+    try:
+        found = [bound(each, horizon=SHOWN, dt=fit.wv.dt) for each in (fit.model, *rivals)]
+    except InputError:
+        return ""
+    pairs = np.array([[each.N, each.K] for each in found])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = float(np.nanmax(np.max(pairs, axis=0) / np.min(pairs, axis=0))) - 1.0
+    size = f"at most {per_cent(change)}" if change > _LEAST_CHANGE else "less than 0.1 %"
+    text = f"N and K of a filter for {SHOWN:g} s change by {size} with another of them"
+    return f". {text}" if np.isfinite(change) else ""
 
 
 def _rows(notices: list[Notice]) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from gmwm._core.files import writable_file
 from gmwm._core.text import readable
 from gmwm._core.units import SI_UNIT
 from gmwm.ins.field import Comparison, Navigated, outage_pictures
@@ -21,6 +22,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
     InputError
         If the file cannot be written.
     """
+    path = writable_file(path)
     measured, alignment = navigated.measured, navigated.alignment
     imu, sensors = measured.imu, measured.sensors
     return write_page(
@@ -51,6 +53,7 @@ def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]
     InputError
         If the file cannot be written.
     """
+    path = writable_file(path)
     return write_page(
         path,
         "comparison.html",

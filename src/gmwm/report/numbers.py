@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import yaml
@@ -47,12 +47,14 @@ class Certified:
     notes: tuple[str, ...]
 
 
-def certified(calibration: Calibration) -> dict[float, Certified]:
+def certified(
+    calibration: Calibration, horizons: Sequence[float] | None = None
+) -> dict[float, Certified]:
     """The numbers by horizon; a horizon shorter than two samples is left out."""
     longest = max((fit.wv.dt for fit in calibration.values()), default=0.0)
     found: dict[float, Certified] = {}
     imu = None
-    for horizon in HORIZONS:
+    for horizon in horizons or HORIZONS:
         if horizon >= 2.0 * longest or horizon == SHOWN:
             found[horizon], imu = _at(calibration, horizon, imu)
     return found

@@ -172,7 +172,7 @@
   });
   each("select[data-horizon]", function (select) {
     select.addEventListener("change", function () {
-      each("div[data-for]", function (box) { box.hidden = box.dataset.for !== select.value; });
+      each("[data-for]", function (box) { box.hidden = box.dataset.for !== select.value; });
     });
   });
   function copied(button, ok) {

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.files import writable_file
 from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
 from gmwm.report.text import model_text
@@ -31,6 +32,7 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
     InputError
         If the file cannot be written.
     """
+    path = writable_file(path)
     study, experiment = validation.study, validation.experiment
     outages = [_outage(validation, i) for i in range(len(study.outages))]
     return write_page(

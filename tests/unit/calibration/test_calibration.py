@@ -113,7 +113,7 @@ def test_print_is_short_and_html_escapes(calibration):
     assert max(map(len, text.splitlines())) <= 80
     for name, fit in calibration.items():
         assert re.search(rf"^{name} +{'valid' if fit.valid else 'NOT VALID'} ", text, re.M)
-    verdict = re.search(r"Hz\. (.*)</p>", calibration._repr_html_()).group(1)
+    verdict = re.search(r"Hz\. (.*?)</p>", calibration._repr_html_()).group(1)
     assert " ".join(text.split()).endswith(verdict)
     shown = replace(calibration, source="<b>x</b>")._repr_html_()
     assert "&lt;b&gt;x" in shown
@@ -553,7 +553,7 @@ def test_issues_are_reported_and_screened():
     assert line["sinusoid_amplitude"] == pytest.approx(0.01, rel=0.1)
     told = " ".join(map(str, calibration.notices))
     assert "accel_x: a periodic line at 0.7" in told
-    assert "(a term of the model)" in told
+    assert "(a term of the model, which N and K of a filter leave out)" in told
     assert "gyro_x: a spike or shock" in told
     assert f"(left out, {calibration['gyro_x'].wv.gaps.missing} samples)" in told
     assert calibration.notices[0].code == "events-left-out"

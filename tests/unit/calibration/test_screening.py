@@ -37,7 +37,8 @@ def test_what_became_of_a_line(off, near):
         assert second is other
         return first.action
 
-    assert (said(with_it, {}) == "a term of the model") is near
+    term = "a term of the model, which N and K of a filter leave out"
+    assert (said(with_it, {}) == term) is near
     assert (said(plain, offered) == "tried as a term of the model, which does not need it") is near
     assert said(plain, {}) == "not tried as a term of the model"
     resonance = {"gyro_x": WhiteNoise(1.0) + Resonance(1.0, 10.0, 0.1)}

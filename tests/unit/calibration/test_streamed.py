@@ -85,7 +85,7 @@ def test_a_stream_is_screened_as_a_recording_is(spoilt):
     assert found.is_examined
     assert found.left_out["gyro_x"] == gmwm.health_stream(spoilt, **READING).events("gyro_x")
     (line,) = [n for n in found.notices if n.code == "line" and n.where == "gyro_y"]
-    assert line.action == "a term of the model"
+    assert line.action == "a term of the model, which N and K of a filter leave out"
     (event,) = [n for n in found.notices if n.code == "event"]
     assert event.values["left_out"]
     # As it is, shocks and lines are in the noise.

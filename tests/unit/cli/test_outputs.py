@@ -27,6 +27,11 @@ def refusal(name, output):
     return str(result.exception)
 
 
+def test_a_data_sheet_is_read_before_the_recordings():
+    given = ["compare", "absent.csv", "absent.json", "--datasheet", "taken"]
+    assert "taken: holds no sensors" in str(CliRunner().invoke(cli, given).exception)
+
+
 @pytest.fixture(autouse=True)
 def _place(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from hashlib import sha256
 from html import escape, unescape
 from html.parser import HTMLParser
-from itertools import chain
 
 import numpy as np
 import pytest
@@ -171,10 +170,11 @@ def test_nothing_runs_but_the_two_scripts_of_the_page(parsed):
 
 def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
-    assert headings == [None, "health", "navigation", *calibration]
+    assert headings == ["health", "navigation", *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
-    # The name, and the findings where it is not valid.
-    assert links == [
+    # The name, and the findings where it is not valid; above, why each of those is not.
+    above = ["#health" for fit in calibration.values() if not fit.valid]
+    assert links == above + [
         link
         for name, fit in calibration.items()
         for link in ([f"#{name}"] if fit.valid else [f"#{name}", "#health"])
@@ -210,7 +210,7 @@ def test_valid_and_not_valid(calibration):
         notices = () if valid else (Notice("misfit", "bad", "", "misses the data"),)
         fits = {name: replace(fit, notices=notices) for name, fit in calibration.fits.items()}
         shown = Page(page(replace(calibration, fits=fits)))
-        verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 6}
+        verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 7}
         assert set(verdicts) == set(fits)
         start = "valid: fits" if valid else "not valid: the model misses the data"
         assert all(text.startswith(start) for text in verdicts.values())
@@ -219,14 +219,18 @@ def test_valid_and_not_valid(calibration):
 def test_numbers_that_are_not_valid_are_marked(calibration):
     assert not calibration["accel_x"].valid
     found = certified(calibration)
-    (box,) = answer(calibration, found)["boxes"]
-    marked = {row["name"]: row["invalid"] for row in chain(*box["groups"].values())}
-    assert marked["gyro_x"] == marked["gyro"] == []
-    assert marked["accel_x"] == marked["accel"] == ["accel_x"]
-    assert "also those not valid" in next(iter(box["groups"]))
+    first = answer(calibration, found)
+    assert first["trusted"] == [name for name, fit in calibration.items() if fit.valid]
+    assert [names for names, _ in first["causes"]] == ["accel_x"]
+    uses = {row["name"]: row["use"] for row in first["boxes"][0]["sensors"]}
+    assert uses == {"gyro": "", "accel": "provisional for accel_x (not valid)"}
     fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
-    (right,) = answer(right := replace(calibration, fits=fits), certified(right))["boxes"]
-    assert "not valid" not in next(iter(right["groups"]))
+    right = answer(right := replace(calibration, fits=fits), certified(right))
+    assert [row["use"] for row in right["boxes"][0]["sensors"]] == ["", ""]
+    assert right["causes"] == []
+    two = {"accel_y": fits["accel_x"], **calibration.fits}
+    mixed = answer(mixed := replace(calibration, fits=two), certified(mixed))["boxes"][0]
+    assert mixed["sensors"][1]["use"] == ("safe for accel_y, provisional for accel_x (not valid)")
     as_yaml, as_python = (found[60.0].texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
     for text in (as_yaml, as_python):
         (line,) = [line for line in text.splitlines() if "# not valid" in line]
@@ -248,9 +252,9 @@ def test_how_well_a_curve_fits_is_said_of_the_levels_that_tell(calibration):
 
 
 def test_a_sign_is_explained_where_a_row_has_it(parsed, calibration):
-    assert "≤ before filter N or K" in parsed.text
+    assert "≤ before N or K" in parsed.text
     one = replace(calibration, fits={"gyro_x": calibration["gyro_x"]})
-    assert "before filter N or K" not in Page(page(one)).text
+    assert "before N or K" not in Page(page(one)).text
 
 
 def test_one_p_value_and_one_misfit(calibration):
@@ -321,8 +325,10 @@ def test_the_error_budget_is_in_the_report(parsed, calibration):
     assert [row[0] for row in parsed.cells if row[:1] and "tilt" in row[0]] == ["tilt"] * 2
     for row, calibrated in zip(rows, (True, False), strict=True):
         total = gmwm.error_budget(calibration, times, calibrated=calibrated).total()["position"]
-        shown = [float(cell.replace(",", "")) for cell in row[1:5]]
+        shown = [float(cell.replace(",", "").removeprefix("≈ ")) for cell in row[1:5]]
         assert shown == pytest.approx(total, rel=6e-3)
+        tilt = gmwm.error_budget(calibration, times, calibrated=calibrated).total()["attitude"]
+        assert [cell.startswith("≈") for cell in row[1:5]] == [t > np.radians(10) for t in tilt]
         assert row[5] == "m"
         assert re.fullmatch(r"gyro_x .*, \d+ %", row[6])
     head = next(row for row in parsed.cells if row[0] == "error after coasting for (1 sigma)")
@@ -375,7 +381,7 @@ def test_the_growth_figure(parsed, calibration):
 def test_without_inertial_sensors_nothing_is_said_of_navigation(calibration):
     fits = {"voltage": calibration["voltage"]}
     shown = Page(page(replace(calibration, fits=fits)))
-    assert [a.get("id") for t, a in shown.elements if t == "h2"] == [None, "health", "voltage"]
+    assert [a.get("id") for t, a in shown.elements if t == "h2"] == ["health", "voltage"]
 
 
 def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
@@ -434,11 +440,14 @@ def test_marks_and_the_curve_of_the_filter_are_the_certified_numbers(parsed, cal
     tau = np.array(curve["x"])
     believed = per_si * np.sqrt(numbers.N**2 / tau + numbers.K**2 * tau / 3.0)
     assert curve["y"] == pytest.approx(believed, rel=1e-4)
-    rows = [row for row in parsed.cells if row[0] == "gyro_x" and len(row) == 5]
-    shown = rows[2]  # of 1, 10, 60 and 600 s
-    assert float(shown[1].split()[0]) == pytest.approx(numbers.N, rel=5e-3)
-    assert float(shown[2].split()[0]) == pytest.approx(numbers.K, rel=5e-3)
-    assert float(shown[4]) == pytest.approx(numbers.nees[60.0], rel=0.05)
+    box = answer(calibration, certified(calibration))["boxes"][0]
+    shown = box["axes"]["gyro_x"]
+    assert float(shown["N"]["si"].split()[0]) == pytest.approx(numbers.N, rel=5e-3)
+    assert float(shown["K"]["si"].split()[0]) == pytest.approx(numbers.K, rel=5e-3)
+    (row,) = [row for row in parsed.cells if row[0] == "gyro_x" and len(row) == 7]
+    assert shown["N"]["field"] + shown["N"]["si"] in row[1]  # beside those for 1, 10 and 600 s
+    consistency = dict(box["about"])["gyro_x"].removeprefix("consistency ")
+    assert float(consistency) == pytest.approx(numbers.nees[60.0], rel=0.05)
 
 
 def test_what_is_copied_is_what_is_exported(calibration):
@@ -456,7 +465,7 @@ def test_the_box_says_what_white_noise_and_random_walk_stand_for(calibration):
     one = replace(calibration, fits={"gyro_x": fit})
     texts = [n.text for n in gmwm.bound(fit).notices if n.code.startswith("more-than-")]
     (box,) = answer(one, certified(one))["boxes"]
-    assert box["covers"] == [("gyro_x", "; ".join(texts))]
+    assert dict(box["about"])["gyro_x"].endswith(f"; {'; '.join(texts)}")
     assert [text.split(" has to cover ")[0][-1] for text in texts] == ["t", "K"]
     assert "; ".join(texts) in unescape(page(one))
 
@@ -468,15 +477,16 @@ def test_shared_numbers_stand_beside_those_of_the_axes(calibration):
     fits = {"gyro_x": calibration["gyro_x"], "gyro_y": other, "accel_x": calibration["accel_x"]}
     both = replace(calibration, fits=fits)
     shared = gmwm.bound(both, horizon=60.0, shared=True)
-    (together, alone) = answer(both, certified(both))["boxes"][0]["groups"].values()
-    first, rows = together[0], {row["name"]: row for row in alone}
+    box = answer(both, certified(both))["boxes"][0]
+    first, said = box["sensors"][0], dict(box["about"])
     assert first["name"] == "gyro"
     assert float(first["N"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
     assert float(first["K"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
     nees = sorted(shared[name].nees[60.0] for name in ("gyro_x", "gyro_y"))
-    assert [float(cell) for cell in first["nees"].split(" to ")] == pytest.approx(nees, rel=0.05)
+    ends = [float(end) for end in said["gyro"].removeprefix("consistency ").split(" to ")]
+    assert ends == pytest.approx(nees, rel=0.05)
     assert nees[0] < 0.5
-    assert float(rows["gyro_y"]["nees"]) == pytest.approx(1.0, rel=0.05)
+    assert said["gyro_y"].startswith("consistency 1")
 
 
 def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
@@ -510,6 +520,14 @@ def test_data_sheets_that_cannot_be_used(calibration, tmp_path, text, what):
     path.write_text(text)
     with pytest.raises(InputError, match=what):
         read_datasheet(path, {name: fit.wv.quantity or "" for name, fit in calibration.items()})
+    with pytest.raises(InputError, match=what):
+        read_datasheet(path)
+
+
+def test_a_data_sheet_is_read_before_there_are_channels(tmp_path):
+    path = tmp_path / "sheet.yaml"
+    path.write_text("gyro_z: {N: 1 deg/sqrt(h)}\naccel: {B: 1 g}\n")
+    assert set(read_datasheet(path).entries) == {"gyro_z", "accel"}
 
 
 def test_series_and_spectrum_leave_out_what_was_masked(calibration, recording):
@@ -665,10 +683,10 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
     assert shown.text.startswith("Sensor error")
     (first,) = re.findall(r"Not healthy: .*? Length", shown.text)
     (why,) = (trust(n, fit, calibration)[1] for n, fit in calibration.items() if not fit.valid)
-    assert f"Not healthy: accel_x not valid: {why}; " in first
+    assert f"Trust gyro_x, voltage; not accel_x: {why}; no model of gyro_y. Filter for" in first
     # With those for which fits are not valid.
     severe = 1 + sum(n.severity == "bad" for fit in calibration.values() for n in fit.notices)
-    assert f"; {severe} severe issues (accel_x); 1 warning (gyro_x)." in first
+    assert f"Not healthy: {severe} severe issues (accel_x); 1 warning (gyro_x)." in first
     assert f"{severe} severe issues, 1 warning and" in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)
@@ -759,7 +777,7 @@ def test_names_are_text_not_markup(calibration):
     for words in ("skip", "why", "Found", "Done", "tie", "A"):
         assert f"{words} {HOSTILE}" in shown.text
     headings = [attributes.get("id") for tag, attributes in shown.elements if tag == "h2"]
-    assert headings == [None, "health", "navigation", HOSTILE]
+    assert headings == ["health", "navigation", HOSTILE]
     assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == f"{HOSTILE} not valid"
 
 
@@ -790,9 +808,25 @@ def test_the_file(calibration, tmp_path):
     assert calibration.report(tmp_path / "again.html").read_bytes() == path.read_bytes()
 
 
-def test_a_folder_that_is_not_there(calibration, tmp_path):
+WRITERS = [
+    write_report,
+    gmwm.report.write_comparison_report,
+    gmwm.report.write_fleet_report,
+    gmwm.report.write_navigated_report,
+    gmwm.report.write_sensor_comparison_report,
+    gmwm.report.write_validation_report,
+    lambda nothing, path: gmwm.export(nothing, "kalibr", path=path),
+]
+
+
+@pytest.mark.parametrize("write", WRITERS)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(write, tmp_path):
+    (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match=r"report\.html: cannot be written"):
-        write_report(calibration, tmp_path / "nowhere" / "report.html")
+        write(None, tmp_path / "nowhere" / "report.html")
+    with pytest.raises(InputError, match="folder of that name is in the way"):
+        write(None, str(tmp_path / "folder"))
+    assert [each.name for each in tmp_path.iterdir()] == ["folder"]
 
 
 # -- words ----------------------------------------------------------------------------------------

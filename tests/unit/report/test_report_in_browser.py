@@ -175,18 +175,26 @@ def test_copy_buttons_give_yaml_and_python(tab, calibration):
     assert "gyroparams(" in copied(tab, "MATLAB")
 
 
-def test_the_horizon_swaps_the_numbers(tab):
+def test_the_horizon_swaps_the_numbers(tab, calibration):
     def choose(seconds):
         tab.run(
             "(function () { var s = document.querySelector('[data-horizon]');"
             f" s.value = '{seconds}'; s.dispatchEvent(new Event('change')); }}())"
         )
-        return tab.run("Array.from(document.querySelectorAll('div[data-for]')).filter("
-                       "function (d) { return !d.hidden; }).map("
-                       "function (d) { return d.dataset.for; })")  # fmt: skip
+        shown = tab.run("Array.from(document.querySelectorAll('[data-for]')).filter("
+                        "function (d) { return !d.hidden; }).map("
+                        "function (d) { return d.dataset.for; })")  # fmt: skip
+        return set(shown), tab.run("document.querySelector('#filter').innerText")
 
-    assert choose(10) == ["10"]
-    assert choose(60) == ["60"]
+    def number(value):
+        return f"{value:.3g}"
+
+    for seconds in (10, 60):
+        times, text = choose(seconds)
+        assert times == {str(seconds)}
+        own = gmwm.bound(calibration["gyro_x"], horizon=seconds)
+        assert f"gyro N {number(own.N)} rad/s/sqrt(Hz), K {number(own.K)} " in text
+        assert f" for {seconds} s without aiding: " in text
 
 
 def test_csv_holds_every_curve(tab, shown):
@@ -276,7 +284,7 @@ def test_words_of_figures_are_whole_on_paper(tab):
 
 def test_notes_are_on_paper(tab):
     notes = (
-        "Array.from(document.querySelectorAll('.run span')).filter(function (s) {"
+        "Array.from(document.querySelectorAll('.run > *')).filter(function (s) {"
         " return s.getClientRects().length; }).map(function (s) { return s.innerText; })"
     )
     try:

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from gmwm.errors import InputError
 from gmwm.report.validation import write_validation_report
 
 
@@ -59,9 +58,3 @@ def test_a_page_without_outages_or_with_filters_that_diverged(tmp_path, outages,
     found = made_up({"right": 1.0, "bold": 3.0}, outages, dead=dead)
     path = write_validation_report(found, tmp_path / "a.html")
     assert text_of(path).count("diverged in 40 of 40 runs") == len(dead)
-
-
-def test_a_place_that_cannot_be_written(tmp_path, made_up):
-    with pytest.raises(InputError, match="cannot be written"):
-        write_validation_report(made_up({"A": 1.0}, (), 2), tmp_path / "no" / "a.html")
-    assert list(tmp_path.iterdir()) == []

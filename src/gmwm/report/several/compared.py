@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gmwm._core.files import writable_file
 from gmwm._core.notices import worst_first
 from gmwm._core.text import brief
 from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorComparison
@@ -54,7 +55,7 @@ def write_sensor_comparison_report(
     InputError
         If the file cannot be written, or the data sheet not be read.
     """
-    sheet = None
+    path, sheet = writable_file(path), None
     if datasheet is not None:
         sheet = read_datasheet(datasheet, {name: a.quantity for name, a in comparison.items()})
     sources = {label: each.source for label, each in comparison.calibrations.items()}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gmwm._core.files import writable_file
 from gmwm._core.text import brief, per_cent
 from gmwm.fleet import (
     CONFIDENCE,
@@ -46,6 +47,7 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     InputError
         If the file cannot be written.
     """
+    path = writable_file(path)
     return write_page(
         path,
         "fleet.html",
