@@ -25,7 +25,8 @@ _NEEDED = (
 )
 
 _READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
-            "start": "--imu-start", "format": "--format", "layout": "--layout"}  # fmt: skip
+            "start": "--imu-start", "format": "--format", "layout": "--layout",
+            "damaged": "--damaged"}  # fmt: skip
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 _OF_FILE = (
     "trajectory", "duration", "truth", "filters", "outages", "runs", "seed", "imu", "gnss_fixes",
