@@ -66,12 +66,15 @@ def column_of(table: Table, index: int) -> str:
     return stamps or f"column {label(table.names, index)}"
 
 
-def damage_notice(source: str, what: str, is_taken: bool) -> Notice:
+def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
     """What is to be said of a damaged file of which what is there is taken.
 
     what: Is wrong with it, and where.
-    Raises InputError with the code "damaged" unless it is to be taken.
+    is_taken: Whether the caller asks for that; None if it cannot be asked for.
+    Raises InputError, with the code "damaged" if it can be, unless it is.
     """
+    if is_taken is None:
+        raise InputError(f"{source} {what}: get a whole copy")
     if not is_taken:
         mend = "get a whole copy, or take what is there, damaged=True"
         raise InputError(f"{source} {what}", "damaged", mend)

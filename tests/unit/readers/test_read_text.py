@@ -299,7 +299,7 @@ def test_dead_channel_is_passed_on(write, samples):
 
 @pytest.mark.parametrize("odd", ["+1.5", '"1.5"', "1.5\x20"])
 def test_blocks_read_in_either_way_fit_together(write, monkeypatch, odd):
-    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 1000))
+    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 1000, str))
     rows = np.round(np.random.default_rng(1).normal(size=(500, 6)), 4)
     path = write(rows, HEADER, end="\r\n")
     lines = path.read_bytes().split(b"\r\n")

@@ -70,7 +70,8 @@ def read_blocks(
 
     path, rate, units, channels, time, layout, topic, clock, format, damaged: As in `gmwm.read`, of
         delimited text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of ArduPilot, a binary
-        layout or a table in memory; of one topic. Temperatures with stamps of their own are left out.
+        layout or a table in memory; of one topic. Temperatures with stamps of their own are left
+        out.
     rows: Of a block, about.
     Yields: consecutive parts on one grid of the sampling interval of the first; rows that are
         missing between two of them are NaN at the beginning of the second.
