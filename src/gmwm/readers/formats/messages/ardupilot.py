@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +24,14 @@ from gmwm.readers.formats.arrays import (
     array_of,
     damage_named,
 )
-from gmwm.readers.formats.messages.dataflash import Extent, Messages, messages
 from gmwm.readers.formats.messages.endings import cut_off, end_of_content
 from gmwm.readers.formats.messages.parts import MessageTable
 from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
 from gmwm.readers.table import Table, damage_notice
+
+if TYPE_CHECKING:
+    from gmwm.readers.formats.messages.dataflash import Extent, Messages
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
@@ -94,6 +97,8 @@ class DataflashTable(MessageTable):
         return f"messages {self.series.kind}"
 
     def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+        from gmwm.readers.formats.messages.dataflash import messages  # compiled
+
         fields = list(self.series.columns.values())
         with damage_named(self.source, _damage):
             for found in messages(self.path, (self.series.kind,)):
@@ -152,6 +157,8 @@ def _contents(
     path: Path,
 ) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches, str]:
     """How many messages there are of each series, its sensors, the batches, and what is damaged."""
+    from gmwm.readers.formats.messages.dataflash import Extent, messages  # compiled
+
     counts: Counter[_Series] = Counter()
     sensors: dict[_Series, frozenset[str]] = {}
     headers: list[Messages] = []
