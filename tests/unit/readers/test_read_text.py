@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -350,3 +352,15 @@ def test_a_row_that_the_fast_parser_loses_is_read(write, samples, monkeypatch):
 
     monkeypatch.setattr(csv, "read_csv", one_less)
     assert_holds(read(write(samples, HEADER), rate=50, units=SI), samples)
+
+
+def test_reading_text_loads_nothing_that_only_others_need(write, samples):
+    times = np.arange(len(samples)) / 100.0
+    path = write(np.column_stack([times, samples]), f"time_s,{HEADER}")
+    heavy = ["numba", "scipy", "pint", "pandas", "matplotlib", "plotly"]
+    script = (
+        f"import sys, gmwm; gmwm.read({str(path)!r}, units={{'gyro': 'deg/s', 'accel': 'g'}}); "
+        f"print([m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
