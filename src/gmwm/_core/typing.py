@@ -17,6 +17,9 @@ BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[int, int, str], None]
 """Called with how many are done, of how many, and what is being worked on (may be empty)."""
 
+QUARTILE = 0.6744897501960817
+"""Of the standard normal: its median absolute value. `scipy.special` takes 0.2 s to import."""
+
 
 def inner(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> float:
     """Sum of products, in double precision.

@@ -42,6 +42,26 @@ _DEFINITIONS = (
     "degree_per_second = degree / second = dps",
 )
 
+_USUAL = {
+    "rad/s": {
+        "rad/s": 1.0, "deg/s": 0.017453292519943295, "deg/h": 4.84813681109536e-06,
+        "mdeg/s": 1.7453292519943296e-05, "mrad/s": 0.001,
+    },
+    "m/s^2": {
+        "m/s^2": 1.0, "g": 9.80665, "mg": 0.00980665, "ug": 9.806649999999999e-06, "cm/s^2": 0.01,
+    },
+    "rad/s/sqrt(Hz)": {
+        "deg/sqrt(h)": 0.0002908882086657216, "deg/h/sqrt(Hz)": 4.84813681109536e-06,
+    },
+    "rad/sqrt(s)": {"deg/sqrt(h)": 0.0002908882086657216},
+    "rad/s/s/sqrt(Hz)": {"deg/h/sqrt(h)": 8.080228018492267e-08},
+    "m/s^2/sqrt(Hz)": {"ug/sqrt(Hz)": 9.806649999999999e-06, "m/s/sqrt(h)": 0.016666666666666666},
+    "m/s^2/s/sqrt(Hz)": {"ug/sqrt(h)": 1.6344416666666664e-07},
+    "rad": {"deg": 0.017453292519943295}, "m": {"m": 1.0}, "m/s": {"m/s": 1.0},
+    "s": {"s": 1.0, "ms": 0.001, "us": 1e-06, "ns": 1e-09},
+}  # fmt: skip
+"""What pint finds for the units of most recordings: importing it takes 0.25 s and 20 MB."""
+
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Any]:
@@ -83,6 +103,9 @@ def factor(unit: str, si_unit: str) -> float:
     Returns: what a number in ``unit`` is multiplied by to have it in ``si_unit``.
     Raises InputError if a unit is unknown or the two do not measure the same thing.
     """
+    known = _USUAL.get(si_unit, {}).get(unit)
+    if known is not None:
+        return known
     import pint
 
     value, target = _quantity(unit), _quantity(si_unit)
@@ -96,6 +119,8 @@ def factor(unit: str, si_unit: str) -> float:
 
 def seconds_in(unit: str) -> float | None:
     """How many seconds a unit of time has, ``None`` if the text is none."""
+    if any(unit in _USUAL[of_sensor] for of_sensor in SI_UNIT.values()):
+        return None
     try:
         return factor(unit, "s")
     except InputError:
@@ -108,6 +133,9 @@ def quantity_of(unit: str) -> str:
 
     Raises InputError if the unit is unknown or neither of the two.
     """
+    for quantity, si_unit in SI_UNIT.items():
+        if unit in _USUAL[si_unit]:
+            return quantity
     # Without exceptions of pint, which keep the arrays of their callers until they are collected.
     dimension = _quantity(unit).dimensionality
     for quantity, si_unit in SI_UNIT.items():

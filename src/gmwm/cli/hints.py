@@ -16,6 +16,7 @@ HINTS = {
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "channels-swapped": "--channel accel_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
+    "damaged": "get a whole copy, or take what is there, --damaged",
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
     "heading-unknown": "--heading DEG, or heading: in the file",

@@ -25,7 +25,8 @@ _NEEDED = (
 )
 
 _READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
-            "start": "--imu-start", "format": "--format", "layout": "--layout"}  # fmt: skip
+            "start": "--imu-start", "format": "--format", "layout": "--layout",
+            "damaged": "--damaged"}  # fmt: skip
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 _OF_FILE = (
     "trajectory", "duration", "truth", "filters", "outages", "runs", "seed", "imu", "gnss_fixes",
@@ -254,7 +255,7 @@ def _named_in_messages(file: Path | None) -> Iterator[None]:
         yield
     except InputError as error:
         where = "" if file is None else f"{file}: "
-        raise InputError(f"{where}{error}", error.code) from None
+        raise InputError(f"{where}{error.problem}", error.code, error.mend, error.values) from None
 
 
 def _validate(

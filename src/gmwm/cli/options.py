@@ -80,6 +80,9 @@ reading_options = together(
                  help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
                       "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
                       "[,rates][,little|big]."),
+    click.option("--damaged", is_flag=True,
+                 help="Take what is there of a text or a flight log that is cut off or damaged in "
+                      "places; it is refused otherwise."),
 )  # fmt: skip
 """What the file is, for `read_recording`."""
 
@@ -162,6 +165,7 @@ def arguments_of_read(
     time_column: str | None,
     form: str | None = None,
     layout: str | None = None,
+    damaged: bool = False,
     topics: tuple[str, ...] = (),
     clock: str = CLOCKS[0],
     only: str | None = None,
@@ -180,7 +184,7 @@ def arguments_of_read(
         "topic": topics,
         "clock": clock,
         "format": form,
-    }
+    } | ({"damaged": True} if damaged else {})
 
 
 def _chosen(

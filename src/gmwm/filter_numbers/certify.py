@@ -18,7 +18,6 @@ from gmwm.filter_numbers.certificate import Cause, Certificate, Check
 from gmwm.filter_numbers.given import Given, in_use
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
-from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
 from gmwm.process import Model, Process, WhiteNoise
 from gmwm.readers import Recording
 
@@ -139,6 +138,9 @@ def _in_flight(
     axes: Axes, numbers: SensorNumbers, times: Sequence[float]
 ) -> tuple[list[Check], list[Notice]]:
     """Errors of an INS/GNSS filter at the end of outages, where there are six axes."""
+    # Trajectories and filters, which no calibration needs.
+    from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
+
     by_name = {axis.name: axis for axis in axes.axes}
     try:
         truth = SensorModels.of(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,13 +25,14 @@ from gmwm.readers import tuning
 from gmwm.readers.cells import BLANKS, FIELD_OF_DATE, has_zone, number, seconds_of, split_line
 from gmwm.readers.dialects import with_dialect
 from gmwm.readers.layout import Layout, find_layout
-from gmwm.readers.table import label, usable
+from gmwm.readers.table import damage_notice, label, usable
 from gmwm.readers.text_file import blocks, content_size, count_lines
 
 if TYPE_CHECKING:
     import pyarrow
 
 _HEAD = 1 << 18
+_ENOUGH_LINES = 16  # before one whose last field is shorter than that of each
 
 # What `number` takes for missing, as it is commonly written; Arrow knows NaN by itself.
 _NULLS = ["", "NA", "na", "N/A", "n/a", "#N/A", "null", "NULL", "Null", "None", "none"]
@@ -43,15 +44,21 @@ class CsvTable:
 
     path: Path
     layout: Layout
+    is_taken: bool | None = None
+    _damages: list[Notice] = field(default_factory=list, compare=False)
 
     @classmethod
-    def open(cls, path: Path) -> CsvTable:
+    def open(cls, path: Path, is_taken: bool | None = None) -> CsvTable:
         """Look at the beginning of a file.
 
+        is_taken: Whether what is there of a damaged file is taken, if that can be asked for.
         Raises InputError if it cannot be read or is not a table.
         """
-        _, head = next(blocks(path, size=_HEAD), (1, b""))
-        return cls(path, with_dialect(find_layout(path.name, head), path.name, head))
+        damages = list[str]()
+        _, head = next(blocks(path, size=_HEAD, say=damages.append), (1, b""))
+        if damages and not head:
+            damage_notice(path.name, damages[0], is_taken)
+        return cls(path, with_dialect(find_layout(path.name, head), path.name, head), is_taken)
 
     @property
     def source(self) -> str:
@@ -75,8 +82,11 @@ class CsvTable:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What was noticed in the header."""
-        return self.layout.notices
+        """What was noticed in the header, and of damage as far as the file was read."""
+        return (*self.layout.notices, *self._damages)
+
+    def _note_damage(self, what: str) -> None:
+        self._damages[:] = [damage_notice(self.source, what, self.is_taken)]
 
     def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Read some columns; see `Table`.
@@ -135,7 +145,12 @@ class CsvTable:
     def _parsed(self, columns: Sequence[int]) -> Iterator[list[FloatArray]]:
         """Columns of one block of text after another."""
         infinite = _Infinite()
-        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+        layout, before = self.layout, b""
+        for line, block in blocks(self.path, layout.offset, layout.line, say=self._note_damage):
+            if _is_cut(block, before, layout):
+                self._note_damage(f"is cut off in line {line}")
+                break
+            before = block
             found = _parse_with_arrow(block, self.layout, columns)
             if found is None:
                 found = _parse_by_field(line, block, self, columns, infinite)
@@ -147,6 +162,8 @@ class CsvTable:
 
     def _estimated_samples(self, columns: int) -> float:
         """How many numbers that many columns hold, by the size of the file and its first lines."""
+        if self.is_taken:  # what a packed file says of its size is at its end
+            return 0.0
         _, head = next(blocks(self.path, self.layout.offset, size=_HEAD), (1, b""))
         lines = max(len(head.splitlines()), 1)
         return content_size(self.path) / max(len(head) / lines, 1.0) * columns
@@ -182,6 +199,22 @@ class _Infinite:
                 f"{source}, {self.first} is not a usable number{others}: cut the file before "
                 "that line, or empty the field if the sample is missing"
             )
+
+
+def _is_cut(block: bytes, before: bytes, layout: Layout) -> bool:
+    """Whether a last line has no end, and lacks fields or digits of its last field.
+
+    block: Such a line is one by itself.
+    before: The block before it.
+    """
+    if block.endswith((b"\n", b"\r")):
+        return False
+    delimiter = None if layout.delimiter == BLANKS else layout.delimiter.encode()
+    *first, last = block.split(delimiter)
+    if len(first) + 1 < layout.width:
+        return True
+    sizes = [len(line.split(delimiter)[-1]) for line in before.splitlines() if line.strip()]
+    return len(sizes) >= _ENOUGH_LINES and len(last) < min(sizes)
 
 
 def _parse_with_arrow(

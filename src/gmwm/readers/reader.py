@@ -58,6 +58,7 @@ def read(
     topic: str | Sequence[str] = (),
     clock: str = "header",
     format: str | None = None,
+    damaged: bool = False,
 ) -> Recording:
     """Read a static recording of an inertial sensor.
 
@@ -100,6 +101,9 @@ def read(
         What the file is, where its first bytes and its name do not show it: ``"text"``,
         ``"numpy"``, ``"hdf5"``, ``"mat"``, ``"parquet"``, ``"feather"``, ``"rosbag"``,
         ``"rosbag2"``, ``"ulog"`` or ``"ardupilot"``.
+    damaged : bool, optional
+        Take what is there of a text or a flight log that is cut off or damaged in places; it is
+        refused otherwise. Other formats have what their ends are needed for.
 
     Returns
     -------
@@ -120,7 +124,7 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    tables = tables_of(path, layout, topic, clock, format, channels)
+    tables = tables_of(path, layout, topic, clock, format, channels, damaged)
     return _read(tables, Given(rate, units or {}, channels, time))
 
 
@@ -131,11 +135,12 @@ def tables_of(
     clock: str,
     format: str | None,
     channels: object,
+    damaged: bool,
 ) -> Sequence[Table]:
     """What `read` opens; the arguments are its own."""
     if layout is None:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
-        return open_tables(path, Wanted(topics, clock, channels is not None), format)
+        return open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
     if format is not None:
         raise InputError("layout is of a binary file without a header: leave out format")
     return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]

@@ -9,6 +9,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
 
 READABLE = (
     "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ, ROS bags, PX4 and "
@@ -63,6 +64,21 @@ def column_of(table: Table, index: int) -> str:
     """How messages call a column, or the stamps of messages that have no columns of their own."""
     stamps: str = getattr(table, "stamps", "")
     return stamps or f"column {label(table.names, index)}"
+
+
+def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
+    """What is to be said of a damaged file of which what is there is taken.
+
+    what: Is wrong with it, and where.
+    is_taken: Whether the caller asks for that; None if it cannot be asked for.
+    Raises InputError, with the code "damaged" if it can be, unless it is.
+    """
+    if is_taken is None:
+        raise InputError(f"{source} {what}: get a whole copy")
+    if not is_taken:
+        mend = "get a whole copy, or take what is there, damaged=True"
+        raise InputError(f"{source} {what}", "damaged", mend)
+    return Notice("damaged", "warning", "", f"the file {what}; what is there is used")
 
 
 def usable(values: FloatArray) -> bool:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -22,23 +23,31 @@ _LINE_END = re.compile(rb"\r\n|\n|\r")
 
 
 def blocks(
-    path: Path, offset: int = 0, line: int = 1, size: int = BLOCK
+    path: Path,
+    offset: int = 0,
+    line: int = 1,
+    size: int = BLOCK,
+    say: Callable[[str], object] = str,
 ) -> Iterator[tuple[int, bytes]]:
     r"""Iterate over a file's lines, many at a time.
 
-    Blank lines at the end of the file are left out, so that they need no care further on.
+    Blank lines at the end of the file are left out, so that they need no care further on. A last
+    line without an end is a block by itself. Of a compression that is cut off, the whole lines
+    before that are given.
 
     offset: Bytes (after decompression) to leave out at the beginning.
     line: Number of the line that begins there.
     size: Bytes to read at once.
+    say: Is told that the compression is cut off, and may raise an error.
     Yields: line, number of the first line of the block, counted from 1; block, whole lines; ends
         may be ``\n``, ``\r\n`` or ``\r``.
     Raises InputError if the file cannot be read or its compression is damaged.
     """
     with _open(path) as stream:
-        _read(stream, offset, path.name)
-        text = b""
-        while fresh := _read(stream, size, path.name):
+        _, damage = _read(stream, offset, path.name)
+        text, fresh = b"", b" "
+        while fresh and not damage:
+            fresh, damage = _read(stream, size, path.name)
             text += fresh
             end = _end_of_content(text[: _end_of_last_line(text)])
             if end:
@@ -50,7 +59,9 @@ def blocks(
                     f"{path.name}, line {line}: longer than {_LONGEST_LINE >> 20} MB, so this is "
                     "no table of numbers: check that it is the right file"
                 )
-        if end := _end_of_content(text):
+        if damage:
+            say(damage)
+        elif end := _end_of_content(text):
             yield line, text[:end]
 
 
@@ -108,17 +119,22 @@ def _open(path: Path) -> BinaryIO:
     return stream
 
 
-def _read(stream: BinaryIO, size: int, name: str) -> bytes:
+def _read(stream: BinaryIO, size: int, name: str) -> tuple[bytes, str]:
+    """Bytes, and what is wrong if the compression ends with them."""
+    parts = list[bytes]()
+    damage = ""
     try:
-        return stream.read(size)
-    except EOFError as error:
-        raise InputError(
-            f"{name} ends before its gzip data are complete: it was cut off, get a whole copy"
-        ) from error
-    except (gzip.BadGzipFile, zlib.error) as error:
+        # A piece at a time: what was unpacked before an error is there.
+        while size > 0 and (part := cast(io.BufferedReader, stream).read1(size)):
+            parts.append(part)
+            size -= len(part)
+    except EOFError:
+        damage = "ends before its gzip data are complete"
+    except (gzip.BadGzipFile, zlib.error) as error:  # which numbers are right cannot be told
         raise InputError(f"{name} is a damaged gzip file ({error}): get a whole copy") from error
     except OSError as error:
         raise _unreadable(name, error) from error
+    return b"".join(parts), damage
 
 
 def _unreadable(name: str, error: OSError) -> InputError:

@@ -4,6 +4,7 @@ from math import pi, sqrt
 
 import pytest
 
+from gmwm._core import units
 from gmwm._core.units import SI_UNIT, factor, field_units, quantity_of, si_parameter_unit as spelled
 from gmwm.errors import InputError
 from gmwm.process import CATALOGUE
@@ -196,3 +197,14 @@ def test_first_order_parameters_of_all_processes_have_a_field_unit(quantity):
     for unit in PARAMETER_UNITS:
         expected = unit.startswith("u") and unit != "u^2"
         assert bool(field_units(unit, quantity)) is expected, unit
+
+
+def test_usual_units_are_as_pint_has_them(monkeypatch):
+    usual = dict(units._USUAL)
+    for si_unit in usual:
+        monkeypatch.setitem(units._USUAL, si_unit, {})
+    for si_unit, known in usual.items():
+        for unit, expected in known.items():
+            assert factor.__wrapped__(unit, si_unit) == expected
+    for quantity, si_unit in SI_UNIT.items():
+        assert {quantity_of.__wrapped__(unit) for unit in usual[si_unit]} == {quantity}

@@ -147,7 +147,7 @@ def test_one_that_is_not_finite(damaged):
 def test_what_is_infinite_is_counted_over_all_blocks(damaged, monkeypatch):
     from gmwm.readers import csv_table
 
-    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500))
+    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500, str))
     path = damaged(12, "1,inf,3,4,-inf,6")
     path.write_text(path.read_text() + "1,2,,4,5,1e200\n" * 3)
     assert "line 12, column 'gyro_y'" in problem(path)
@@ -177,7 +177,7 @@ def test_ragged(damaged, line, found):
 @pytest.mark.parametrize("line", ["1 2 3 4 5", "1\t2 3 4  5 6 7"])
 def test_ragged_blanks(write, samples, line):
     path = write(samples, delimiter=" ")
-    path.write_text(path.read_text() + line)
+    path.write_text(f"{path.read_text()}{line}\n")
     assert f"line 81: {len(line.split())} fields where 6" in problem(path)
 
 
@@ -324,6 +324,34 @@ def test_cut_gzip(write, samples, keep):
     message = problem(path)
     assert message.startswith("static.csv.gz ends before its gzip data are complete")
     assert "get a whole copy" in message
+
+
+@pytest.mark.parametrize("keep", [0.5, -4])
+def test_what_is_there_of_cut_gzip_may_be_taken(write, keep):
+    rows = np.random.default_rng(1).normal(size=(4000, 6))
+    path = write(rows, HEADER, name="static.csv.gz")
+    data = path.read_bytes()
+    path.write_bytes(data[: int(keep * len(data)) if isinstance(keep, float) else keep])
+    found = read(path, rate=100, units=SI, damaged=True)
+    assert 0.45 < found.n / len(rows) <= 1.0
+    assert np.array_equal(found["accel_z"].values, rows[: found.n, 5])
+    assert [each.severity for each in found.notices if each.code == "damaged"] == ["warning"]
+
+
+@pytest.mark.parametrize("cut", [12, 5])  # two fields and a half, a digit and a half
+@pytest.mark.parametrize("delimiter", [",", " "])
+def test_text_that_is_cut_off_in_its_last_line(write, samples, cut, delimiter):
+    path = write(samples, delimiter=delimiter)
+    text = path.read_text().rstrip("\n")
+    path.write_text(text)  # a last line without an end is whole by itself
+    assert read(path, rate=100, units=SI).n == len(samples)
+    path.write_text(text[:-cut])
+    message = problem(path)
+    assert message.startswith(f"static.csv is cut off in line {len(samples)}: ")
+    assert message.endswith("or take what is there, damaged=True")
+    found = read(path, rate=100, units=SI, damaged=True)
+    assert found.n == len(samples) - 1
+    assert [each.severity for each in found.notices if each.code == "damaged"] == ["warning"]
 
 
 def test_damaged_gzip(write, samples):

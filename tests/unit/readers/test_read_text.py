@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -299,7 +301,7 @@ def test_dead_channel_is_passed_on(write, samples):
 
 @pytest.mark.parametrize("odd", ["+1.5", '"1.5"', "1.5\x20"])
 def test_blocks_read_in_either_way_fit_together(write, monkeypatch, odd):
-    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 1000))
+    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 1000, str))
     rows = np.round(np.random.default_rng(1).normal(size=(500, 6)), 4)
     path = write(rows, HEADER, end="\r\n")
     lines = path.read_bytes().split(b"\r\n")
@@ -350,3 +352,15 @@ def test_a_row_that_the_fast_parser_loses_is_read(write, samples, monkeypatch):
 
     monkeypatch.setattr(csv, "read_csv", one_less)
     assert_holds(read(write(samples, HEADER), rate=50, units=SI), samples)
+
+
+def test_reading_text_loads_nothing_that_only_others_need(write, samples):
+    times = np.arange(len(samples)) / 100.0
+    path = write(np.column_stack([times, samples]), f"time_s,{HEADER}")
+    heavy = ["numba", "scipy", "pint", "pandas", "matplotlib", "plotly"]
+    script = (
+        f"import sys, gmwm; gmwm.read({str(path)!r}, units={{'gyro': 'deg/s', 'accel': 'g'}}); "
+        f"print([m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr

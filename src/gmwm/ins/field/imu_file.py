@@ -56,6 +56,7 @@ def read_imu(
     *,
     format: str | None = None,
     layout: str | None = None,
+    damaged: bool = False,
 ) -> Imu:
     """Read an IMU record as increments.
 
@@ -72,7 +73,7 @@ def read_imu(
         ``{"accel_z": "-az"}``, has the opposite sign.
     start : float, optional
         Time of the first sample, s, of a record without time stamps.
-    format, layout : str, optional
+    format, layout, damaged : optional
         See `gmwm.read`.
 
     Returns
@@ -85,7 +86,9 @@ def read_imu(
         If the file cannot be used, an axis or more than `gmwm.ins.tuning.LONGEST_FILLED` of samples
         is missing, or the specific force is far from gravity: most often a wrong unit.
     """
-    log = read_imu_log(path, rate, units, channels, time, start, format=format, layout=layout)
+    log = read_imu_log(
+        path, rate, units, channels, time, start, format=format, layout=layout, damaged=damaged
+    )
     return log.imu
 
 
@@ -99,15 +102,17 @@ def read_imu_log(
     *,
     format: str | None = None,
     layout: str | None = None,
+    damaged: bool = False,
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
     columns, turned = _signs(channels)
     is_log = layout is None and (is_text(Path(path)) if format is None else format == "text")
     parts: Iterator[Recording]
     if is_log and content_size(Path(path)) > tuning.READ_AT_ONCE:
-        parts = read_blocks(path, rate, units, columns, time, rows=ROWS)
+        parts = read_blocks(path, rate, units, columns, time, damaged=damaged, rows=ROWS)
     else:
-        parts = iter((read(path, rate, units, columns, time, layout, format=format),))
+        found = read(path, rate, units, columns, time, layout, format=format, damaged=damaged)
+        parts = iter((found,))
     record = _Record.of(parts, turned)
     clock = _clock(Path(path), record, time if is_log else False, start)
     filled = _fill(record)

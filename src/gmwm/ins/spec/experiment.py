@@ -61,6 +61,7 @@ class ReadingSpec(Spec):
     time: Annotated[str | StrictInt | Literal[False] | None, written("a column, or none")] = None
     format: str | None = None
     layout: str | None = None
+    damaged: bool = False
 
     def options(self) -> dict[str, Any]:
         """Arguments of `gmwm.read`."""

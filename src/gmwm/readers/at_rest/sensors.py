@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray, known_of, median
+from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.readers import tuning
@@ -96,7 +95,7 @@ def _steps(axes: Sequence[FloatArray] | FloatArray) -> FloatArray:
         steps = np.diff(values)
         known = known_of(np.abs(steps, out=steps))
         if known.size:
-            found[axis] = median(known, overwrite=True) / (ndtri(0.75) * math.sqrt(2.0))
+            found[axis] = median(known, overwrite=True) / (QUARTILE * math.sqrt(2.0))
     return found
 
 

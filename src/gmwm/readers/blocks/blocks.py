@@ -63,19 +63,21 @@ def read_blocks(
     topic: str | Sequence[str] = (),
     clock: str = "header",
     format: str | None = None,
+    damaged: bool = False,
     rows: int = tuning.ROWS_OF_BLOCK,
 ) -> Iterator[Recording]:
     """Read a static recording a block at a time, as `gmwm.read` does as a whole.
 
-    path, rate, units, channels, time, layout, topic, clock, format: As in `gmwm.read`, of delimited
-        text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of ArduPilot, a binary layout or a
-        table in memory; of one topic. Temperatures with stamps of their own are left out.
+    path, rate, units, channels, time, layout, topic, clock, format, damaged: As in `gmwm.read`, of
+        delimited text, NPY, Parquet, Feather, a bag, `IMU`, `GYR` or `ACC` of ArduPilot, a binary
+        layout or a table in memory; of one topic. Temperatures with stamps of their own are left
+        out.
     rows: Of a block, about.
     Yields: consecutive parts on one grid of the sampling interval of the first; rows that are
         missing between two of them are NaN at the beginning of the second.
     Raises InputError if the file cannot be used, or not a block at a time.
     """
-    opened = tables_of(path, layout, topic, clock, format, channels)
+    opened = tables_of(path, layout, topic, clock, format, channels, damaged)
     tables = [table for table in opened if has_sensors(table)] or opened
     if not all(hasattr(table, "segments") for table in tables):
         raise InputError(

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy
-from scipy.special import ndtri
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
+from gmwm._core.typing import QUARTILE, BoolArray, FloatArray, IntArray, median
 from gmwm.readers import tuning
 from gmwm.readers.clock.line import interval_of
-from gmwm.readers.clock.tracking import follow
 
 
 @dataclass(frozen=True)
@@ -53,6 +50,8 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
     extent: Samples that may be lost in one gap, at most.
     Returns: None if there is no interval that most rows agree on.
     """
+    from gmwm.readers.clock.tracking import follow  # compiled: even stamps do without numba
+
     burst, of_row = _bursts(stamps)
     if np.max(of_row) > min(tuning.MOST_OF_ONE_STAMP, max(stamps.size // 8, 16)):
         return None  # the clock stood still
@@ -93,7 +92,7 @@ def followed(stamps: FloatArray, same: BoolArray, extent: int) -> Followed | Non
         trend = _smooth(x - slope * number, is_set)
         late = (x - trend) / slope - number
         del number
-        spread = median(np.abs(late), overwrite=True) / ndtri(0.75)
+        spread = median(np.abs(late), overwrite=True) / QUARTILE
         sigma, age, start = max(spread, tuning.LEAST_JITTER), memory, 0.0
     return Followed(advance, is_set, late, rough * slope, burst)
 
@@ -139,6 +138,8 @@ def _likeliest(x: FloatArray, same: BoolArray, costs: FloatArray) -> float:
     """By how much the interval is shorter than thought: where many rows are lost, some rows have
     no stretch without a loss.
     """
+    from gmwm.readers.clock.tracking import follow
+
     few = slice(0, tuning.ROWS_OF_TRIAL)
     advance, is_set = np.zeros(x[few].size, dtype=np.int64), np.zeros(x[few].size, dtype=bool)
 
@@ -171,12 +172,14 @@ def _rows_that_follow(x: FloatArray, same: BoolArray, burst: int, extent: int) -
 
 def _smooth(late: FloatArray, is_set: BoolArray) -> FloatArray:
     """Slow part of what stamps are late, between the times at which the clock was set."""
+    from scipy import ndimage
+
     smooth = np.empty(late.size)
     edges = [0, *np.flatnonzero(is_set), late.size]
     for start, stop in pairwise(edges):
         part = late[start:stop]
         # The median drops what a stall delays, the mean the noise of the median.
         calm, size = smooth[start:stop], tuning.ROWS_OF_TREND
-        scipy.ndimage.median_filter(part, min(size, part.size) | 1, output=calm, mode="nearest")
-        scipy.ndimage.uniform_filter1d(calm, size, output=calm, mode="nearest")
+        ndimage.median_filter(part, min(size, part.size) | 1, output=calm, mode="nearest")
+        ndimage.uniform_filter1d(calm, size, output=calm, mode="nearest")
     return smooth

@@ -45,7 +45,7 @@ def _alone(open_table: Callable[[Path], Table]) -> Callable[..., tuple[Table, ..
     return lambda path, wanted: (open_table(path),)
 
 
-_TEXT = Kind("text", (), (), _alone(CsvTable.open))
+_TEXT = Kind("text", (), (), lambda path, wanted: (CsvTable.open(path, wanted.damaged),))
 
 KINDS = (
     # Their names are judged, and what is inside is checked, as they always were.

@@ -48,7 +48,7 @@ def _load_npz(path: Path) -> dict[str, Array]:
     with damage_named(path.name):
         with path.open("rb") as stream:
             magic = stream.read(len(_ZIP_MAGIC))
-        if magic == _ZIP_MAGIC and zipfile.is_zipfile(path):
+        if magic == _ZIP_MAGIC:
             # The columns of an entry are asked for one after another.
             read = lru_cache(maxsize=1)(partial(_read_entry, path))
             with zipfile.ZipFile(path) as archive:

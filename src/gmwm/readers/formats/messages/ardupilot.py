@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,11 +24,14 @@ from gmwm.readers.formats.arrays import (
     array_of,
     damage_named,
 )
-from gmwm.readers.formats.messages.dataflash import Messages, messages
+from gmwm.readers.formats.messages.endings import cut_off, end_of_content
 from gmwm.readers.formats.messages.parts import MessageTable
 from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
-from gmwm.readers.table import Table
+from gmwm.readers.table import Table, damage_notice
+
+if TYPE_CHECKING:
+    from gmwm.readers.formats.messages.dataflash import Extent, Messages
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
@@ -35,6 +39,9 @@ _SENSORS = {"gyro": ("Gyr", "rad/s"), "accel": ("Acc", "m/s^2")}
 _OF_BATCH = ("accel", "gyro")  # IMU_SENSOR_TYPE_ACCEL, IMU_SENSOR_TYPE_GYRO
 _TIME = "time [us]"
 _SAMPLES = 32  # of a message of a batch
+_MARKS = b"\xa3\x95"
+_REMAINS = 528
+"""Bytes at the end that may be remains of a page of the memory: pymavlink passes over as many."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +97,8 @@ class DataflashTable(MessageTable):
         return f"messages {self.series.kind}"
 
     def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
+        from gmwm.readers.formats.messages.dataflash import messages  # compiled
+
         fields = list(self.series.columns.values())
         with damage_named(self.source, _damage):
             for found in messages(self.path, (self.series.kind,)):
@@ -108,7 +117,8 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
     Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     with damage_named(path.name, _damage):
-        counts, sensors, batches = _contents(path)
+        counts, sensors, batches, damage = _contents(path)
+    damaged = (damage_notice(path.name, damage, wanted.damaged),) if damage else ()
     ranks: list[list[Topic]] = [[], [], []]
     for series, count in counts.items():
         ranks[_RANKS[series.kind]].append(Topic(series.name, count, sensors[series]))
@@ -122,7 +132,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
     by_name = {series.name: series for series in counts}
     tables: list[Table] = []
     for topic in chosen:
-        notices = () if tables else left_out(ranks, chosen)
+        notices = () if tables else (*damaged, *left_out(ranks, chosen))
         if topic.name in by_name:
             series = by_name[topic.name]
             names = tuple(series.columns)
@@ -143,14 +153,20 @@ def _damage(error: Exception) -> str:
 _Batches = dict[str, tuple[str, dict[str, AnyArray]]]
 
 
-def _contents(path: Path) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches]:
-    """How many messages there are of each series, its sensors, and the batches."""
+def _contents(
+    path: Path,
+) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches, str]:
+    """How many messages there are of each series, its sensors, the batches, and what is damaged."""
+    from gmwm.readers.formats.messages.dataflash import Extent, messages  # compiled
+
     counts: Counter[_Series] = Counter()
     sensors: dict[_Series, frozenset[str]] = {}
     headers: list[Messages] = []
     data: list[Messages] = []
-    held = 0
-    for found in messages(path, (*_RANKS, _HEADER, _DATA)):
+    held, extent, stamps = 0, Extent(), list[float]()
+    for found in messages(path, (*_RANKS, _HEADER, _DATA), extent):
+        if "TimeUS" in found.fields:
+            stamps = [*stamps[:1], *found["TimeUS"][[0, -1]].tolist()]
         if found.kind in (_HEADER, _DATA):
             (headers if found.kind == _HEADER else data).append(found)
             held += 4 * found.rows.nbytes  # as float64
@@ -166,7 +182,21 @@ def _contents(path: Path) -> tuple[dict[_Series, int], dict[_Series, frozenset[s
                     if any(np.any(found[field][mine]) for field in series.fields_of(sensor))
                 }
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
-    return {each: counts[each] for each in order}, sensors, _batches(headers, data)
+    seconds = (stamps[-1] - stamps[0]) * 1e-6 if stamps else 0.0
+    damage = _damage_of(path, extent, seconds)
+    return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
+
+
+def _damage_of(path: Path, extent: Extent, seconds: float) -> str:
+    """What is wrong with a log of which messages were found, if anything is."""
+    end = end_of_content(path)
+    with path.open("rb") as stream:
+        stream.seek(extent.end)
+        rest = stream.read(max(min(end - extent.end, _REMAINS), 0))
+    between = extent.between + (len(rest) if len(rest) == _REMAINS else 0)
+    if between:
+        return f"is damaged in places, where {between:,} bytes or more are no messages"
+    return cut_off(seconds) if rest and rest[:2] == _MARKS[: len(rest)] else ""
 
 
 def _field(parts: Sequence[Messages], name: str) -> AnyArray:

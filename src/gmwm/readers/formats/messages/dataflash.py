@@ -8,6 +8,7 @@ next marks of a kind that is known; a log of any length is read in blocks.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +34,16 @@ _BLOCK = 1 << 22  # bytes read at a time
 
 @compiled()
 def _walk(
-    data: npt.NDArray[np.uint8], at: int, lengths: npt.NDArray[np.int64],
+    data: npt.NDArray[np.uint8], at: int, end: int, lengths: npt.NDArray[np.int64],
     is_wanted: npt.NDArray[np.bool_], kinds: npt.NDArray[np.int64], places: npt.NDArray[np.int64],
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int, int, int]:  # fmt: skip
     """Kinds and places of wanted messages, up to an FMT or the end of what is there.
 
-    Returns: count; at, where the walk goes on.
+    end: Of the message before.
+    Returns: count; at, where the walk goes on; between, bytes that are no messages; end of the last
+        message.
     """
-    count = 0
+    count = between = 0
     while at + 3 <= data.size:
         kind = data[at + 2]
         if data[at] != 0xA3 or data[at + 1] != 0x95 or lengths[kind] < 3:
@@ -51,10 +54,12 @@ def _walk(
         if is_wanted[kind]:
             kinds[count], places[count] = kind, at
             count += 1
+        between += at - end
         at += lengths[kind]
+        end = at
         if kind == 0x80:
             break
-    return count, at
+    return count, at, between, end
 
 
 class _Forms:
@@ -113,20 +118,39 @@ class Messages:
         return values * self._factors[field] if field in self._factors else values
 
 
-def messages(path: Path, wanted: Collection[str]) -> Iterator[Messages]:
+@dataclass
+class Extent:
+    """How much of a log is messages, as far as it was read.
+
+    between: Bytes between them that are none.
+    end: Of the last one.
+    """
+
+    between: int = 0
+    end: int = 0
+
+
+def messages(
+    path: Path, wanted: Collection[str], extent: Extent | None = None
+) -> Iterator[Messages]:
     """Messages of some kinds, block by block.
 
     wanted: Names of the kinds.
+    extent: Is kept up to date.
     Raises KeyError, ValueError if the statement of a wanted kind is damaged.
     """
-    forms, before, rest = _Forms(wanted), 0, b""
+    forms, before, rest, end = _Forms(wanted), 0, b"", 0
+    extent = extent or Extent()
     with path.open("rb") as stream:
         while fresh := stream.read(_BLOCK):
             data = np.frombuffer(rest + fresh, np.uint8)
             at, count = 0, 1
             kinds, places = np.empty((2, data.size // _BEGIN + 1), np.int64)
             while count:
-                count, at = _walk(data, at, forms.lengths, forms.is_wanted, kinds, places)
+                count, at, between, end = _walk(
+                    data, at, end, forms.lengths, forms.is_wanted, kinds, places
+                )
+                extent.between += between
                 is_form = bool(count) and kinds[count - 1] == _FMT
                 own = slice(count - is_form)
                 for kind in np.unique(kinds[own]):
@@ -139,5 +163,7 @@ def messages(path: Path, wanted: Collection[str]) -> Iterator[Messages]:
                     forms.add(data[at - _FORM.itemsize : at])
                 else:
                     count = 0
+            extent.end = before + end
             before += at
+            end -= at
             rest = data[at:].tobytes()

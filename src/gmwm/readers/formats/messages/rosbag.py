@@ -68,6 +68,8 @@ class _Bag:
     def _reader(self) -> Any:
         """Open until the bag is dropped: its index may take as long to read as its messages."""
         kind = "rosbag1" if self.is_ros1 else "rosbag2"
+        for file in sorted(self.path.glob("*.db3")) if self.path.is_dir() else [self.path]:
+            _check_pages(file)
         reader = library(f"rosbags.{kind}", "ros", self.path.name).Reader(self.path)
         reader.open()
         weakref.finalize(self, reader.close)
@@ -187,6 +189,18 @@ def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int) -> BagTable:
     text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
     notice = Notice("topic", "note", "", text, {"topic": topic.name})
     return BagTable(topic, (_STAMPS, *names), bag, IMU, is_log, origin, notices=(notice,))
+
+
+def _check_pages(path: Path) -> None:
+    """Refuse a file of SQLite that ends inside a page, whose rest SQLite takes for zeros.
+
+    Its size is in the header (SQLite, Database File Format, 1.3.2).
+    """
+    with path.open("rb") as stream:
+        head = stream.read(18)
+    size = int.from_bytes(head[16:], "big")
+    if head.startswith(_SQLITE) and path.stat().st_size % (65536 if size == 1 else size or 1):
+        raise ValueError(f"{path.name} ends inside a page")
 
 
 def _is_ros1(path: Path) -> bool:

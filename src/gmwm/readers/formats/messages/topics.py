@@ -20,11 +20,13 @@ class Wanted:
         accelerometers.
     clock: {"header", "log"}, which stamps of messages count.
     by_channel: Whether channels are named, of which one sensor may have all.
+    damaged: Whether what is there of a damaged file is taken.
     """
 
     topics: Sequence[str] = ()
     clock: str = "header"
     by_channel: bool = False
+    damaged: bool = False
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,10 @@ from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
 from gmwm.readers.formats.extras import library
+from gmwm.readers.formats.messages.endings import cut_off, end_of_content
 from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
 from gmwm.readers.names import AXES
+from gmwm.readers.table import damage_notice
 
 _COMBINED = "sensor_combined"
 _FIELDS = {"gyro": "gyro_rad", "accel": "accelerometer_m_s2"}
@@ -32,6 +34,11 @@ _UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 _TIME = "time [us]"
 _NO_TIME = 2**31 - 1
 """RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg."""
+
+_HEAD = 3
+"""Bytes of a message before its content."""
+
+_PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
 
 _MEND = (
     "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics (bits 8 and "
@@ -53,7 +60,7 @@ def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
 
 
 def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    sets, notices = _data_sets(path)
+    sets, notices = _data_sets(path, wanted.damaged)
     ranks = [
         [_topic(each, _not_zero(each.data)) for each in sets if each.name == _COMBINED],
         [_topic(each, frozenset((_FIFO[each.name],))) for each in sets if each.name in _FIFO],
@@ -91,23 +98,43 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     )
 
 
-def _data_sets(path: Path) -> tuple[list[Any], tuple[Notice, ...]]:
+class _Stream(io.BufferedReader):
+    """A log that remembers whether it was read to an end inside a message, without its padding."""
+
+    def __init__(self, path: Path):
+        super().__init__(io.FileIO(path))
+        self.is_cut = False
+        self._end = end_of_content(path)
+
+    def read(self, size: int | None = -1) -> bytes:
+        found = super().read(size)
+        if found in _PADDING or len(found) < (size or 0):
+            if size == _HEAD and self.tell() - len(found) >= self._end:
+                return b""
+            self.is_cut |= len(found) < (size or 0)
+        return found
+
+
+def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...]]:
     """Topics about an IMU, and what was noticed."""
     wanted = [_COMBINED, *_FIFO, *_SINGLE]
     reader = library("pyulog", "px4", path.name).ULog
     # pyulog prints what is damaged.
     quiet = redirect_stdout(io.StringIO())
-    with damage_named(path.name, _damage), quiet, path.open("rb") as stream:
+    with damage_named(path.name, _damage), quiet, _Stream(path) as stream:
         log = reader(stream, wanted)
+    sets = [each for each in log.data_list if each.data["timestamp"].size]
     notices = []
-    if log.file_corruption:
-        text = "the log is damaged in places, which were passed over"
-        notices.append(Notice("log-damaged", "warning", "", text))
+    if log.file_corruption or stream.is_cut:
+        first = min((int(each.data["timestamp"][0]) for each in sets), default=log.last_timestamp)
+        what = cut_off((log.last_timestamp - first) * 1e-6)
+        what = "is damaged in places" if log.file_corruption else what
+        notices.append(damage_notice(path.name, what, is_taken))
     lost = sum(dropout.duration for dropout in log.dropouts) / 1e3
     if lost > 0.0:
         text = f"the logger dropped {len(log.dropouts)} stretches, {lost:.3g} s in all"
         notices.append(Notice("log-dropouts", "note", "", text, {"duration": lost}))
-    return [each for each in log.data_list if each.data["timestamp"].size], tuple(notices)
+    return sets, tuple(notices)
 
 
 def _damage(error: Exception) -> str:

@@ -283,7 +283,7 @@ def test_truncated(bag1, tmp_path):
         folder = write2(tmp_path / storage, {"/imu": imu_topic(ROS2, X)}, storage)
         file = next(each for each in folder.iterdir() if each.suffix == suffix)
         whole = file.read_bytes()
-        for size in (0, 10, 100, len(whole) // 2):
+        for size in (0, 10, 100, len(whole) // 2, len(whole) - 1):
             file.write_bytes(whole[:size])
             assert " is " in refusal(folder)
             assert file.name in refusal(file)
