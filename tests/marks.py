@@ -1,0 +1,8 @@
+"""Marks of tests."""
+
+import pytest
+
+
+def slow(*values):
+    """A case for ``pytest -m slow``: one like it is always run."""
+    return pytest.param(*values, marks=pytest.mark.slow)
