@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
-from gmwm.calibration import AMBIGUITY, Calibration, floor
+from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration, floor
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Axis, Triad
@@ -119,9 +119,11 @@ def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) 
 
 def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     """Whether the numbers of a channel can be used, and why, in about five words."""
-    for notice in fit.notices:
-        if notice.severity == "bad":
-            return False, _WHY.get(notice.code, notice.code.replace("-", " "))
+    codes = [notice.code for notice in fit.notices if notice.severity == "bad"]
+    if codes:
+        # What departs from noise is why a model misses levels too.
+        code = next((code for code in codes if code in DEPARTURES), codes[0])
+        return False, _WHY.get(code, code.replace("-", " "))
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:

@@ -348,6 +348,12 @@ def test_a_comparison_fits_a_telephone_and_fetches_nothing(calibration, tab, tmp
     wv = replace(other.wv, name="gyro_x", quantity="gyro", unit="rad/s")
     two = replace(one, fits={"gyro_x": replace(other, wv=wv)}, source="two.csv")
     found = gmwm.compare([one, two])
+    sheet = tmp_path / "sheet.yaml"
+    sheet.write_text("gyro: {N: 1.2 deg/sqrt(h), K: 40 deg/h/sqrt(h)}\n")
+    tab.size(1300)
+    tab.open(found.report(tmp_path / "compare.html", datasheet=sheet))
+    cut = "Array.from(document.querySelectorAll('.wide')).filter(function (w) {"
+    assert tab.run(f"{cut} return w.scrollWidth > w.clientWidth; }}).length") == 0
     tab.size(420)
     tab.open(found.report(tmp_path / "compare.html"))
     assert tab.run("document.documentElement.scrollWidth") <= 420
