@@ -27,13 +27,13 @@ def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         os.close(handle)
     except OSError as error:
-        raise InputError(_sentence(target, error)) from None
+        raise _not_written(target, error) from None
     try:
         yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, target)
     except OSError as error:
-        raise InputError(_sentence(target, error)) from None
+        raise _not_written(target, error) from None
     finally:
         with suppress(FileNotFoundError):
             os.unlink(name)
@@ -64,7 +64,7 @@ def moved_together(folder: Path) -> Iterator[Path]:
                 for each in sorted(Path(name).iterdir()):
                     os.replace(each, folder / each.name)
     except OSError as error:
-        raise InputError(_sentence(folder, error)) from None
+        raise _not_written(folder, error) from None
 
 
 @contextmanager
@@ -143,9 +143,7 @@ def replaceable(path: Path) -> Path:
     Raises InputError if a folder stands there.
     """
     if os.path.isdir(path):
-        raise InputError(
-            f"{path}: a folder of that name is in the way: move it, or choose another place with -o"
-        )
+        raise _refused(f"{path}: a folder of that name is in the way", "move it, or ")
     return path
 
 
@@ -158,7 +156,7 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(_sentence(folder, error)) from None
+        raise _not_written(folder, error) from None
     _check_new_files(folder, folder)
     return folder
 
@@ -169,7 +167,7 @@ def _check_new_files(folder: Path, output: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(_sentence(output, error)) from None
+        raise _not_written(output, error) from None
 
 
 @contextmanager
@@ -215,8 +213,12 @@ def one_writer(folder: Path) -> Iterator[None]:
             path.unlink(missing_ok=True)
 
 
-def _sentence(path: Path, error: OSError) -> str:
-    return f"{path}: cannot be written ({error.strerror}): choose another place with -o"
+def _not_written(path: Path, error: OSError) -> InputError:
+    return _refused(f"{path}: cannot be written ({error.strerror})")
+
+
+def _refused(problem: str, first: str = "") -> InputError:
+    return InputError(problem, "output", f"{first}choose another place", {"first": first})
 
 
 def _umask() -> int:

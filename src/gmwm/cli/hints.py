@@ -27,6 +27,7 @@ HINTS = {
     "no-rest": "--all to take everything as static",
     "no-stamps": "--clock log",
     "other-runs": "-o FOLDER",
+    "output": "{first}choose another place with -o",
     "rate": "--rate 100",
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
