@@ -370,6 +370,8 @@ def read(rng: random.Random, path: Path) -> Any:
         options["topic"] = rng.choice(("/imu", "IMU[0]", "sensor_combined", "x"))
     if rng.random() < 0.1:
         options["clock"] = "log"
+    if rng.random() < 0.5:
+        options["damaged"] = True
     if rng.random() < 0.1:
         options["channels"] = rng.choice((["gyro"], {"gyro_x": 1}, ["accel_z", "temp"]))
     if rng.random() < 0.15 and not {"topic", "clock", "format", "layout"} & set(options):

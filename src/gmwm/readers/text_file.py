@@ -79,7 +79,8 @@ def content_size(path: Path) -> int:
 
 def count_lines(text: bytes) -> int:
     """Count line ends of any of the three kinds."""
-    return text.count(b"\n") + text.count(b"\r") - text.count(b"\r\n")
+    lines = text.count(b"\n")
+    return lines + text.count(b"\r") - text.count(b"\r\n") if b"\r" in text else lines
 
 
 def _end_of_last_line(text: bytes) -> int:

@@ -95,7 +95,7 @@ def test_blank_line_in_a_single_column(write, samples):
 
 @pytest.mark.parametrize("arrow", [True, False])
 def test_over_many_blocks_either_way(write, monkeypatch, arrow):
-    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 2000))
+    monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 2000, str))
     if not arrow:
         monkeypatch.setattr(csv_table, "_parse_with_arrow", lambda *_: None)
     rng = np.random.default_rng(8)
