@@ -345,7 +345,7 @@ def test_right_models_are_not_blamed():
 @pytest.mark.parametrize(
     ("seed", "vehicle", "options"),
     [(501, "car", {}), (510, "helicopter", {}), (501, "loiter", {}),
-     (2058, "helicopter", {"duration": 160.0}), 
+     (2058, "helicopter", {"duration": 160.0}),
      slow(8223, "car", {"duration": 300.0, "rate": 20.0})],
 )  # fmt: skip
 def test_right_models_of_noisy_sensors_are_not_blamed(seed, vehicle, options):
