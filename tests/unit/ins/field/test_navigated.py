@@ -1,6 +1,5 @@
 """Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
 
-import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
