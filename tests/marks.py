@@ -1,4 +1,4 @@
-"""Marks of tests."""
+"""Cases that are not run by default."""
 
 import pytest
 
