@@ -232,12 +232,7 @@ STEPS = np.arange(10_000)
         pytest.param(STEPS % 2 / 8.0, None, id="toggling"),
         pytest.param((STEPS % 4 < 2) / 8.0, WhiteNoise() + RandomWalk(), id="toggling in twos"),
         pytest.param(STEPS / 8.0, None, id="straight line"),
-        pytest.param(
-            STEPS / 8.0,
-            WhiteNoise() + RandomWalk(),
-            id="straight line, given",
-            marks=pytest.mark.slow,
-        ),
+        slow(STEPS / 8.0, WhiteNoise() + RandomWalk(), id="straight line, given"),
         pytest.param(np.sin(0.05 * STEPS), None, id="sine"),
     ],
 )

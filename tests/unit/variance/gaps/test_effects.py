@@ -408,9 +408,7 @@ def test_likelihood_and_moments_agree_on_a_gappy_series():
 
 
 @pytest.mark.parametrize("lost", ["0.1 %", "1 %", "30 shocks", "100 shocks"])
-@pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 21))]
-)
+@pytest.mark.parametrize("seed", [1, *map(slow, range(2, 21))])
 def test_a_few_missing_samples_make_no_ramp(lost, seed):
     """One hour at 100 Hz; with as few as these 18 of 20 records were given a ramp."""
     n = 360_000
