@@ -14,6 +14,7 @@ from gmwm import Resonance, Sinusoid
 from gmwm._core.units import factor
 from gmwm.diagnosis.motion import find_motion
 from gmwm.readers import turning_gravity
+from marks import slow
 from places import SHARED
 
 ADIS = SHARED / "data/adis16405"
@@ -72,9 +73,7 @@ def test_every_channel(number):
     assert shaken == ({"gyro_x"} if number == 4 else set())
 
 
-@pytest.mark.parametrize(
-    "number", [1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3, 4))]
-)
+@pytest.mark.parametrize("number", [1, slow(2), slow(3), slow(4)])
 def test_recordings_are_at_rest(number):
     rec = recording(number)
     codes = {"gravity", "swapped", "gyro-unit"}

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from marks import slow
 from places import REPOSITORY
 
 DOCS = REPOSITORY / "docs"
@@ -34,9 +35,7 @@ def runner(tmp_path_factory):
     return pages.Runner(tmp_path_factory.mktemp("pages"))
 
 
-@pytest.mark.parametrize(
-    "name", [n if n == "README.md" else pytest.param(n, marks=pytest.mark.slow) for n in RUN]
-)
+@pytest.mark.parametrize("name", [n if n == "README.md" else slow(n) for n in RUN])
 def test_what_a_page_shows_runs(runner, name):
     runner.run(PAGES[name])
 

@@ -21,6 +21,7 @@ from gmwm import (
 )
 from gmwm._core.notices import Notice
 from gmwm.calibration import Stopwatch, tuning
+from marks import slow
 from places import SHARED
 
 DT = 0.01
@@ -231,7 +232,7 @@ STEPS = np.arange(10_000)
         pytest.param(STEPS % 2 / 8.0, None, id="toggling"),
         pytest.param((STEPS % 4 < 2) / 8.0, WhiteNoise() + RandomWalk(), id="toggling in twos"),
         pytest.param(STEPS / 8.0, None, id="straight line"),
-        pytest.param(STEPS / 8.0, WhiteNoise() + RandomWalk(), id="straight line, given"),
+        slow(STEPS / 8.0, WhiteNoise() + RandomWalk(), id="straight line, given"),
         pytest.param(np.sin(0.05 * STEPS), None, id="sine"),
     ],
 )
@@ -593,7 +594,7 @@ def as_recording(values):
 
 
 @pytest.mark.parametrize(
-    ("share", "size"), [(0.01, 4.0), (0.01, 30.0), (0.03, 10.0), (0.05, 100.0)]
+    ("share", "size"), [(0.01, 4.0), slow(0.01, 30.0), (0.03, 10.0), (0.05, 100.0)]
 )
 def test_outliers_all_over_the_record_are_left_out(share, size):
     recording = as_recording(contaminated(share, size))
@@ -638,7 +639,7 @@ def heavy(law, n, seed):
     return walk + 1e-3 * draw[law]()
 
 
-@pytest.mark.parametrize("law", ["laplace", "t3", "t5", "uniform"])
+@pytest.mark.parametrize("law", ["laplace", "t3", slow("t5"), "uniform"])
 def test_white_noise_of_heavy_tails_is_white_noise(law):
     # One hour. Robust variances are a sixth to a half too small at the finest level only, which
     # took the white noise for a random walk or a ramp with Gauss-Markov processes.

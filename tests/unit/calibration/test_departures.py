@@ -14,6 +14,7 @@ from gmwm.calibration.departure_notices import departure_notice
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
 from gmwm.cli.hints import with_option
+from marks import slow
 
 DT = 1.0
 N = 7200
@@ -36,7 +37,7 @@ def recording(x, rate=1.0 / DT):
     return Recording.from_arrays({"gyro_x": x}, rate, {"gyro": "rad/s"}, source="bench.csv")
 
 
-@pytest.mark.parametrize(("size", "seed"), [(0.5, 1), (-1.0, 2), (-1.0, 1), (3.0, 3)])
+@pytest.mark.parametrize(("size", "seed"), [(0.5, 1), slow(-1.0, 2), (-1.0, 1), (3.0, 3)])
 def test_a_step_is_found_with_its_size(size, seed):
     # It passes for a random walk: no test of the wavelet variances fails.
     fit = fitted(noise(seed) + size * SAMPLE * STEP)
@@ -57,7 +58,7 @@ def test_a_step_is_found_with_its_size(size, seed):
         ("transient", np.exp(-TIME / 600.0), 600.0),
         ("drift-at-start", np.maximum(1.0 - TIME / 900.0, 0.0), 900.0),
         ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0), 1500.0),
-        ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0), 1500.0),
+        slow("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0), 1500.0),
     ],
 )
 def test_other_departures_are_found(kind, curve, time):
@@ -75,8 +76,8 @@ def test_other_departures_are_found(kind, curve, time):
     [
         WALK,
         WHITE,
-        WHITE + RandomWalk(2e-5),
-        WHITE + GaussMarkov(3e-5, 1000.0),
+        slow(WHITE + RandomWalk(2e-5)),
+        slow(WHITE + GaussMarkov(3e-5, 1000.0)),
         WHITE + GaussMarkov(3e-5, 20.0) + GaussMarkov(4e-5, 1500.0),
     ],
     ids=["N+K", "N", "N+10K", "N+GM", "N+2GM"],
@@ -331,7 +332,7 @@ def test_what_was_taken_off_is_what_the_model_lacks():
     ("sizes", "seed", "between"),
     [
         ((1.0, -1.0, 1.0), 20, True),
-        ((-1.0, 1.0, -1.0), 21, True),
+        slow((-1.0, 1.0, -1.0), 21, True),
         ((1.0, 1.0, -1.0), 22, False),
         ((1.0, -0.6, 1.0), 23, False),
         ((1.0, -1.0), 24, False),

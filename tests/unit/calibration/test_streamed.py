@@ -9,6 +9,7 @@ from click.testing import CliRunner
 import gmwm
 from gmwm.cli.main import cli
 from gmwm.errors import InputError
+from marks import slow
 
 MODEL = gmwm.WhiteNoise() + gmwm.RandomWalk()
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -93,7 +94,7 @@ def test_a_stream_is_screened_as_a_recording_is(spoilt):
     assert raw["gyro_x"].params["N"] > 2.0 * found["gyro_x"].params["N"]
 
 
-@pytest.mark.parametrize(("times", "rows"), [(2, 13_333), (3, 20_000)])
+@pytest.mark.parametrize(("times", "rows"), [(2, 13_333), slow(3, 20_000)])
 def test_a_channel_that_is_written_several_times_has_its_own_rate(tmp_path, times, rows):
     x = np.random.default_rng(5).normal(size=(60_000, 2)) * 1e-3
     x[:, 1] = np.repeat(x[:, 1], times)[1:60_001]

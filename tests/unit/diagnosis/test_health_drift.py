@@ -7,6 +7,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import Channel, RandomWalk, Recording, WhiteNoise
 from gmwm.diagnosis.tuning import FALSE_ALARM
+from marks import slow
 
 DT = 0.01
 
@@ -52,7 +53,7 @@ def test_size_of_the_wander(record):
     assert notice.values["white"] == pytest.approx(1.0 / np.sqrt(1000.0), rel=0.15)
 
 
-@pytest.mark.parametrize("model", [WhiteNoise(0.1), RandomWalk(1.0)])
+@pytest.mark.parametrize("model", [WhiteNoise(0.1), slow(RandomWalk(1.0))])
 def test_noise_of_one_size_does_not_change(record, model):
     runs = 100
     count = 0

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 import gmwm
 from gmwm.diagnosis.repeated import held_share
+from marks import slow
 
 
 def held(times, n, seed=1, first=0, step=0.0):
@@ -76,7 +77,7 @@ def interpolated(rate, seed, digits=None):
 
 
 @pytest.mark.parametrize(("rate", "digits"), [(63.0, None), (63.0, 6), (50.5, None), (31.0, 7)])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, slow(1)])
 def test_linear_interpolation_is_named_and_not_modelled(rate, digits, seed):
     noise = 1e-3 * np.random.default_rng(9).normal(size=12_000)
     channels = {"accel_x": interpolated(rate, seed, digits), "gyro_x": noise}
@@ -103,7 +104,7 @@ def test_noise_is_not_interpolated(step):
 
 
 @pytest.mark.parametrize(("share", "severity"), [(0.03, "warning"), (0.1, "bad")])
-@pytest.mark.parametrize("kind", ["white", "walk", "low-pass"])
+@pytest.mark.parametrize("kind", ["white", slow("walk"), "low-pass"])
 def test_samples_put_between_their_neighbours_are_named(share, severity, kind):
     rng = np.random.default_rng(5)
     noise = rng.normal(size=40_000)

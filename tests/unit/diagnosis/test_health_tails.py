@@ -7,6 +7,7 @@ import gmwm
 from gmwm.diagnosis.contamination import Tails, contamination_notice, heavy_tails
 from gmwm.diagnosis.events import find_events
 from gmwm.diagnosis.innovations import innovations
+from marks import slow
 
 N = 36_000
 
@@ -93,7 +94,7 @@ def test_the_distance_is_passed_with_the_chance():
             assert tails.beyond(np.array([distance]))[0] == pytest.approx(chance, rel=1e-6)
 
 
-@pytest.mark.parametrize("size", [10.0, 100.0])
+@pytest.mark.parametrize("size", [10.0, slow(100.0)])
 def test_what_outliers_leave_is_white(record, size):
     # Samples cut off about a level that follows them would depend on each other: 11 % of variance.
     rng = np.random.default_rng(7)

@@ -12,6 +12,7 @@ from gmwm.diagnosis import find_still, rest_of
 from gmwm.diagnosis.still.loudness import loudness
 from gmwm.errors import InputError
 from gmwm.process import Resonance, WhiteNoise
+from marks import slow
 
 RATE = 100.0
 GYRO, ACCEL = 1e-4, 1e-3  # u/sqrt(Hz)
@@ -119,7 +120,7 @@ def vibrating(size, *stretches, seconds=300.0, seed=1, axes=range(6), line=True)
 
 @pytest.mark.parametrize("line", [True, False])
 @pytest.mark.parametrize("share", [0.05, 0.6])
-@pytest.mark.parametrize("size", [1.5, 3.0, 10.0])
+@pytest.mark.parametrize("size", [1.5, slow(3.0), 10.0])
 def test_what_only_vibrates_is_no_rest(size, share, line):
     begin, end = 100.0, 100.0 + 300.0 * share
     found = rest_of(vibrating(size, (begin, end), axes=range(3, 6), line=line))

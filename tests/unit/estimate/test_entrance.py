@@ -8,6 +8,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
+from marks import slow
 from places import GOLDEN
 
 
@@ -254,7 +255,7 @@ def test_a_redundant_term_is_found_under_all_weights(weights):
 
 @pytest.mark.parametrize(
     "truth",
-    [gmwm.AR([1.2, -0.5], 1.0), gmwm.ARMA([0.6], [0.4], 1.0), Resonance(1.0, 0.1, 0.1)],
+    [slow(gmwm.AR([1.2, -0.5], 1.0)), gmwm.ARMA([0.6], [0.4], 1.0), Resonance(1.0, 0.1, 0.1)],
     ids=repr,
 )
 def test_a_right_model_that_no_mixture_follows_is_allowed_no_discrepancy(truth):

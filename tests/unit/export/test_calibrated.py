@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import gmwm
+import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.notices import Notice
 from gmwm.export import TARGETS
@@ -145,9 +146,7 @@ def test_a_walk_that_was_not_found_is_called_an_upper_bound(text):
     assert "upper bound" not in block_of(text, "accelerometer_noise_density")
 
 
-@pytest.mark.parametrize(
-    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
-)
+@pytest.mark.parametrize("seed", [0, marks.slow(1), marks.slow(2)])
 def test_bounds_of_pure_white_noise_are_numbers(seed):
     # Six axes: where one of them leaves K all but undetermined, the file must still be usable.
     rec = recording(WhiteNoise(N_GYRO), WhiteNoise(N_ACCEL), axes="xyz", n=4000, seed=seed)

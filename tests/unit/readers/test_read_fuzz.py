@@ -17,7 +17,7 @@ from gmwm.readers.names import CANONICAL
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 
-thorough = settings(max_examples=200, deadline=None, database=None)
+thorough = settings(deadline=None, database=None)
 
 CELLS = [
     *("null", "None", "-NaN", "n/a"),
@@ -145,7 +145,7 @@ def check(outcome, path):
     assert all(str(notice).isprintable() for notice in outcome.notices)
 
 
-@settings(thorough, max_examples=100)  # those below ask more of files of the same kind
+@thorough
 @given(data=mutated(), compress=st.booleans(), rate=st.sampled_from([None, 100.0]))
 def test_text(folder, data, compress, rate):
     path = folder / ("a.csv.gz" if compress else "a.csv")

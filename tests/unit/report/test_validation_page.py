@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from gmwm.report.validation import write_validation_report
+from marks import slow
 
 
 def text_of(path: Path) -> str:
@@ -50,7 +51,7 @@ def test_few_runs_tell_nothing(tmp_path, made_up):
     ("outages", "dead"),
     [
         ((), ("bold",)),
-        (((20, 10),), ("right",)),
+        slow(((20, 10),), ("right",)),
         (((20, 10),), ("right", "bold")),
     ],
 )

@@ -25,7 +25,7 @@ def test_expectation_by_hand():
 
 
 def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
-    monkeypatch.setattr(appendix, "LENGTHS", (2_000, 100_000))
+    monkeypatch.setattr(appendix, "LENGTHS", (2_000, 30_000))
     rows = converge(runs=40, seed=3)
     truth = np.array([0.04, 4e-4])
     for row in rows:

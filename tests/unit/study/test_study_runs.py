@@ -102,7 +102,7 @@ def test_the_table_says_what_it_is(tmp_path):
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_method_knows_its_options(name, tmp_path, monkeypatch):
     """A short series is estimated or refused with a sentence, never with an error in an option."""
-    short = replace(STUDIES[name], n=600)
+    short = replace(STUDIES[name], n=300)
     monkeypatch.setitem(STUDIES, name, short)
     table = run_study(short, tmp_path, runs=1)
     assert set(table["method"].to_pylist()) == set(short.methods)

@@ -7,6 +7,7 @@ import pytest
 
 import gmwm
 from gmwm import ARIMA, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
+from marks import slow
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 40.0)
 
@@ -28,7 +29,7 @@ def standardised(truth, n, runs, seed, *, omega="model", **options):
     [
         {"robust": True, "efficiency": 0.9},  # what both leave out is below, beside a ramp
         {"omega": "data", "data_covariance": "octave"},
-        {"omega": "data", "data_covariance": "octave", "wavelet": "db2"},
+        slow({"omega": "data", "data_covariance": "octave", "wavelet": "db2"}),
     ],
     ids=str,
 )

@@ -21,6 +21,7 @@ from gmwm.variance.covariance.robust import (
 from gmwm.variance.kernels import cumulative, haar_coefficients
 from gmwm.variance.robust import consistency, robust_variance, tuning_constant
 from gmwm.variance.robust_kernels import middle_bin
+from marks import slow
 from places import SHARED
 
 MTIG = SHARED / "data/mtig/mtig_contaminated_gyro_x.csv.gz"
@@ -409,7 +410,9 @@ def test_fewer_levels_and_counts_of_a_series_with_gaps():
 
 
 @pytest.mark.parametrize(
-    "process", [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(1.0), gmwm.GaussMarkov(1.0, 50.0)], ids=repr
+    "process",
+    [gmwm.WhiteNoise(1.0), slow(gmwm.RandomWalk(1.0)), gmwm.GaussMarkov(1.0, 50.0)],
+    ids=repr,
 )
 def test_simulated_covariance_of_clean_series(process):
     runs, n = 500, 4096

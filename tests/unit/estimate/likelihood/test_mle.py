@@ -29,6 +29,7 @@ from gmwm.estimate.result.fit import Fit
 from gmwm.process import as_model
 from gmwm.readers.recording import Channel
 from gmwm.variance.analysis import as_channel
+from marks import slow
 
 OF_SAMPLES = ("mle", "whittle", "em")
 
@@ -169,7 +170,7 @@ def test_an_interval_of_95_percent_covers_95_percent():
     assert all(0.87 < count / runs <= 1.0 for count in held.values()), held
 
 
-@pytest.mark.parametrize("method", ["mle", "whittle"])
+@pytest.mark.parametrize("method", ["mle", slow("whittle")])
 def test_an_amplitude_of_zero_has_an_upper_bound(method):
     zero = bounded = 0
     runs = 20
@@ -198,7 +199,7 @@ def test_an_amplitude_of_zero_has_an_upper_bound(method):
     [
         (1.5e-3, "mle", 20),
         (6e-3, "mle", 40),
-        pytest.param(1.5e-3, "em", 10, marks=pytest.mark.slow),
+        slow(1.5e-3, "em", 10),
     ],
 )
 def test_intervals_of_a_walk_that_can_hardly_be_seen_cover_it(K, method, runs):
@@ -474,8 +475,11 @@ def test_candidates_have_the_amplitudes_of_the_data():
     assert 1.0 < found.N < 4.0  # coarse levels count as much as fine ones
 
 
-@pytest.mark.parametrize("method", ["mle", "em"])
-@pytest.mark.parametrize("kept", [lambda k: k % 2 == 1, lambda k: k * 7 % 10 < 4])
+@pytest.mark.parametrize(
+    ("kept", "method"),
+    [(lambda k: k % 2 == 1, "mle"), slow(lambda k: k % 2 == 1, "em"),
+     (lambda k: k * 7 % 10 < 4, "mle"), (lambda k: k * 7 % 10 < 4, "em")],
+)  # fmt: skip
 def test_gaps_may_be_anywhere(method, kept):
     truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
     x = truth.simulate(4000, 1.0, seed=3)

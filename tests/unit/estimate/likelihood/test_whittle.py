@@ -29,7 +29,7 @@ MODELS = [
     (QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 9999, 1.0),
     (QuantizationNoise(0.004) + WhiteNoise(0.02) + RandomWalk(0.02), 8192, 0.01),
     (AR([1.2, -0.6], 2.0) + WhiteNoise(1.0), 3001, 1.0),
-    (GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 100_000, 1.0),
+    (GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 40_000, 1.0),
     (WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1), 8191, 1.0),
     (as_model(ARMA([0.9], [-0.5], 1.0)), 5003, 1.0),
     (as_model(MA([-0.9], 1.0)), 4097, 1.0),

@@ -8,15 +8,13 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.estimate.problem import Coordinates
 from gmwm.estimate.result.bound import quantile_above_zero, upper_amplitude
+from marks import slow
 
 MODEL = WhiteNoise() + RandomWalk()
 WV = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(20_000, 1.0, 1), 1.0)
 
 
-@pytest.mark.parametrize(
-    "walk",
-    [1e-3, *(pytest.param(walk, marks=pytest.mark.slow) for walk in (5e-4, 1.7e-3))],
-)
+@pytest.mark.parametrize("walk", [1e-3, slow(5e-4), slow(1.7e-3)])
 def test_bounds_of_a_walk_near_the_threshold_lie_above_it(walk):
     # Under the noise without the walk 30, 26 and 16 of 100 bounds lay below.
     runs, below = 40, 0

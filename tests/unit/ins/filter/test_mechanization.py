@@ -19,6 +19,7 @@ from gmwm.ins.trajectory.manoeuvres import (
 )
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 from gmwm.ins.trajectory.trajectory import NavState, Trajectory
+from marks import slow
 
 NORTH = (math.radians(46.5), 0.1, 400.0)
 SOUTH = (math.radians(-33.0), -2.0, 20.0)
@@ -41,14 +42,14 @@ def assert_comes_back(true: Trajectory, metres: float = 0.1, degrees: float = 1e
     assert np.max(np.abs(found.velocity - true.velocity)) < 1e-3
 
 
-@pytest.mark.parametrize("start", [SOUTH, (math.radians(84.0), 3.0, 3000.0)])
+@pytest.mark.parametrize("start", [SOUTH, slow((math.radians(84.0), 3.0, 3000.0))])
 def test_a_helicopter_comes_back_after_half_an_hour(start: tuple[float, float, float]) -> None:
     true = helicopter_mapping(start=start)
     assert true.duration == pytest.approx(1800.0)
     assert_comes_back(true)
 
 
-@pytest.mark.parametrize("start", [NORTH, DATE_LINE])
+@pytest.mark.parametrize("start", [slow(NORTH), DATE_LINE])
 def test_a_car_comes_back(start: tuple[float, float, float]) -> None:
     assert_comes_back(car_drive(start=start))
 

@@ -24,6 +24,7 @@ from gmwm.ins.montecarlo.consistency import (
     over_time,
 )
 from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
+from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}
 
@@ -136,7 +137,7 @@ def test_interval_of_coverage_is_honest_whatever_the_correlation_of_components(s
         assert np.mean([each[i].within for each in found]) >= least(draws, 0.95)
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.9, 0.99])
+@pytest.mark.parametrize("memory", [0.0, slow(0.9), 0.99])
 def test_interval_of_coverage_over_time_is_honest(memory):
     rng = np.random.default_rng(5)
     draws = 100

@@ -13,6 +13,7 @@ from gmwm.variance.covariance import daubechies as module
 from gmwm.variance.covariance.daubechies import wavelet_covariance
 from gmwm.variance.covariance.haar import haar_covariance
 from gmwm.variance.modwt import coefficients
+from marks import slow
 
 WALKING = gmwm.WhiteNoise(1.0) + gmwm.RandomWalk(0.1)
 PROCESSES = [
@@ -139,7 +140,7 @@ def test_covariance_is_that_of_simulated_series(process, name):
     assert np.max(np.abs(found - predicted) / np.outer(scale, scale) / spread) < 4.5
 
 
-@pytest.mark.parametrize("n", [64, 1000, 4099, 3_000_000])
+@pytest.mark.parametrize("n", [64, 1000, 4099, slow(3_000_000)])
 @pytest.mark.parametrize("name", ["db2", "db6", "coif5"])
 def test_covariance_is_symmetric_and_positive_definite(name, n):
     model = gmwm.WhiteNoise(1.0) + gmwm.GaussMarkov(0.3, 40.0) + gmwm.RandomWalk(1e-3)

@@ -27,6 +27,7 @@ from gmwm.variance.gaps.effects import (
 )
 from gmwm.variance.gaps.filling import Filling
 from gmwm.variance.gaps.kernels import pairs_at_lag
+from marks import slow
 
 
 def with_gaps(x, gaps):
@@ -159,7 +160,11 @@ PROCESSES = [
 
 @pytest.mark.parametrize(
     ("pattern", "process"),
-    [(each, one) for i, each in enumerate(PATTERNS) for one in PROCESSES[1 - i % 2 :: 2]],
+    [
+        (slow if one is not PROCESSES[i % 4] else pytest.param)(each, one)
+        for i, each in enumerate(PATTERNS)
+        for one in PROCESSES[i % 2 :: 2]
+    ],
     ids=str,
 )
 def test_change_is_that_of_the_quadratic_form(process, pattern):
@@ -260,7 +265,7 @@ def check_levels(model, lost, n, runs, seed, most):
     assert np.all(ratio < np.log(1.2) + 1.5 * chance * spread), ratio
 
 
-@pytest.mark.parametrize("model", [MODELS[1], MODELS[4], MODELS[5]], ids=repr)
+@pytest.mark.parametrize("model", [MODELS[1], slow(MODELS[4]), MODELS[5]], ids=repr)
 def test_levels_of_a_gappy_series_are_those_of_the_complete_one(model):
     check_levels(model, singles(0.01), 17_000, 40, 1, 0.3)
 
@@ -368,7 +373,7 @@ def test_recorded_steps_pass_through_short_gaps():
 
 GAPPY = [
     WhiteNoise(1.0) + GaussMarkov(0.7, 40.0),
-    WhiteNoise(1.0) + RandomWalk(0.03) + RateRamp(2e-3),
+    slow(WhiteNoise(1.0) + RandomWalk(0.03) + RateRamp(2e-3)),
 ]
 
 
@@ -403,9 +408,7 @@ def test_likelihood_and_moments_agree_on_a_gappy_series():
 
 
 @pytest.mark.parametrize("lost", ["0.1 %", "1 %", "30 shocks", "100 shocks"])
-@pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 21))]
-)
+@pytest.mark.parametrize("seed", [1, *map(slow, range(2, 21))])
 def test_a_few_missing_samples_make_no_ramp(lost, seed):
     """One hour at 100 Hz; with as few as these 18 of 20 records were given a ramp."""
     n = 360_000
