@@ -824,7 +824,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(write, tmp_pa
     (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match=r"report\.html: cannot be written"):
         write(None, tmp_path / "nowhere" / "report.html")
-    with pytest.raises(InputError, match="in the way: move it, or choose another place$"):
+    with pytest.raises(InputError, match=r"in the way: move it, or choose another place$"):
         write(None, str(tmp_path / "folder"))
     assert [each.name for each in tmp_path.iterdir()] == ["folder"]
 
