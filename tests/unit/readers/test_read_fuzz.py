@@ -178,12 +178,16 @@ def _value(cell: str) -> float:
     return np.nan if cell.lower() in ("", "na", "n/a", "#n/a", "null", "none") else float(cell)
 
 
-def naive(data: bytes, delimiter: str | None) -> np.ndarray | None:
-    """The last six of seven columns by nothing but split and float."""
+def naive(data: bytes, delimiter: str | None, comments: str) -> np.ndarray | None:
+    """The last six of seven columns by nothing but split and float.
+
+    comments: Marks of lines before the first row that are none; below a header such a line may be a
+        row, of which the column with the mark is not read.
+    """
     text = data.decode("utf-8", "replace").removeprefix("\ufeff")
     rows: list[list[float]] = []
     for line in re.split("\r\n|\r|\n", text):
-        if not line.strip(" \t") or (not rows and line.lstrip(" ")[0] in "#%"):
+        if not line.strip(" \t") or (not rows and line.lstrip(" ")[0] in comments):
             continue
         if delimiter:  # between quotes it parts nothing
             line = re.sub('"[^"]*"', lambda quoted: quoted[0].replace(delimiter, "?"), line)
@@ -220,7 +224,7 @@ def test_what_is_accepted_is_what_the_file_says(folder, data):
     if isinstance(outcome, str):
         return
     found = np.column_stack([channel.values for channel in outcome.values()])
-    said = [naive(data, mark) for mark in (";", "\t", ",", None)]
+    said = [naive(data, mark, note) for mark in (";", "\t", ",", None) for note in ("#%", "")]
     named = sum(each.values["count"] for each in outcome.notices if each.code == "sentinel")
     assert any(same_but_for(rows, found, named) for rows in said)
 
