@@ -200,8 +200,9 @@ def naive(data: bytes, delimiter: str | None, comments: str) -> np.ndarray | Non
             # A line of words before the header has other widths.
             rows.append([_value(cell) for cell in (cells if len(cells) < 7 else cells[1:7])][-6:])
         except ValueError:
-            if rows:
+            if any(len(row) == 6 for row in rows):
                 return None
+            rows = []  # a line of numbers before the header
     return np.array(rows) if all(len(row) == 6 for row in rows) else None
 
 
