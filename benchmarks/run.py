@@ -37,10 +37,10 @@ BEGIN, END = "<!-- begin: benchmarks/run.py -->", "<!-- end: benchmarks/run.py -
 TRUTH = gmwm.WhiteNoise(0.2) + gmwm.GaussMarkov(0.05, 40.0)
 FIVE = (
     gmwm.WhiteNoise(1e-3)
-    + gmwm.RandomWalk(1e-5)
-    + gmwm.QuantizationNoise(1e-5)
-    + gmwm.GaussMarkov(2e-4, 10.0)
-    + gmwm.GaussMarkov(2e-4, 300.0)
+    + gmwm.RandomWalk(3e-5)
+    + gmwm.QuantizationNoise(3e-5)
+    + gmwm.GaussMarkov(1e-3, 1.0)
+    + gmwm.GaussMarkov(5e-4, 50.0)
 )
 DT, ROUNDS, SHORT = 0.01, 3, 3_000
 
