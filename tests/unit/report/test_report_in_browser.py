@@ -77,6 +77,22 @@ def test_every_figure_is_drawn_and_nothing_foreign_runs(tab, path):
     assert all("Content Security Policy" in text for text in complaints)
 
 
+# What is in a cell of numbers and has a part of it on another line.
+BROKEN = """(function () {
+  var found = [], node, walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while ((node = walk.nextNode())) {
+    if (!node.parentNode.closest('td.num')) { continue; }
+    for (var word of node.textContent.matchAll(/[^\\s/\\-]{1,12}/g)) {
+      var range = document.createRange();
+      range.setStart(node, word.index);
+      range.setEnd(node, word.index + word[0].length);
+      var tops = Array.from(range.getClientRects()).map(function (r) { return r.top; });
+      if (tops.length && Math.max(...tops) - Math.min(...tops) > 4) { found.push(word[0]); }
+    }
+  }
+  return found; })()"""
+
+
 @pytest.mark.parametrize("width", [1300, 420])
 def test_nothing_is_cut_off(tab, width):
     try:
@@ -86,6 +102,7 @@ def test_nothing_is_cut_off(tab, width):
         plots = tab.run("Array.from(document.querySelectorAll('.plot svg.main-svg')).map("
                         "function (p) { return p.getBoundingClientRect().right; })")  # fmt: skip
         assert max(plots) <= width
+        assert tab.run(BROKEN) == []
     finally:
         tab.size(1300)
 
@@ -357,6 +374,7 @@ def test_a_comparison_fits_a_telephone_and_fetches_nothing(calibration, tab, tmp
     tab.size(420)
     tab.open(found.report(tmp_path / "compare.html"))
     assert tab.run("document.documentElement.scrollWidth") <= 420
+    assert tab.run(BROKEN) == []
     assert tab.run("document.querySelectorAll('.multiples svg').length") == 1
     assert [each for each in tab.requests() if not each.startswith(("file:", "data:"))] == []
 
@@ -370,6 +388,7 @@ def test_a_validation_fits_a_telephone_and_can_be_read(tab, tmp_path, made_up):
             tab.scheme(scheme)
             tab.open(page)
             assert tab.run("document.documentElement.scrollWidth") <= 420
+            assert tab.run(BROKEN) == []
             ratio, where = tab.run(CONTRAST)
             assert ratio >= 4.5, (scheme, where)
         wide = (
