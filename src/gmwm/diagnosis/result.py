@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from gmwm._core.documents import Document
-from gmwm._core.forms import Form, Notices, NotNegative, Positive, Rate, Samples, Text
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
@@ -22,11 +20,9 @@ from gmwm.readers import Recording
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 _INDENT = 11
-
-_OR_LIST = Field(strict=False)  # JSON has no tuples
-
-Index = Annotated[int, Field(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -242,6 +238,8 @@ class Health(Document, Printed):
 
     @classmethod
     def document_form(cls) -> type[Form]:
+        from gmwm.diagnosis.form import HealthForm
+
         return HealthForm
 
     @classmethod
@@ -261,49 +259,3 @@ def _wrapped(notice: Notice) -> list[str]:
     """Severity in front, text and action beside it."""
     text = notice.text + (f"; {notice.action}" if notice.action else "")
     return wrapped(text, first=f"  {notice.severity:{_INDENT - 2}}", indent=_INDENT)
-
-
-# -- what a stored one holds --------------------------------------------------------------------
-
-
-class RepetitionForm(Form):
-    """Of `Repetition`."""
-
-    times: Annotated[int, Field(ge=2)]
-    first: Index
-
-    @model_validator(mode="after")
-    def _together(self) -> Self:
-        if self.first >= self.times:
-            raise ValueError("first is not below times")
-        return self
-
-
-class ChannelHealthForm(Form):
-    """Of `ChannelHealth`."""
-
-    lines: Annotated[list[Annotated[tuple[Positive, NotNegative], _OR_LIST]], _OR_LIST]
-    resonances: Annotated[list[Annotated[tuple[Positive, Positive], _OR_LIST]], _OR_LIST]
-    events: Annotated[list[Annotated[tuple[Index, Samples], _OR_LIST]], _OR_LIST]
-    lsb: NotNegative
-    outliers: Annotated[float, Field(ge=0.0, le=1.0)]
-    held: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    noise: NotNegative = 0.0
-    repetition: RepetitionForm | None
-
-
-class HealthForm(Form):
-    """Of `Health`."""
-
-    source: Text
-    rate_hz: Rate
-    n: Samples
-    notices: Notices
-    channels: dict[Text, ChannelHealthForm]
-
-    @model_validator(mode="after")
-    def _together(self) -> Self:
-        for name, channel in self.channels.items():
-            if any(not start < stop <= self.n for start, stop in channel.events):
-                raise ValueError(f"an event of {name} is no interval of samples")
-        return self

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
-
-from pydantic import Field
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from gmwm._core.documents import Document
-from gmwm._core.forms import Form, Notices, NotNegative, Text
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.text import Printed, bullets, wrapped
@@ -21,46 +18,14 @@ from gmwm.filter_numbers.table import shown_unit
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 CONSUMERS = {
     "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
     "outage": "INS/GNSS filter, at the end of an outage",
     "keyframes": "Relative pose between keyframes",
 }
 """Who uses the numbers."""
-
-
-class CheckForm(Form):
-    """Of `Check`."""
-
-    consumer: Text
-    where: Text
-    quantity: Text
-    unit: Text
-    time: NotNegative
-    true: NotNegative | None
-    believed: NotNegative | None
-    nees: NotNegative | None
-
-
-class CauseForm(Form):
-    """Of `Cause`."""
-
-    quantity: Text
-    name: Text
-    N: NotNegative | None
-    K: NotNegative | None
-    N_factor: NotNegative | None
-    K_factor: NotNegative | None
-
-
-class CertificateForm(Form):
-    """Of `Certificate`; its numbers have forms of their own."""
-
-    numbers: dict[str, Any]
-    recommended: dict[str, Any]
-    checks: Annotated[Sequence[CheckForm], Field(min_length=1, max_length=10_000)]
-    causes: Annotated[Sequence[CauseForm], Field(max_length=1000)]
-    notices: Notices
 
 
 @dataclass(frozen=True)
@@ -217,6 +182,8 @@ class Certificate(Document, Printed):
 
     @classmethod
     def document_form(cls) -> type[Form]:
+        from gmwm.filter_numbers.form import CertificateForm
+
         return CertificateForm
 
     @classmethod

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
-
-from pydantic import Field
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
-from gmwm._core.forms import Form, Model as ModelForm, Notices, NotNegative, Positive, Rate, Text
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
@@ -24,43 +21,13 @@ from gmwm.process import Model, model_from_list
 if TYPE_CHECKING:
     import pandas
 
+    from gmwm._core.forms import Form
+
 FORMS = ("N+K", "N+GM", "N+K+GM", "N+2GM")
 """White noise with a random walk, with one or two Gauss-Markov processes, or with both."""
 
 METHODS = ("bound", "reduce", "given")
 """Where numbers come from: `bound`, `reduce`, or somebody who gave them."""
-
-
-class PredictedForm(Form):
-    """Of `Predicted`."""
-
-    time: Positive
-    nees: NotNegative | None
-    tightness: NotNegative | None
-
-
-class FilterNumbersForm(Form):
-    """Of `FilterNumbers`."""
-
-    form: Text
-    model: ModelForm
-    horizon_s: Positive
-    initial_sd: NotNegative
-    method: Text
-    predicted: Annotated[Sequence[PredictedForm], Field(max_length=100)]
-    notices: Notices
-    quantity: Text
-    stderr: dict[Text, NotNegative] = Field(default_factory=dict)
-
-
-class SensorNumbersForm(Form):
-    """Of `SensorNumbers`; each axis has a form of its own."""
-
-    source: Text
-    rate_hz: Rate | None
-    duration_s: Positive | None
-    shared: bool
-    channels: Annotated[dict[Text, dict[str, Any]], Field(min_length=1, max_length=10_000)]
 
 
 @dataclass(frozen=True)
@@ -235,6 +202,8 @@ class FilterNumbers(Document, Printed):
 
     @classmethod
     def document_form(cls) -> type[Form]:
+        from gmwm.filter_numbers.form import FilterNumbersForm
+
         return FilterNumbersForm
 
     @classmethod
@@ -374,6 +343,8 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
 
     @classmethod
     def document_form(cls) -> type[Form]:
+        from gmwm.filter_numbers.form import SensorNumbersForm
+
         return SensorNumbersForm
 
     @classmethod
