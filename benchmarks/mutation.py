@@ -1,11 +1,12 @@
 """How many single changes of the source do the unit tests notice?
 
 Run with ``pip install cosmic-ray coverage`` and ``python benchmarks/mutation.py -o FOLDER`` (two
-hours on one core; ``--mutants 24`` for a first look). Cosmic Ray makes the changes in a copy of the
-checkout, drawn at random, as many in each room: arithmetic and comparisons turned, terms and
-conditions negated, constants raised or lowered by one, loops skipped. Of the unit tests, those run
-that pass through the changed line (or, where it is compiled or runs at import, those of its room).
-A change that no test fails on survives; survivors are printed with the changed line.
+hours on one core; ``--mutants 24`` for a first look, ``--rooms readers`` for one room). Cosmic Ray
+makes the changes in a copy of the checkout, drawn at random, as many in each room: arithmetic and
+comparisons turned, terms and conditions negated, constants raised or lowered by one, loops skipped.
+Of the unit tests, those run that pass through the changed line (or, where it is compiled or runs at
+import, those of its room), each time in a fork of a process that has what the package imports. A
+change that no test fails on survives; survivors are printed with the changed line.
 
 The folder keeps results; a second call goes on with what is there.
 """
@@ -13,18 +14,24 @@ The folder keeps results; a second call goes on with what is there.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numba
 import numpy as np
+import pytest
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
@@ -35,6 +42,7 @@ ROOMS = (
     "calibration budget export",
 )  # fmt: skip
 ARITHMETIC = "Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul"
+SLOW_TO_IMPORT = ("scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats", "pandas")
 OPERATORS = re.compile(
     rf"ReplaceBinaryOperator_({ARITHMETIC})$|ReplaceComparisonOperator_(Lt|Gt|LtE|GtE|Eq|NotEq)_"
     "(Lt|Gt|LtE|GtE|Eq|NotEq)$|NumberReplacer|ReplaceUnaryOperator_USub_UAdd|AddNot|"
@@ -65,11 +73,11 @@ def mutants_of(path: Path, tree: Path) -> Iterator[Mutant]:
             yield Mutant(str(path.relative_to(tree)), name, occurrence, line, column)
 
 
-def drawn(tree: Path, count: int, seed: int) -> list[Mutant]:
+def drawn(tree: Path, count: int, seed: int, rooms: Sequence[str] = ROOMS) -> list[Mutant]:
     """As many of each room; at most one of each place in the source."""
     rng = np.random.default_rng(seed)
     chosen = []
-    for room in ROOMS:
+    for room in rooms:
         files = [f for each in room.split() for f in (tree / "src/gmwm" / each).rglob("*.py")]
         everything = [mutant for file in sorted(files) for mutant in mutants_of(file, tree)]
         seen: set[tuple[str, int, int]] = set()
@@ -79,22 +87,43 @@ def drawn(tree: Path, count: int, seed: int) -> list[Mutant]:
             if place not in seen:
                 seen.add(place)
                 chosen.append(mutant)
-            if len(seen) == -(-count // len(ROOMS)):
+            if len(seen) == -(-count // len(rooms)):
                 break
     return chosen
 
 
-def pytest(
-    tree: Path, *arguments: str, timeout: float | None = None, **variables: str
-) -> subprocess.CompletedProcess[str]:
-    """Run pytest in the copy, in one process."""
-    environment = {**os.environ, "PYTHONPATH": str(tree / "src"), "PYTHONDONTWRITEBYTECODE": ""}
-    command = [sys.executable, *arguments, "-q", "-p", "no:cacheprovider", "-o",
-               "addopts=-m 'not slow'"]  # fmt: skip
-    return subprocess.run(
-        command, cwd=tree, env=environment | variables, timeout=timeout,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+def tested(tree: Path, tests: Sequence[str], loops: Path, longest: float) -> bool | None:
+    """Whether the tests pass in a fork of this process; None if none ended in time.
+
+    loops: Folder of what is compiled.
+    longest: s.
+    """
+    if (child := os.fork()) == 0:
+        status = 3
+        try:
+            os.setsid()  # what the tests start ends with them
+            os.environ |= {"PYTHONPATH": str(tree / "src"), "NUMBA_CACHE_DIR": str(loops)}
+            numba.config.CACHE_DIR = str(loops)  # type: ignore[attr-defined]
+            sys.path.insert(0, str(tree / "src"))
+            sys.dont_write_bytecode = True
+            os.chdir(tree)
+            for stream in (1, 2):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+            options = ("-x", "-q", "-p", "no:cacheprovider", "-o", "addopts=-m 'not slow'")
+            status = int(pytest.main([*options, *tests]))
+        finally:
+            os._exit(status)
+    end, ended, status = time.monotonic() + longest, 0, 0
+    while not ended and time.monotonic() < end:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        time.sleep(0.02)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    if not ended:
+        os.waitpid(child, 0)
+        return None
+    code = os.waitstatus_to_exitcode(status)
+    return None if code in (4, 5) else code == 0  # these two: no test was run
 
 
 def traced(tree: Path, folder: Path) -> CoverageData:
@@ -106,7 +135,10 @@ def traced(tree: Path, folder: Path) -> CoverageData:
             f"[run]\nsource = {tree}/src/gmwm\ndata_file = {file}\n"
             "dynamic_context = test_function\n"
         )
-        pytest(tree, "-m", "coverage", "run", f"--rcfile={settings}", "-m", "pytest", "tests/unit")
+        command = (sys.executable, "-m", "coverage", "run", f"--rcfile={settings}", "-m", "pytest")
+        options = ("-q", "-p", "no:cacheprovider", "-o", "addopts=-m 'not slow'", "tests/unit")
+        environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
+        subprocess.run((*command, *options), cwd=tree, env=environment, check=False)
     data = CoverageData(str(file))
     data.read()
     return data
@@ -130,24 +162,20 @@ def tests_of(mutant: Mutant, tree: Path, data: CoverageData) -> list[str]:
     return [name for _, name in sorted(set(found))] or [str(own)]
 
 
-def survives(mutant: Mutant, tree: Path, data: CoverageData, longest: float) -> bool | None:
+def survives(mutant: Mutant, tree: Path, tests: Sequence[str], longest: float) -> bool | None:
     """Whether no test fails; None if they take too long, by the change or by the machine's load."""
     file = tree / mutant.path
-    source = file.read_text()
+    source, stamps = file.read_text(), file.stat()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
-    tests = ("-m", "pytest", "-x", *tests_of(mutant, tree, data))
     try:
         file.write_text(changed)
-        if "@compiled" in source:  # what is compiled of the change is not kept
-            with TemporaryDirectory() as folder:
-                result = pytest(tree, *tests, timeout=longest, NUMBA_CACHE_DIR=folder)
-        else:
-            result = pytest(tree, *tests, timeout=longest)
-    except subprocess.TimeoutExpired:
-        return None
+        if "@compiled" not in source:
+            return tested(tree, tests, tree.parent / "loops", longest)
+        with TemporaryDirectory() as loops:  # what is compiled of the change is not kept
+            return tested(tree, tests, Path(loops), longest)
     finally:
         file.write_text(source)
-    return result.returncode == 0
+        os.utime(file, ns=(stamps.st_atime_ns, stamps.st_mtime_ns))
 
 
 def main() -> None:
@@ -155,6 +183,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--mutants", type=int, default=304)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rooms", nargs="+", default=ROOMS, choices=ROOMS)
     longest = "s, after which the tests of a change are stopped, which then counts for nothing"
     parser.add_argument("--longest", type=float, default=240.0, help=longest)
     parser.add_argument("-o", "--output", type=Path, required=True)
@@ -165,12 +194,14 @@ def main() -> None:
         ignored = shutil.ignore_patterns(".git", ".venv", "out")
         shutil.copytree(Path(__file__).resolve().parents[1], tree, ignore=ignored)
     data = traced(tree, folder)
+    for name in SLOW_TO_IMPORT:  # once, before the forks
+        import_module(name)
     record = folder / "results.json"
     results = json.loads(record.read_text()) if record.exists() else {}
-    for mutant in drawn(tree, options.mutants, options.seed):
+    for mutant in drawn(tree, options.mutants, options.seed, options.rooms):
         key = json.dumps(asdict(mutant))
         if key not in results:
-            results[key] = survives(mutant, tree, data, options.longest)
+            results[key] = survives(mutant, tree, tests_of(mutant, tree, data), options.longest)
             record.write_text(json.dumps(results))
     report({Mutant(**json.loads(key)): alive for key, alive in results.items()}, tree)
 
