@@ -125,12 +125,7 @@ class Filter:
         return P
 
     def run(
-        self,
-        imu: Imu,
-        initial: NavState,
-        initial_sd: InitialSd,
-        events: Events,
-        outputs: Outputs,
+        self, imu: Imu, initial: NavState, initial_sd: InitialSd, events: Events, outputs: Outputs
     ) -> Solution:
         """Filter a record.
 
