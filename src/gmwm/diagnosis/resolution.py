@@ -27,29 +27,35 @@ def step_size(values: FloatArray) -> float:
     levels = np.unique(part)
     if levels.size < 2:
         return 0.0
-    differences = np.diff(levels)
-    differences = differences[differences > _SMALLEST * (levels[-1] - levels[0])]
+    gaps = np.diff(levels)
+    differences = gaps[gaps > _SMALLEST * (levels[-1] - levels[0])]
     smallest = float(np.min(differences))
     first = float(np.median(differences[differences <= tuning.ONE_STEP * smallest]))
     # Few levels that come again and again are steps whatever their places.
     if levels.size < tuning.FEWEST_LEVELS and levels.size > part.size / 2:
         return 0.0
+    levels -= np.mean(levels)
     for divisor in tuning.DIVISORS:
-        step, off = _lattice(levels, first / divisor)
+        step, off = _lattice(levels, gaps, first / divisor)
         if off <= tuning.OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
             return step
     return 0.0
 
 
-def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
-    """Step after regression of the levels on their places, and rms distance in steps."""
-    places = np.concatenate([[0.0], np.cumsum(np.rint(np.diff(levels) / step))])
+def _lattice(levels: FloatArray, gaps: FloatArray, step: float) -> tuple[float, float]:
+    """Step after regression of the levels on their places, and rms distance in steps.
+
+    levels: Less their mean.
+    gaps: Between them.
+    """
+    places = np.concatenate([[0.0], np.cumsum(np.rint(gaps / step))])
     if places[-1] == 0.0:
         return step, np.inf
-    centred = places - np.mean(places)
-    refined = inner(centred, levels - np.mean(levels)) / inner(centred, centred)
-    gaps = np.diff(levels) / refined
-    return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
+    places -= np.mean(places)
+    refined = inner(places, levels) / inner(places, places)
+    off = gaps / refined
+    off -= np.rint(off)
+    return refined, float(np.sqrt(np.mean(off**2)))
 
 
 def is_coarse(values: FloatArray, step: float) -> bool:
