@@ -9,6 +9,7 @@ from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.innovations import Signal
 
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
 
@@ -78,24 +79,19 @@ def is_coarse(values: FloatArray, step: float) -> bool:
     return bool(beyond < 2.0 * norm.sf(tuning.COARSE) * places.size)
 
 
-def rounding_notice(
-    name: str, unit: str, step: float, scatter: float, samples: FloatArray | None = None
-) -> Notice | None:
+def rounding_notice(signal: Signal, samples: FloatArray | None = None) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
     before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
     sec. 5): of variance step^2/12, plain additive noise.
 
-    name, unit: Of the channel.
-    step: u; 0 if there is none.
-    scatter: Standard deviation of what cannot be predicted from the samples before, rounding
-        included, u.
     samples: (n,), for `is_coarse`.
     """
+    name, unit, step = signal.name, signal.unit, signal.step
     if step == 0.0:
         return None
-    noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
+    noise = float(np.sqrt(max(signal.scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
     text = f"samples come in steps of {readable(step, unit)}"
     if noise < step / tuning.COARSE or (samples is not None and is_coarse(samples, step)):
