@@ -59,11 +59,7 @@ class Document:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
-        return {
-            "schema": self.SCHEMA,
-            "schema_version": self.SCHEMA_VERSION,
-            **self.content(),
-        }
+        return {"schema": self.SCHEMA, "schema_version": self.SCHEMA_VERSION, **self.content()}
 
     @classmethod
     def from_dict(cls, content: Any) -> Self:

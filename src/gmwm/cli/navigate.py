@@ -240,12 +240,9 @@ def navigate(
         if reading:
             imu = content.get("imu")
             content["imu"] = {**(imu if isinstance(imu, dict) else {"file": imu}), **reading}
-        if "compare" in content:
-            _compare(content, folder, output, place, as_json)
-        elif "outages" in content:
+        if "outages" in content and "compare" not in content:
             raise InputError("--outages needs sensors to compare: give --sensors A=a.json twice")
-        else:
-            _filter(content, folder, output, place, as_json)
+        _own_data(content, folder, output, place, as_json)
 
 
 @contextmanager
@@ -290,42 +287,26 @@ def _validate(
     click.echo(f"\nwrote {table}\nwrote {report}")
 
 
-def _filter(
+def _own_data(
     content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
 ) -> None:
-    """Filter real data."""
+    """Filter real data, or compare sensor models on them."""
     from gmwm._core.files import folder_to_fill
-    from gmwm.ins.field import Measured, Navigated
+    from gmwm.ins.field import Comparison, Measured, Navigated
 
     with _named_in_messages(place):
-        measured = Measured.of(content, base)
-    measured = replace(measured, notices=tuple(map(with_option, measured.notices)))
+        given = (Comparison if "compare" in content else Measured).of(content, base)
+    given = replace(given, notices=tuple(map(with_option, given.notices)))
+    found: Comparison | Navigated
     with folder_to_fill(output) as folder:
-        paths = [folder / name for name in _OF_LOG]
-        navigated = Navigated.of(measured)
-        navigated.write_solution(paths[0])
-        navigated.report(paths[1])
+        if isinstance(given, Comparison):
+            found, paths = given, [given.report(folder / _OF_SENSORS)]
+        else:
+            found, paths = Navigated.of(given), [folder / name for name in _OF_LOG]
+            found.write_solution(paths[0])
+            found.report(paths[1])
     if as_json:
-        click.echo(json.dumps(navigated.to_dict(), allow_nan=False))
+        click.echo(json.dumps(found.to_dict(), allow_nan=False))
         return
-    click.echo(navigated)
+    click.echo(found)
     click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
-
-
-def _compare(
-    content: dict[str, Any], base: Path, output: Path, place: Path | None, as_json: bool
-) -> None:
-    """Compare sensor models on real data."""
-    from gmwm._core.files import folder_to_fill
-    from gmwm.ins.field import Comparison
-
-    with _named_in_messages(place):
-        comparison = Comparison.of(content, base)
-    comparison = replace(comparison, notices=tuple(map(with_option, comparison.notices)))
-    with folder_to_fill(output) as folder:
-        page = comparison.report(folder / _OF_SENSORS)
-    if as_json:
-        click.echo(json.dumps(comparison.to_dict(), allow_nan=False))
-        return
-    click.echo(comparison)
-    click.echo(f"\nwrote {page}")

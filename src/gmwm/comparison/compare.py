@@ -19,12 +19,7 @@ from gmwm.comparison import tuning
 from gmwm.comparison.clock import suspected_clocks
 from gmwm.comparison.curves import Equality
 from gmwm.comparison.result import AxisComparison, SensorComparison
-from gmwm.comparison.structure import (
-    axis_numbers,
-    curve_inflation,
-    joint_fit,
-    spreads,
-)
+from gmwm.comparison.structure import axis_numbers, curve_inflation, joint_fit, spreads
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
 from gmwm.readers import Recording, is_frame

@@ -2,10 +2,7 @@
 
 from gmwm.diagnosis.check import health as health
 from gmwm.diagnosis.gathered import gathered as gathered
-from gmwm.diagnosis.joined import (
-    health_stream as health_stream,
-    joined as joined,
-)
+from gmwm.diagnosis.joined import health_stream as health_stream, joined as joined
 from gmwm.diagnosis.repeated import thinned as thinned
 from gmwm.diagnosis.result import (
     ChannelHealth as ChannelHealth,

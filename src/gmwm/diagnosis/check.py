@@ -23,7 +23,7 @@ from gmwm.diagnosis.contamination import (
 )
 from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
-from gmwm.diagnosis.innovations import Innovations, innovations
+from gmwm.diagnosis.innovations import Innovations, Signal, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
 from gmwm.diagnosis.repeated import (
@@ -220,23 +220,24 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
     held, chance = held_share(values, step, errors.level)
-    stuck = stuck_notice(name, unit, dt, values, step, errors)
+    signal = Signal(name, unit, dt, step, errors.level)
+    stuck = stuck_notice(signal, values, errors)
     if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
         held = 0.0  # most of what is held is held in a few places
     is_even = held > 0.0 and not leaves_runs(values)
     noise = known_of(quiet)
     found = [
         held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
-        saturation_notice(name, unit, present, noise, step)
-        or abrupt_end_notice(name, unit, noise, step, errors.level)
-        or hole_notice(name, unit, noise, step, errors.level),
-        repeated_value_notice(name, unit, present, step, errors.level),
-        event_notice(name, unit, dt, values, motion.outside(events, dt), errors.level),
+        saturation_notice(signal, present, noise)
+        or abrupt_end_notice(signal, noise)
+        or hole_notice(signal, noise),
+        repeated_value_notice(signal, present),
+        event_notice(signal, values, motion.outside(events, dt)),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
-        rounding_notice(name, unit, step, errors.level, noise),
-        variance_notice(name, unit, dt, errors, usable, step, is_heavy=tails is not None),
-        drift_notice(name, unit, dt, quiet),
+        rounding_notice(signal, noise),
+        variance_notice(signal, errors, usable, is_heavy=tails is not None),
+        drift_notice(signal, quiet),
     ]
     notices = [one for one in found if one is not None]
     standardized = _standardized(errors, usable)

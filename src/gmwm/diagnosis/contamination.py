@@ -162,10 +162,7 @@ def _mixture(x: FloatArray, at: FloatArray) -> FloatArray:
     )
 
 
-_STARTS = {
-    "student": ((np.log(4.0), np.log(0.8)),),
-    "power": ((np.log(1.2), np.log(1.0)),),
-}
+_STARTS = {"student": ((np.log(4.0), np.log(0.8)),), "power": ((np.log(1.2), np.log(1.0)),)}
 _MIXTURE_STARTS = ((0.0, np.log(2.0), -3.0), (0.0, np.log(20.0), -5.0))
 
 

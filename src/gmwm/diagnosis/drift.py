@@ -11,7 +11,7 @@ from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
 from gmwm._core.typing import BoolArray, FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Innovations, Signal
 
 
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
@@ -24,7 +24,7 @@ def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5
     return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
-def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice | None:
+def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """Say how far the level wanders, and whether it does so in one direction.
 
     The variance of the means of 64 parts is compared with what the differences between means of
@@ -32,10 +32,9 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
     drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
     20 times the root mean square of what the line leaves (200,000 simulated).
 
-    name, unit: Of the channel.
-    dt: s.
     values: (n,), samples, NaN where missing.
     """
+    name, unit, dt = signal.name, signal.unit, signal.dt
     size = values.size // tuning.PARTS
     if size < 2 * tuning.SHORT_MEAN:
         return None
@@ -83,28 +82,19 @@ def drift_notice(name: str, unit: str, dt: float, values: FloatArray) -> Notice 
 
 
 def variance_notice(
-    name: str,
-    unit: str,
-    dt: float,
-    errors: Innovations,
-    usable: BoolArray,
-    step: float,
-    *,
-    is_heavy: bool = False,
+    signal: Signal, errors: Innovations, usable: BoolArray, *, is_heavy: bool = False
 ) -> Notice | None:
     """Say whether the noise is as large at the end as at the beginning, and all the time between.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
     variance gives the error of their means, so tails heavier than Gaussian do no harm.
 
-    name, unit: Of the channel.
-    dt: s.
     usable: (n,) of bool, prediction errors outside events.
-    step: To which samples are rounded, u.
     is_heavy: Whether the noise has heavy tails: the predictions after a large sample are worse
         then.
     """
-    if step > 2.0 * errors.level:
+    name, unit, dt = signal.name, signal.unit, signal.dt
+    if signal.step > 2.0 * errors.level:
         return None  # noise below the step is seen only when the level is between two steps
     found = _change_notice(name, dt, errors, usable)
     values = _unsteadiness(dt, errors, usable, is_heavy)

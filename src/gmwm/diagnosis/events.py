@@ -10,7 +10,7 @@ from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.contamination import Tails
-from gmwm.diagnosis.innovations import Innovations, innovations, running_scale
+from gmwm.diagnosis.innovations import Innovations, Signal, innovations, running_scale
 
 _LISTED = 3
 
@@ -111,20 +111,13 @@ def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def event_notice(
-    name: str,
-    unit: str,
-    dt: float,
-    values: FloatArray,
-    events: tuple[tuple[int, int], ...],
-    scatter: float,
+    signal: Signal, values: FloatArray, events: tuple[tuple[int, int], ...]
 ) -> Notice | None:
     """Say when the events are, how large and how long.
 
-    name, unit: Of the channel.
-    dt: s.
     values: (n,), samples, NaN where missing.
-    scatter: Usual standard deviation of a prediction error, u.
     """
+    name, unit, dt, scatter = signal.name, signal.unit, signal.dt, signal.scatter
     if not events:
         return None
     clean = np.array(values)

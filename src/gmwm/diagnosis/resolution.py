@@ -9,6 +9,7 @@ from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.innovations import Signal
 
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
 
@@ -27,29 +28,35 @@ def step_size(values: FloatArray) -> float:
     levels = np.unique(part)
     if levels.size < 2:
         return 0.0
-    differences = np.diff(levels)
-    differences = differences[differences > _SMALLEST * (levels[-1] - levels[0])]
+    gaps = np.diff(levels)
+    differences = gaps[gaps > _SMALLEST * (levels[-1] - levels[0])]
     smallest = float(np.min(differences))
     first = float(np.median(differences[differences <= tuning.ONE_STEP * smallest]))
     # Few levels that come again and again are steps whatever their places.
     if levels.size < tuning.FEWEST_LEVELS and levels.size > part.size / 2:
         return 0.0
+    levels -= np.mean(levels)
     for divisor in tuning.DIVISORS:
-        step, off = _lattice(levels, first / divisor)
+        step, off = _lattice(levels, gaps, first / divisor)
         if off <= tuning.OFF_LATTICE / (1.0 if divisor == 1 else 3.0):
             return step
     return 0.0
 
 
-def _lattice(levels: FloatArray, step: float) -> tuple[float, float]:
-    """Step after regression of the levels on their places, and rms distance in steps."""
-    places = np.concatenate([[0.0], np.cumsum(np.rint(np.diff(levels) / step))])
+def _lattice(levels: FloatArray, gaps: FloatArray, step: float) -> tuple[float, float]:
+    """Step after regression of the levels on their places, and rms distance in steps.
+
+    levels: Less their mean.
+    gaps: Between them.
+    """
+    places = np.concatenate([[0.0], np.cumsum(np.rint(gaps / step))])
     if places[-1] == 0.0:
         return step, np.inf
-    centred = places - np.mean(places)
-    refined = inner(centred, levels - np.mean(levels)) / inner(centred, centred)
-    gaps = np.diff(levels) / refined
-    return refined, float(np.sqrt(np.mean((gaps - np.rint(gaps)) ** 2)))
+    places -= np.mean(places)
+    refined = inner(places, levels) / inner(places, places)
+    off = gaps / refined
+    off -= np.rint(off)
+    return refined, float(np.sqrt(np.mean(off**2)))
 
 
 def is_coarse(values: FloatArray, step: float) -> bool:
@@ -72,24 +79,19 @@ def is_coarse(values: FloatArray, step: float) -> bool:
     return bool(beyond < 2.0 * norm.sf(tuning.COARSE) * places.size)
 
 
-def rounding_notice(
-    name: str, unit: str, step: float, scatter: float, samples: FloatArray | None = None
-) -> Notice | None:
+def rounding_notice(signal: Signal, samples: FloatArray | None = None) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
     before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
     sec. 5): of variance step^2/12, plain additive noise.
 
-    name, unit: Of the channel.
-    step: u; 0 if there is none.
-    scatter: Standard deviation of what cannot be predicted from the samples before, rounding
-        included, u.
     samples: (n,), for `is_coarse`.
     """
+    name, unit, step = signal.name, signal.unit, signal.step
     if step == 0.0:
         return None
-    noise = float(np.sqrt(max(scatter**2 - step**2 / 12.0, 0.0)))
+    noise = float(np.sqrt(max(signal.scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
     text = f"samples come in steps of {readable(step, unit)}"
     if noise < step / tuning.COARSE or (samples is not None and is_coarse(samples, step)):

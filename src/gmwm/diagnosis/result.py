@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -67,16 +67,11 @@ class ChannelHealth:
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> ChannelHealth:
         """Inverse of `dataclasses.asdict`, after a round trip through JSON and its form."""
-        repeated = content["repetition"]
+        known = {each.name: content[each.name] for each in fields(cls)}
+        known |= {name: tuple(known[name]) for name in ("lines", "resonances", "events")}
+        repeated = known.pop("repetition")
         return cls(
-            lines=tuple(content["lines"]),
-            resonances=tuple(content["resonances"]),
-            events=tuple(content["events"]),
-            lsb=content["lsb"],
-            outliers=content["outliers"],
-            held=content["held"],
-            noise=content["noise"],
-            repetition=repeated and Repetition(repeated["times"], repeated["first"]),
+            **known, repetition=repeated and Repetition(repeated["times"], repeated["first"])
         )
 
 

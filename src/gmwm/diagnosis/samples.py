@@ -13,7 +13,7 @@ from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Innovations, Signal
 from gmwm.readers import Channel
 
 
@@ -115,9 +115,7 @@ def run_lengths(values: FloatArray) -> IntArray:
     return np.diff(changes, prepend=0, append=values.size)
 
 
-def stuck_notice(
-    name: str, unit: str, dt: float, values: FloatArray, step: float, errors: Innovations
-) -> Notice | None:
+def stuck_notice(signal: Signal, values: FloatArray, errors: Innovations) -> Notice | None:
     """Find runs of equal samples longer than rounding explains.
 
     Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
@@ -125,17 +123,14 @@ def stuck_notice(
     interval around the prediction (Anderson 1955, *Proc. AMS* 6, 170-176). A run of L repetitions
     somewhere in n samples therefore has a probability below n times the L-th power.
 
-    name, unit: Of the channel.
-    dt: s.
     values: (n,), samples, NaN where missing.
-    step: u; 0 if samples are not rounded.
     """
     present = ~np.isnan(values)
     series = known_of(values)
-    if not is_dithered(series, step):
+    if not is_dithered(series, signal.step):
         return None
     lengths = run_lengths(series)
-    longest = _longest_by_chance(series.size, step, _scale_between(errors, present, lengths))
+    longest = _longest_by_chance(series.size, signal.step, _scale_between(errors, present, lengths))
     stuck = np.flatnonzero(lengths > longest)
     if not stuck.size:
         return None
@@ -146,20 +141,19 @@ def stuck_notice(
     numbers = {
         "count": float(stuck.size),
         "longest": float(lengths[worst]),
-        "time": float(np.flatnonzero(present)[start]) * dt,
+        "time": float(np.flatnonzero(present)[start]) * signal.dt,
         "value": float(series[start]),
         "samples": float(total),
     }
-    value = readable(numbers["value"], unit, digits=5)
+    value = readable(numbers["value"], signal.unit, digits=5)
     many = f"{stuck.size:,} times, the longest" if stuck.size > 1 else ""
     text = (
         f"stuck {many} at {value} for {lengths[worst]:,} samples from "
         f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
     ).replace("  ", " ")
     severity: Severity = "bad" if share > tuning.MUCH_MISSING else "warning"
-    return Notice(
-        "stuck", severity, name, text, numbers, "make such samples missing (NaN) before the fit"
-    )
+    action = "make such samples missing (NaN) before the fit"
+    return Notice("stuck", severity, signal.name, text, numbers, action)
 
 
 def _scale_between(errors: Innovations, present: BoolArray, lengths: IntArray) -> float:
@@ -186,20 +180,17 @@ def _longest_by_chance(n: int, step: float, scale: float) -> int:
     return max(int(np.ceil(np.log(tuning.FALSE_ALARM / n) / np.log(same))) + 1, fewest)
 
 
-def saturation_notice(
-    name: str, unit: str, values: FloatArray, quiet: FloatArray, step: float
-) -> Notice | None:
+def saturation_notice(signal: Signal, values: FloatArray, quiet: FloatArray) -> Notice | None:
     """Find more samples at the largest or smallest value than at the one before it.
 
     A tail falls outwards, and for noise faster and faster: from the last step but one to the last
     by no less than from the one before to it, up to chance (binomial test, with three standard
     errors for that fall).
 
-    name, unit: Of the channel.
     values: (n,), samples, none missing.
     quiet: (m,), those outside shocks, whose peaks may be cut off without harm: they are left out.
-    step: u; 0 if samples are not rounded.
     """
+    step = signal.step
     if not is_dithered(values, step):
         return None
     lowest, highest = float(np.min(values)), float(np.max(values))
@@ -224,21 +215,19 @@ def saturation_notice(
         return None
     count = sum(ends.values())
     share = count / values.size
-    where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    where = " and ".join(readable(end, signal.unit, digits=5) for end in ends)
     of_noise = sum(np.count_nonzero(np.abs(quiet - end) <= half * step) for end in ends)
     return Notice(
         "saturation",
         "bad" if of_noise > tuning.FALSE_ALARM * values.size else "warning",
-        name,
+        signal.name,
         f"cut off at {where}: {count:,} samples ({share:.2g} of all) at the end of the scale",
         {"samples": float(count), "share": share, "lowest": lowest, "highest": highest},
         "use a wider range; make such samples missing (NaN) if they are few",
     )
 
 
-def abrupt_end_notice(
-    name: str, unit: str, values: FloatArray, step: float, scatter: float
-) -> Notice | None:
+def abrupt_end_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """Find an extreme at which samples end although they are as dense there as before.
 
     Noise thins out towards its extremes. Numbers that were rectified, wrapped round or sorted out
@@ -248,11 +237,9 @@ def abrupt_end_notice(
     them a slow process takes to its extreme (sign test). Steps above half of the scatter are not
     looked at: they hide how noise ends.
 
-    name, unit: Of the channel.
     values: (n,), samples outside shocks in their order, none missing.
-    step: u; 0 if samples are not rounded.
-    scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
+    step, scatter = signal.step, signal.scatter
     count = max(int(tuning.LAST_OF_END * values.size), tuning.FEWEST_OF_END)
     if values.size < 4 * count or 2.0 * step > scatter:
         return None
@@ -278,11 +265,11 @@ def abrupt_end_notice(
             density += near.size / values.size / width * float(np.std(values))
     if not found:
         return None
-    where = " and ".join(readable(end, unit, digits=5) for end in sorted(found))
+    where = " and ".join(readable(end, signal.unit, digits=5) for end in sorted(found))
     return Notice(
         "abrupt-end",
         "bad" if density > tuning.HARMFUL_END else "warning",
-        name,
+        signal.name,
         f"samples end abruptly at {where}, where noise would thin out: rectified, wrapped round "
         "or sorted out",
         {"lowest": min(found), "highest": max(found), "density": density},
@@ -290,20 +277,16 @@ def abrupt_end_notice(
     )
 
 
-def hole_notice(
-    name: str, unit: str, values: FloatArray, step: float, scatter: float
-) -> Notice | None:
+def hole_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """Find steps that never come among others that often do, as where a bit of a word is stuck.
 
     Noise thins out towards a gap between two of its levels. Beside a hole the numbers of samples do
     not fall, and the steps on both sides come without a gap: lattices that lie in each other, as
     of two offsets, have gaps all over.
 
-    name, unit: Of the channel.
     values: (n,), samples, none missing.
-    step: u; 0 if samples are not rounded.
-    scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
+    step, scatter = signal.step, signal.scatter
     if not values.size or step == 0.0 or step > scatter:
         return None
     lowest = float(np.min(values))
@@ -330,11 +313,11 @@ def hole_notice(
     below, above = max(found, key=lambda pair: pair[1] - pair[0])
     ends = [lowest + place * step for place in (below, above)]
     width = ends[1] - ends[0]
-    where = " and ".join(readable(end, unit, digits=5) for end in ends)
+    where = " and ".join(readable(end, signal.unit, digits=5) for end in ends)
     return Notice(
         "abrupt-end",
         "bad" if width > tuning.WIDE_HOLE * scatter else "warning",
-        name,
+        signal.name,
         f"no sample lies between {where}, where those beside come often: a bit is stuck, or codes "
         "of the converter are missing",
         {"lowest": ends[0], "highest": ends[1], "holes": float(len(found))},
@@ -342,9 +325,7 @@ def hole_notice(
     )
 
 
-def repeated_value_notice(
-    name: str, unit: str, values: FloatArray, step: float, scatter: float
-) -> Notice | None:
+def repeated_value_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """Find a value that comes far more often than the ones next to it, in many places.
 
     Noise above its step has no such value: the two values on either side come nearly as often. A
@@ -353,12 +334,9 @@ def repeated_value_notice(
     integers, have twice as many zeros: the fall from zero to one step is larger then than from one
     to two, where that of noise is smaller, and of a Laplace law the same.
 
-    name, unit: Of the channel.
     values: (n,), samples in their order, none missing.
-    step: u; 0 if samples are not rounded.
-    scatter: Standard deviation of what cannot be predicted of a sample, u.
     """
-    if step > scatter:
+    if signal.step > signal.scatter:
         return None
     begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
     levels, counts = np.unique(begins, return_counts=True)
@@ -370,17 +348,17 @@ def repeated_value_notice(
     share = count / values.size
     usual = tuning.BESIDE_REPEATED * np.max(near)
     if counts[most] - usual < max(tuning.FALSE_ALARM * values.size, tuning.LONG_RUN):
-        return _cut_to_zero_notice(name, values, step)
+        return _cut_to_zero_notice(signal.name, values, signal.step)
     is_much = share > tuning.MUCH_REPEATED
     text = (
         f"{count:,} samples ({share:.2g} of all) are "
-        f"{readable(float(levels[most]), unit, digits=5)}, which comes "
+        f"{readable(float(levels[most]), signal.unit, digits=5)}, which comes "
         f"{brief(counts[most] / np.max(near))} times as often as the values next to it"
     )
     return Notice(
         "value-repeated",
         "bad" if is_much else "warning",
-        name,
+        signal.name,
         text,
         {"value": float(levels[most]), "samples": float(count), "share": share},
         "if it stands for no answer or a dead band, make such samples missing (NaN)",

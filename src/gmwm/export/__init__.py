@@ -7,12 +7,7 @@ from typing import Any
 
 from gmwm.export.export import TARGETS as TARGETS, export as export
 from gmwm.export.found import axis_of as axis_of, imu_of as imu_of
-from gmwm.export.imu import (
-    SENSORS as SENSORS,
-    Axis as Axis,
-    Imu as Imu,
-    Triad as Triad,
-)
+from gmwm.export.imu import SENSORS as SENSORS, Axis as Axis, Imu as Imu, Triad as Triad
 from gmwm.export.target import ImuFile as ImuFile, Target as Target
 
 

@@ -10,9 +10,8 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.notices import Notice
 from gmwm._core.text import Printed, bullets, wrapped
-from gmwm.estimate.result import plain
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.result import SensorNumbers
+from gmwm.filter_numbers.result import SensorNumbers, restored, stored
 from gmwm.filter_numbers.table import shown_unit
 
 if TYPE_CHECKING:
@@ -175,8 +174,8 @@ class Certificate(Document, Printed):
         return {
             "numbers": self.numbers.to_dict(),
             "recommended": self.recommended.to_dict(),
-            "checks": [_json(asdict(check)) for check in self.checks],
-            "causes": [_json(asdict(cause)) for cause in self.causes],
+            "checks": [stored(check) for check in self.checks],
+            "causes": [stored(cause) for cause in self.causes],
             "notices": [notice.to_dict() for notice in self.notices],
         }
 
@@ -191,19 +190,11 @@ class Certificate(Document, Printed):
         return cls(
             numbers=SensorNumbers.from_dict(content["numbers"]),
             recommended=SensorNumbers.from_dict(content["recommended"]),
-            checks=tuple(Check(**_python(each)) for each in content["checks"]),
-            causes=tuple(Cause(**_python(each)) for each in content["causes"]),
+            checks=tuple(Check(**restored(each)) for each in content["checks"]),
+            causes=tuple(Cause(**restored(each)) for each in content["causes"]),
             notices=tuple(map(Notice.from_dict, content["notices"])),
         )
 
 
 def _ratio(value: float, by: float) -> float:
     return value / by if by > 0.0 else float("inf")
-
-
-def _json(row: dict[str, Any]) -> dict[str, Any]:
-    return {k: plain(v) if isinstance(v, float) else v for k, v in row.items()}
-
-
-def _python(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: float("nan") if v is None else v for k, v in row.items()}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import factorial
 
 import numpy as np
@@ -110,9 +111,17 @@ class Chain:
         J = block_diagonal([start, np.zeros((q, q)), _moments(real)])
         kept: list[tuple[float, FloatArray, FloatArray]] = []
 
+        def lasting(duration: float) -> _Step:
+            samples = max(round(duration / dt), 0)
+            return _Step.of(
+                _over(truth, true_sd, dt, n, samples),
+                _over(believed, believed_sd, dt, n, samples),
+                n,
+            )
+
         fixes = int(self.settled / self.interval)
         if fixes > 0:
-            step = _Step.of(real, own, dt, n, self.interval)
+            step = lasting(self.interval)
             shape = (fixes - 1 if every_fix else 0, n, n)
             after_P, after_J = np.empty(shape), np.empty(shape)
             P, J = settle(
@@ -126,7 +135,7 @@ class Chain:
                 each[n - 1], each[:, n - 1] = 0.0, 0.0
         before = 0.0
         for time in times:
-            P, J = _Step.of(real, own, dt, n, time - before).over(P, J)
+            P, J = lasting(time - before).over(P, J)
             before = time
             kept.append((time, P[:n, :n], J[:n, :n]))
         columns = list(zip(*kept, strict=True))
@@ -179,23 +188,37 @@ class _Step:
     joint: tuple[FloatArray, FloatArray]
 
     @classmethod
-    def of(cls, real: StateSpace, own: StateSpace, dt: float, n: int, duration: float) -> _Step:
-        samples = max(round(duration / dt), 0)
-        true_M, true_Q = _power(*_integrated(real, dt, n), samples)
-        own_M, own_Q = _power(*_integrated(own, dt, n), samples)
-        q, p = own.n_states, real.n_states
+    def of(
+        cls, real: tuple[FloatArray, FloatArray], own: tuple[FloatArray, FloatArray], n: int
+    ) -> _Step:
+        (true_M, true_Q), (own_M, _) = real, own
+        q, p = len(own_M) - n, len(true_M) - n
         M, Q = np.zeros((n + q + p, n + q + p)), np.zeros((n + q + p, n + q + p))
-        where = np.r_[:n, n + q : n + q + p]
-        M[np.ix_(where, where)], Q[np.ix_(where, where)] = true_M, true_Q
+        for whole, part in ((M, true_M), (Q, true_Q)):
+            whole[:n, :n], whole[:n, n + q :] = part[:n, :n], part[:n, n:]
+            whole[n + q :, :n], whole[n + q :, n + q :] = part[n:, :n], part[n:, n:]
         M[:n, n : n + q] = -own_M[:n, n:]
         M[n : n + q, n : n + q] = own_M[n:, n:]
-        return cls((own_M, own_Q), (M, Q))
+        return cls(own, (M, Q))
 
     def over(self, P: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
         (A, Q), (B, R) = self.filter, self.joint
         return A @ P @ A.T + Q, B @ J @ B.T + R
 
 
+@lru_cache(maxsize=256)
+def _over(
+    model: Model, sd: float, dt: float, n: int, samples: int
+) -> tuple[FloatArray, FloatArray]:
+    """Transition and noise of n integrals and the states over some samples.
+
+    A search for numbers asks for those of the truth with all that it tries, and each chain of
+    `Chain.judged` for the same.
+    """
+    return _power(*_integrated(_with_constant(model, sd, dt), dt, n), samples)
+
+
+@lru_cache(maxsize=64)
 def _with_constant(model: Model, sd: float, dt: float) -> StateSpace:
     """State-space form of a model and of a constant, which is the start of a walk if it has one."""
     forms = []

@@ -181,12 +181,7 @@ class _Search:
             errors = [
                 [
                     chain.errors(
-                        axis.model,
-                        model,
-                        axis.dt,
-                        self.times,
-                        true_sd=axis.bias_sd,
-                        believed_sd=sd,
+                        axis.model, model, axis.dt, self.times, true_sd=axis.bias_sd, believed_sd=sd
                     )
                     for chain in self.chain(axis).judged
                 ]

@@ -191,10 +191,7 @@ class FilterNumbers(Document, Printed):
             "horizon_s": self.horizon,
             "initial_sd": self.initial_sd,
             "method": self.method,
-            "predicted": [
-                {key: plain(value) for key, value in asdict(each).items()}
-                for each in self.predicted
-            ],
+            "predicted": [stored(each) for each in self.predicted],
             "notices": [notice.to_dict() for notice in self.notices],
             "quantity": self.quantity,
             "stderr": dict(self.stderr),
@@ -208,17 +205,13 @@ class FilterNumbers(Document, Printed):
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        nan = float("nan")
         return cls(
             form=str(content["form"]),
             model=model_from_list(content["model"]),
             horizon=float(content["horizon_s"]),
             initial_sd=float(content["initial_sd"]),
             method=str(content["method"]),
-            predicted=tuple(
-                Predicted(**{k: nan if v is None else float(v) for k, v in each.items()})
-                for each in content["predicted"]
-            ),
+            predicted=tuple(Predicted(**restored(each)) for each in content["predicted"]),
             notices=tuple(map(Notice.from_dict, content["notices"])),
             quantity=str(content["quantity"]),
             stderr={str(k): float(v) for k, v in content.get("stderr", {}).items()},
@@ -349,16 +342,21 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        def number(value: Any) -> float:
-            return float("nan") if value is None else float(value)
-
-        axes = {
-            str(name): FilterNumbers.from_dict(each) for name, each in content["channels"].items()
-        }
+        known = restored(content)
         return cls(
-            axes=axes,
-            source=str(content["source"]),
-            rate=number(content["rate_hz"]),
-            duration=number(content["duration_s"]),
-            shared=bool(content["shared"]),
+            axes={name: FilterNumbers.from_dict(each) for name, each in known["channels"].items()},
+            source=known["source"],
+            rate=known["rate_hz"],
+            duration=known["duration_s"],
+            shared=known["shared"],
         )
+
+
+def stored(row: Any) -> dict[str, Any]:
+    """Fields of a dataclass in JSON types: None for a number that is not known."""
+    return {k: plain(v) if isinstance(v, float) else v for k, v in asdict(row).items()}
+
+
+def restored(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Inverse of `stored`."""
+    return {k: float("nan") if v is None else v for k, v in row.items()}

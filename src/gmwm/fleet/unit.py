@@ -141,11 +141,7 @@ class Task:
         before, digest = _state(item.path), digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
         calibration = calibrate(
-            recording,
-            self._models(recording),
-            screening=self.screening,
-            still=self.still,
-            jobs=1,
+            recording, self._models(recording), screening=self.screening, still=self.still, jobs=1
         )
         if _state(item.path) != before:
             raise InputError(

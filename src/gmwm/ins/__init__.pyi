@@ -22,10 +22,7 @@ from .filter.filter import InitialSd as InitialSd, navigate as navigate
 from .filter.mechanization import integrate as integrate
 from .filter.solution import FilterInnovations as FilterInnovations, Solution as Solution
 from .imu.emulation import Imu as Imu, emulate as emulate
-from .imu.preintegration import (
-    Preintegration as Preintegration,
-    preintegrate as preintegrate,
-)
+from .imu.preintegration import Preintegration as Preintegration, preintegrate as preintegrate
 from .imu.recorded import Recorded as Recorded
 from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
 from .montecarlo.consistency import (

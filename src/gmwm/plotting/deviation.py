@@ -228,10 +228,7 @@ def _cycle(count: int) -> list[str]:
 
 
 def boxes(
-    panels: Mapping[str, Mapping[str, FloatArray]],
-    truths: Mapping[str, float],
-    *,
-    title: str = "",
+    panels: Mapping[str, Mapping[str, FloatArray]], truths: Mapping[str, float], *, title: str = ""
 ) -> Figure:
     """Boxplots side by side: one panel a quantity, one box a method, the truth as a line.
 

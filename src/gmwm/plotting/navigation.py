@@ -31,9 +31,7 @@ _T = TypeVar("_T")
 
 
 def track(
-    truth: FloatArray,
-    outages: Sequence[FloatArray],
-    solutions: Mapping[str, Sequence[FloatArray]],
+    truth: FloatArray, outages: Sequence[FloatArray], solutions: Mapping[str, Sequence[FloatArray]]
 ) -> Figure:
     """A track with its outages, and what filters made of it.
 

@@ -132,11 +132,7 @@ def static_recording(seed: int) -> Recording:
 
 
 def experiment(
-    vehicle: str,
-    calibrated: Calibrated,
-    runs: int,
-    seed: int,
-    recordings: Sequence[Recording] = (),
+    vehicle: str, calibrated: Calibrated, runs: int, seed: int, recordings: Sequence[Recording] = ()
 ) -> Experiment:
     """Filters that believe different calibrations, on a helicopter or in a car.
 

@@ -255,10 +255,7 @@ def _weights(stretches: tuple[int, ...], turn: int | None, seed: int) -> FloatAr
 
 
 def crossed_weights(
-    stretches: Sequence[int],
-    calibrated: FloatArray | None,
-    draws: int,
-    rng: np.random.Generator,
+    stretches: Sequence[int], calibrated: FloatArray | None, draws: int, rng: np.random.Generator
 ) -> FloatArray:
     """How often a bootstrap draws each run, (draws, n, n, S).
 

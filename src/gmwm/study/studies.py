@@ -206,10 +206,6 @@ def _compared(study: Study, number: int, runs: int) -> Study:
     )
 
 
-WEIGHTS = (
-    _compared(TABLE_2, 2, 200),
-    _compared(TABLE_3, 3, 200),
-    _compared(TABLE_4, 4, 50),
-)
+WEIGHTS = (_compared(TABLE_2, 2, 200), _compared(TABLE_3, 3, 200), _compared(TABLE_4, 4, 50))
 
 STUDIES = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}

@@ -6,7 +6,7 @@ import pytest
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.drift import _change_notice, drift_notice, part_means, variance_notice
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Innovations, Signal
 
 N = 2 * tuning.PARTS * tuning.SHORT_MEAN
 """Samples of the shortest record that is looked at."""
@@ -28,7 +28,7 @@ def test_what_a_drift_is_said_to_be(slope, lost):
     level = np.repeat(rng.normal(size=tuning.PARTS), size) * (1.0 if slope == 0.0 else 3e-3)
     values = level + 0.01 * rng.normal(size=N) + slope * np.arange(N)
     values[: lost * size] = np.nan
-    found = drift_notice("gyro_x", "rad/s", 0.01, values)
+    found = drift_notice(Signal("gyro_x", "rad/s", 0.01), values)
     means = np.mean(values.reshape(-1, size), axis=1)[lost:]
     place = np.arange(means.size)
     line = np.polyfit(place, means, 1)
@@ -51,7 +51,7 @@ def test_a_level_is_looked_at_in_long_records_of_which_half_is_there(n, lost, th
     values[0] = 0.0
     if lost:
         values += np.arange(n)
-    assert (drift_notice("gyro_x", "rad/s", 0.01, values) is not None) is there
+    assert (drift_notice(Signal("gyro_x", "rad/s", 0.01), values) is not None) is there
 
 
 def test_a_level_wanders_where_white_noise_would_not():
@@ -62,7 +62,7 @@ def test_a_level_wanders_where_white_noise_would_not():
     for size, found in ((1.2, False), (2.5, True)):
         slow = np.repeat(rng.permuted(np.tile([0.1, -0.1], 32)), N // tuning.PARTS)
         values = alternating + steps + size * np.sqrt(0.5) * slow
-        assert (drift_notice("x", "rad/s", 0.01, values) is not None) is found
+        assert (drift_notice(Signal("x", "rad/s", 0.01), values) is not None) is found
 
 
 def errors_of(tenths, n=20_000):
@@ -129,5 +129,5 @@ def test_changes_need_a_thousand_samples(kept, there):
 @pytest.mark.parametrize(("step", "there"), [(2.0, True), (2.1, False)])
 def test_noise_below_half_a_step_is_not_compared(step, there):
     errors = errors_of([1.0] * 5 + [2.0] * 5)
-    found = variance_notice("gyro_x", "rad/s", 0.01, errors, errors.known, step)
+    found = variance_notice(Signal("gyro_x", "rad/s", 0.01, step), errors, errors.known)
     assert (found is not None) is there

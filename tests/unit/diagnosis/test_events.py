@@ -5,7 +5,7 @@ import pytest
 
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.events import _LISTED, event_notice, find_events
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Innovations, Signal
 
 N, G = 1000, tuning.GUARD
 
@@ -56,7 +56,7 @@ def test_one_of_a_thousand_records_of_noise_has_an_event(n, size, found):
 
 
 def notice(values, events, scatter=0.1):
-    return event_notice("gyro_x", "rad/s", 0.01, values, tuple(events), scatter)
+    return event_notice(Signal("gyro_x", "rad/s", 0.01, scatter=scatter), values, tuple(events))
 
 
 def test_what_is_said_of_an_event():

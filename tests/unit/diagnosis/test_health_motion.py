@@ -20,21 +20,20 @@ BIAS = np.radians([0.4, -0.4, -0.3])
 
 def turned(rate, attitude=(0.0, 0.0, GRAVITY)):
     """Gravity in the frame of a sensor that turns at ``rate`` (n, 3), rad/s."""
-    force = []
     x, y, z = attitude
-    for u, v, w in (rate / RATE).tolist():  # plain numbers: a tenth of the time of arrays of three
-        force.append((x, y, z))
+    force, turns = [attitude], np.any(rate != 0.0, axis=1)
+    for u, v, w in (rate[turns] / RATE).tolist():  # plain numbers: a tenth of the time of arrays
         angle = hypot(u, v, w)
-        if angle:
-            u, v, w = -u / angle, -v / angle, -w / angle
-            c, s = cos(angle), sin(angle)
-            along = (u * x + v * y + w * z) * (1.0 - c)  # Rodrigues' formula
-            x, y, z = (
-                x * c + (v * z - w * y) * s + u * along,
-                y * c + (w * x - u * z) * s + v * along,
-                z * c + (u * y - v * x) * s + w * along,
-            )
-    return np.array(force)
+        u, v, w = -u / angle, -v / angle, -w / angle
+        c, s = cos(angle), sin(angle)
+        along = (u * x + v * y + w * z) * (1.0 - c)  # Rodrigues' formula
+        x, y, z = (
+            x * c + (v * z - w * y) * s + u * along,
+            y * c + (w * x - u * z) * s + v * along,
+            z * c + (u * y - v * x) * s + w * along,
+        )
+        force.append((x, y, z))
+    return np.array(force)[np.cumsum(turns) - turns]
 
 
 def turn(n, start, stop, speed, axis):

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
+from gmwm.diagnosis.innovations import Signal
 from gmwm.diagnosis.resolution import rounding_notice, step_size
 
 
@@ -64,7 +65,7 @@ def test_constant_has_no_step():
 def test_severity_rises_with_the_step():
     def severity(ratio):
         scatter = np.sqrt(1.0 + ratio**2 / 12.0)
-        return rounding_notice("accel_x", "m/s^2", ratio, scatter).severity
+        return rounding_notice(Signal("accel_x", "m/s^2", step=ratio, scatter=scatter)).severity
 
     assert [severity(r) for r in (0.1, 0.8, 1.5, 5.0)] == ["good", "note", "warning", "bad"]
 

@@ -5,6 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
+from gmwm.diagnosis.innovations import Signal
 from gmwm.diagnosis.samples import abrupt_end_notice, hole_notice
 from marks import slow
 
@@ -117,7 +118,7 @@ def test_noise_that_thins_out_has_no_abrupt_end(step):
     }
     for name, x in laws.items():
         x = np.rint(x / step + 0.2) * step if step else x
-        assert abrupt_end_notice(name, "u", x, step, 1.0) is None
+        assert abrupt_end_notice(Signal(name, "u", step=step, scatter=1.0), x) is None
 
 
 @pytest.mark.parametrize("step", STEPS[:2])
@@ -125,7 +126,7 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     x = white(100_000, 9) + 0.3 * np.sin(np.arange(100_000) / 500.0)
 
     def ends(values):
-        found = abrupt_end_notice("gyro_x", "u", values, step, 1.0)
+        found = abrupt_end_notice(Signal("gyro_x", "u", step=step, scatter=1.0), values)
         return found.severity, found.values["lowest"], found.values["highest"]
 
     x = np.rint(x / step) * step if step else x
@@ -142,13 +143,13 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
 def test_a_stuck_bit_is_named(bit, severity, value):
     codes = np.rint((white(100_000, 3) + 0.7) / 0.1).astype(int)
     stuck = codes | 1 << bit if value else codes & ~(1 << bit)
-    found = hole_notice("gyro_x", "u", 0.1 * stuck, 0.1, 1.0)
+    found = hole_notice(Signal("gyro_x", "u", step=0.1, scatter=1.0), 0.1 * stuck)
     assert found.severity == severity
     assert found.values["highest"] - found.values["lowest"] == pytest.approx(0.1 * (2**bit + 1))
 
 
 def test_no_sample_has_no_stuck_bit():
-    assert hole_notice("gyro_x", "u", np.zeros(0), 0.1, 1.0) is None
+    assert hole_notice(Signal("gyro_x", "u", step=0.1, scatter=1.0), np.zeros(0)) is None
 
 
 def test_gaps_between_steps_are_no_stuck_bit():
@@ -162,7 +163,7 @@ def test_gaps_between_steps_are_no_stuck_bit():
         (np.rint((noise + 40.0 * (np.arange(noise.size) // 5 % 2)) / 0.1), 0.1),
     ]
     for places, step in cases:
-        assert hole_notice("gyro_x", "u", places * step, step, 1.0) is None
+        assert hole_notice(Signal("gyro_x", "u", step=step, scatter=1.0), places * step) is None
 
 
 @pytest.mark.parametrize(("step", "severity"), [(0.1, "bad"), (0.02, "warning"), (0.5, "bad")])

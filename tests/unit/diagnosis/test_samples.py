@@ -6,6 +6,7 @@ import pytest
 from gmwm import Channel
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.innovations import Signal
 from gmwm.diagnosis.repeated import held_share, leaves_runs, repetition, thinned
 from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
 from gmwm.diagnosis.samples import (
@@ -97,7 +98,7 @@ def test_noise_is_as_wide_as_its_steps_between_runs():
 @pytest.mark.parametrize(("last", "found"), [(7, False), (28, False), (34, True), (2000, True)])
 def test_more_samples_at_the_end_than_before_it(sign, last, found):
     values = sign * shuffled([last, 20, 60, 400, 2000, 5000, 2000, 400, 60, 20, 4])
-    notice = saturation_notice("gyro_x", "rad/s", values, values, 1.0)
+    notice = saturation_notice(Signal("gyro_x", "rad/s", step=1.0), values, values)
     assert (notice is not None) is found
     if found:
         assert notice.values == pytest.approx({
@@ -106,12 +107,14 @@ def test_more_samples_at_the_end_than_before_it(sign, last, found):
         })  # fmt: skip
         assert notice.severity == ("bad" if last > 1e-3 * values.size else "warning")
         quiet = values[np.abs(values) > 0.0]
-        assert saturation_notice("x", "rad/s", values, quiet, 1.0).severity == "warning"
+        assert (
+            saturation_notice(Signal("x", "rad/s", step=1.0), values, quiet).severity == "warning"
+        )
 
 
 def test_both_ends_are_counted():
     values = shuffled([80, 20, 60, 400, 2000, 400, 60, 20, 90])
-    notice = saturation_notice("gyro_x", "rad/s", values, values, 1.0)
+    notice = saturation_notice(Signal("gyro_x", "rad/s", step=1.0), values, values)
     assert notice.values["samples"] == 170.0
     assert "170 samples" in notice.text and " and " in notice.text
 
@@ -131,15 +134,17 @@ def test_both_ends_are_counted():
 )
 def test_steps_that_never_come(counts, found):
     values = shuffled(counts, first=-3)
-    notice = hole_notice("gyro_x", "rad/s", values, 1.0, 3.0)
+    notice = hole_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=3.0), values)
     assert (notice is not None) is found
     if found:
         assert notice.values == {"lowest": -1.0, "highest": 3.0, "holes": 1.0}
         assert notice.severity == "bad"
-        assert hole_notice("x", "rad/s", values, 1.0, 8.5).severity == "warning"
-        assert hole_notice("x", "rad/s", values, 1.0, 1.0) is not None
-        assert hole_notice("x", "rad/s", values, 1.0, 0.99) is None
-        assert hole_notice("x", "rad/s", values, 0.0, 3.0) is None
+        assert (
+            hole_notice(Signal("x", "rad/s", step=1.0, scatter=8.5), values).severity == "warning"
+        )
+        assert hole_notice(Signal("x", "rad/s", step=1.0, scatter=1.0), values) is not None
+        assert hole_notice(Signal("x", "rad/s", step=1.0, scatter=0.99), values) is None
+        assert hole_notice(Signal("x", "rad/s", step=0.0, scatter=3.0), values) is None
 
 
 @pytest.mark.parametrize(
@@ -155,7 +160,7 @@ def test_a_value_that_comes_far_more_often_than_those_beside_it(most, severity):
     values[free] = np.resize(rest[rest != 4.0], free.size)
     often = np.unique(values[np.diff(values, prepend=-1) != 0], return_counts=True)[1]
     scale = np.max(np.delete(often, 4)[2:6]) / 100.0
-    notice = repeated_value_notice("gyro_x", "rad/s", values, 1.0, 2.0)
+    notice = repeated_value_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=2.0), values)
     enough = most - 4.0 * 100.0 * scale >= tuning.LONG_RUN
     assert (notice is not None) is bool(enough)
     if enough:
@@ -169,7 +174,7 @@ def test_numbers_cut_towards_zero(zeros, found):
     # Of a wide law: one step hardly falls, zero comes twice.
     counts = [300, 600, 900, 1000, zeros, 1000, 900, 600, 300]
     values = shuffled(counts, first=-4)
-    notice = repeated_value_notice("gyro_x", "rad/s", values, 1.0, 2.0)
+    notice = repeated_value_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=2.0), values)
     assert (notice is not None) is found
     if found:
         share = zeros / values.size
@@ -236,13 +241,15 @@ def test_the_step_of_samples(step, digits):
      (0.34, "warning"), (0.32, "bad")],
 )  # fmt: skip
 def test_how_coarse_a_step_is_beside_the_noise(scatter, severity):
-    found = rounding_notice("gyro_x", "rad/s", 1.0, float(np.hypot(scatter, 12**-0.5)))
+    found = rounding_notice(
+        Signal("gyro_x", "rad/s", step=1.0, scatter=float(np.hypot(scatter, 12**-0.5)))
+    )
     assert found.severity == severity
     assert found.values == pytest.approx({"lsb": 1.0, "noise": scatter})
     if scatter > 1.0:
         share = per_cent(1.0 / 12.0 / (scatter**2 + 1.0 / 12.0))
         assert found.action == f"counted as white noise: {share} of it"
-    assert rounding_notice("gyro_x", "rad/s", 0.0, 1.0) is None
+    assert rounding_notice(Signal("gyro_x", "rad/s", scatter=1.0)) is None
 
 
 def test_two_levels_are_coarse_wherever_they_are():

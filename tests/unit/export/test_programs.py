@@ -219,10 +219,14 @@ THREE_VALUES = (gtsam_python, gtsam_cpp, matlab, basalt)
 
 
 def propagated(step, noise):
-    covariance = np.zeros((2, 2))
-    n = round(STEPS * DT / step.dt)
-    for _ in range(n):
-        covariance = step.transition @ covariance @ step.transition.T + noise
+    """After some steps, by doubling."""
+    covariance, transition = np.zeros((2, 2)), step.transition
+    left = n = round(STEPS * DT / step.dt)
+    while left:
+        if left & 1:
+            covariance = transition @ covariance @ transition.T + noise
+        noise = transition @ noise @ transition.T + noise
+        transition, left = transition @ transition, left >> 1
     return covariance, n * step.dt
 
 

@@ -34,8 +34,8 @@ def write(tmp_path: Path) -> Writer:
         after: str = "",
     ) -> Path:
         lines = [
-            delimiter.join(repr(float(v)).replace(".", decimal) for v in row) + last
-            for row in np.atleast_2d(rows)
+            delimiter.join(map(repr, row)).replace(".", decimal) + last
+            for row in np.atleast_2d(rows).astype(float).tolist()
         ]
         if header is not None:
             lines.insert(0, header)

@@ -154,12 +154,7 @@ def _bump(free: FloatArray, f: FloatArray, centre: float, dt: float) -> FloatArr
 
 
 def _scored(
-    free: FloatArray,
-    f: FloatArray,
-    power: FloatArray,
-    weight: FloatArray,
-    centre: float,
-    dt: float,
+    free: FloatArray, f: FloatArray, power: FloatArray, weight: FloatArray, centre: float, dt: float
 ) -> tuple[FloatArray, float]:
     """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping.
 

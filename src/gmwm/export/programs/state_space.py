@@ -141,11 +141,7 @@ def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> 
     known = [pair for pair in pairs if pair is not None]
     if len(known) == len(pairs):
         drift, density = (block_diagonal([pair[i] for pair in known]) for i in (0, 1))
-        rates = {
-            **_driven(drift, density),
-            **common,
-            "R": np.array([[model.white_density()]]),
-        }
+        rates = {**_driven(drift, density), **common, "R": np.array([[model.white_density()]])}
     return {
         "unit": SI_UNIT.get(quantity, "u"),
         "model": repr(model),
@@ -187,11 +183,7 @@ def continuous(term: Process, part: StateSpace, dt: float) -> tuple[FloatArray, 
 def _driven(transition: FloatArray, noise: FloatArray) -> Matrices:
     """F, and the noise of those states only that have some."""
     driven = np.diag(noise) > 0.0
-    return {
-        "F": transition,
-        "G": np.eye(len(noise))[:, driven],
-        "Q": noise[np.ix_(driven, driven)],
-    }
+    return {"F": transition, "G": np.eye(len(noise))[:, driven], "Q": noise[np.ix_(driven, driven)]}
 
 
 def _plain(each: dict[str, Any]) -> dict[str, Any]:
@@ -200,11 +192,7 @@ def _plain(each: dict[str, Any]) -> dict[str, Any]:
             return None
         return {key: value.tolist() for key, value in matrices.items()}
 
-    return {
-        **each,
-        "discrete": lists(each["discrete"]),
-        "continuous": lists(each["continuous"]),
-    }
+    return {**each, "discrete": lists(each["discrete"]), "continuous": lists(each["continuous"])}
 
 
 STATE_SPACE = StateSpaceTarget(

@@ -125,12 +125,7 @@ class Filter:
         return P
 
     def run(
-        self,
-        imu: Imu,
-        initial: NavState,
-        initial_sd: InitialSd,
-        events: Events,
-        outputs: Outputs,
+        self, imu: Imu, initial: NavState, initial_sd: InitialSd, events: Events, outputs: Outputs
     ) -> Solution:
         """Filter a record.
 
@@ -252,8 +247,7 @@ def unmodified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
 
 
 def _turned(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatArray:
-    T = np.zeros(covariance.shape)
-    T[..., range(9), range(9)] = 1.0
+    T = np.tile(np.eye(9), (*covariance.shape[:-2], 1, 1))
     T[..., VELOCITY:ATTITUDE, ATTITUDE:] = sign * skew(velocity)
     return T @ covariance @ np.swapaxes(T, -1, -2)
 

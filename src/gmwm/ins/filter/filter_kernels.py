@@ -16,15 +16,7 @@ from gmwm.ins.filter.covariance_kernels import (
     tilt_squared,
     transition,
 )
-from gmwm.ins.filter.filter_arrays import (
-    Kept,
-    Measured,
-    Room,
-    Sampled,
-    Sensors,
-    State,
-    room_for,
-)
+from gmwm.ins.filter.filter_arrays import Kept, Measured, Room, Sampled, Sensors, State, room_for
 from gmwm.ins.filter.measurement_kernels import (
     IS_HEIGHT,
     IS_POSITION,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from scipy.linalg import block_diag
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.imu import AXES, SensorModels
-from gmwm.process import StateSpace
+from gmwm.process import Model, StateSpace
 
 IntArray = npt.NDArray[np.int64]
 
@@ -79,11 +80,8 @@ class SensorStates:
             do.
         Raises InputError if a term has no state-space form, or one of more than two states.
         """
-        blocks: list[_Block] = []
-        white = np.zeros(6)
-        for i, axis in enumerate(AXES):
-            blocks += _of_axis(i, axis, sensors, dt, white, drift_known)
-        return _assembled(blocks, white, dt, k_max)
+        given = tuple((sensors.models[axis], sensors.bias_sd[axis]) for axis in AXES)
+        return _of(given, dt, k_max, drift_known)
 
     def with_markov(
         self, names: Sequence[str], sigma: FloatArray, tau: FloatArray | float, dt: float
@@ -123,13 +121,24 @@ class _Block:
     form: StateSpace
 
 
+@lru_cache(maxsize=8)
+def _of(
+    given: tuple[tuple[Model, float], ...], dt: float, k_max: int, drift_known: bool
+) -> SensorStates:
+    """Of models and standard deviations of biases: faults of a log are looked for with the same."""
+    blocks: list[_Block] = []
+    white = np.zeros(6)
+    for i, (model, bias_sd) in enumerate(given):
+        blocks += _of_axis(i, model, bias_sd**2, dt, white, drift_known)
+    return _assembled(blocks, white, dt, k_max)
+
+
 def _of_axis(
-    index: int, axis: str, sensors: SensorModels, dt: float, white: FloatArray, drift_known: bool
+    index: int, model: Model, bias: float, dt: float, white: FloatArray, drift_known: bool
 ) -> list[_Block]:
     """Blocks of one sensor; adds its white noise (variance of a sample) to ``white``."""
-    blocks = []
-    bias = sensors.bias_sd[axis] ** 2
-    for term in sensors.models[axis].terms:
+    axis, blocks = AXES[index], []
+    for term in model.terms:
         form = term.state_space(dt)
         white[index] += form.measurement_noise
         if form.n_states > _LARGEST_BLOCK:
@@ -169,15 +178,15 @@ def _assembled(blocks: Sequence[_Block], white: FloatArray, dt: float, k_max: in
         partner[part] = first + np.arange(size)[::-1]
         output[part], mean[part] = block.form.output, block.form.initial_mean
         covariance[part, part] = block.form.initial_covariance
-        for k, (transition, added) in enumerate(_carried(block.form, dt, k_max)):
-            phi[k, part] = np.diag(transition)[:size]
-            gain[k, part] = transition[size, :size]
-            noise[k, part] = np.diag(added)[:size]
-            cross[k, part] = added[size, :size]
-            integral[k, block.axis] += added[size, size]
-            if size == _LARGEST_BLOCK:
-                phi_off[k, part] = transition[0, 1], transition[1, 0]
-                noise_off[k, part] = added[0, 1]
+        transition, added = _carried(block.form, dt, k_max)
+        phi[:, part] = np.diagonal(transition, axis1=1, axis2=2)[:, :size]
+        gain[:, part] = transition[:, size, :size]
+        noise[:, part] = np.diagonal(added, axis1=1, axis2=2)[:, :size]
+        cross[:, part] = added[:, size, :size]
+        integral[:, block.axis] += added[:, size, size]
+        if size == _LARGEST_BLOCK:
+            phi_off[:, part] = np.stack([transition[:, 0, 1], transition[:, 1, 0]], axis=1)
+            noise_off[:, part] = added[:, :1, 1]
         first += size
     return SensorStates(
         names=tuple(name for block in blocks for name in block.names),
@@ -196,7 +205,7 @@ def _assembled(blocks: Sequence[_Block], white: FloatArray, dt: float, k_max: in
     )
 
 
-def _carried(form: StateSpace, dt: float, k_max: int) -> list[tuple[FloatArray, FloatArray]]:
+def _carried(form: StateSpace, dt: float, k_max: int) -> tuple[FloatArray, FloatArray]:
     """Transition and noise of the states and of the integral of their output, after k samples."""
     size = form.n_states
     one = np.eye(size + 1)
@@ -204,10 +213,9 @@ def _carried(form: StateSpace, dt: float, k_max: int) -> list[tuple[FloatArray, 
     one[size, :size] = form.output * dt
     added = np.zeros_like(one)
     added[:size, :size] = form.process_noise
-    transition, noise = np.eye(size + 1), np.zeros_like(one)
-    result = [(transition, noise)]
-    for _ in range(k_max):
-        transition = one @ transition
-        noise = one @ noise @ one.T + added
-        result.append((transition, noise))
-    return result
+    transition, noise = (np.zeros((k_max + 1, *one.shape)) for _ in range(2))
+    transition[0] = np.eye(size + 1)
+    for k in range(k_max):
+        transition[k + 1] = one @ transition[k]
+        noise[k + 1] = one @ noise[k] @ one.T + added
+    return transition, noise

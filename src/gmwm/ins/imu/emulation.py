@@ -205,15 +205,7 @@ def _polynomial(c: FloatArray, t: float) -> tuple[float, float, float]:
 
 @compiled()
 def _to_body(
-    n: float,
-    e: float,
-    d: float,
-    sr: float,
-    cr: float,
-    sp: float,
-    cp: float,
-    sy: float,
-    cy: float,
+    n: float, e: float, d: float, sr: float, cr: float, sp: float, cp: float, sy: float, cy: float
 ) -> tuple[float, float, float]:
     """Resolve a vector of the navigation frame in body axes, given sines and cosines."""
     # Yaw, then pitch, then roll.

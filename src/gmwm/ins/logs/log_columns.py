@@ -48,10 +48,7 @@ def open_log(path: Path) -> CsvTable:
 
 
 def find_columns(
-    table: CsvTable,
-    quantities: Callable[[str], Sequence[str]],
-    needed: Sequence[str],
-    header: str,
+    table: CsvTable, quantities: Callable[[str], Sequence[str]], needed: Sequence[str], header: str
 ) -> tuple[dict[str, int], list[str]]:
     """The column of each quantity, and the names of columns that are none.
 

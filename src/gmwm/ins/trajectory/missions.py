@@ -76,13 +76,7 @@ def helicopter_mapping(
             yield Turn(side * (math.pi + away), rate)
 
     return perform(
-        manoeuvres(),
-        start=start,
-        heading=heading,
-        dt=dt,
-        ramp=_RAMP,
-        level=True,
-        duration=duration,
+        manoeuvres(), start=start, heading=heading, dt=dt, ramp=_RAMP, level=True, duration=duration
     )
 
 
@@ -105,11 +99,7 @@ def _turn_to_next_strip(speed: float, spacing: float, rate: float) -> tuple[floa
 
 
 def car_drive(
-    *,
-    duration: float = 1200.0,
-    dt: float = 0.01,
-    start: Lla = _START,
-    heading: float = 1.0,
+    *, duration: float = 1200.0, dt: float = 0.01, start: Lla = _START, heading: float = 1.0
 ) -> Trajectory:
     """A car: streets with right-angled turns and stops at lights, then a winding open road.
 
@@ -152,11 +142,7 @@ def _open_road(side: float) -> list[Manoeuvre]:
     rate = math.radians(4.0)
     found: list[Manoeuvre] = [Accelerate(24.0, 1.2)]
     for bend, rise in ((35.0, 30.0), (-60.0, -12.0), (25.0, 15.0), (-15.0, -33.0)):
-        found += [
-            Straight(9.0),
-            Turn(side * math.radians(bend), rate),
-            Climb(rise, 1.2),
-        ]
+        found += [Straight(9.0), Turn(side * math.radians(bend), rate), Climb(rise, 1.2)]
     return found
 
 

@@ -101,11 +101,7 @@ class ArrayTable:
 
     @classmethod
     def _of(
-        cls,
-        source: str,
-        columns: Sequence[_Column],
-        rate: float | None,
-        notices: Sequence[Notice],
+        cls, source: str, columns: Sequence[_Column], rate: float | None, notices: Sequence[Notice]
     ) -> ArrayTable:
         if not columns:
             raise InputError(

@@ -21,6 +21,5 @@ def library(module: str, extra: str, source: str) -> ModuleType:
     except ImportError as error:
         needed = module.partition(".")[0]
         raise InputError(
-            f"{source} needs {needed}, which is not installed: pip install 'gmwm[{extra}]'",
-            "extra",
+            f"{source} needs {needed}, which is not installed: pip install 'gmwm[{extra}]'", "extra"
         ) from error

@@ -169,3 +169,11 @@ def test_extra_markov_states_touch_no_sensor():
 def test_large_blocks_are_refused_with_a_mend(term):
     with pytest.raises(InputError, match=r"accel_y: .* states in a filter, more than two: approx"):
         states_of(term)
+
+
+def test_states_of_equal_models_are_computed_once():
+    """The faults of a log are looked for by a thousand filters with the same models."""
+    model = GaussMarkov(0.3, 0.05)
+    assert states_of(model) is states_of(GaussMarkov(0.3, 0.05))
+    others = [states_of(model, bias=0.1), states_of(model, k_max=3), states_of(model, white=2.0)]
+    assert all(other is not states_of(model) for other in others)

@@ -18,12 +18,7 @@ import numpy as np
 from gmwm._core import memory
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import (
-    AnyArray,
-    ArrayTable,
-    array_of,
-    damage_named,
-)
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
 from gmwm.readers.formats.messages.endings import cut_off, end_of_content
 from gmwm.readers.formats.messages.parts import MessageTable
 from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
