@@ -13,6 +13,7 @@ from dataclasses import asdict, is_dataclass
 import numpy as np
 import pytest
 
+import gmwm
 from gmwm._core.notices import Notice
 from places import GOLDEN
 
@@ -90,3 +91,20 @@ def first(holds, numbers):
     """The first whole number of a range from which on something holds, by halving it."""
     found = bisect_left(numbers, True, key=lambda number: bool(holds(number)))
     return numbers[found] if found < len(numbers) else None
+
+
+def reading(path, **options):
+    """What comes of reading a file: the recording in a few numbers, or the message."""
+    try:
+        found = gmwm.read(path, **options)
+    except gmwm.InputError as error:
+        return [str(error).replace(str(path), "FILE"), error.code, dict(error.values)]
+    channels = {
+        channel.name: [
+            channel.quantity, channel.unit, channel.n, channel.missing, channel.dt,
+            float(np.nansum(channel.values * np.cos(np.arange(channel.n)))),
+        ]
+        for channel in found.channels
+    }  # fmt: skip
+    return {"rate": found.rate, "jitter": found.jitter and round(found.jitter, 9),
+            "channels": channels, "notices": found.notices}  # fmt: skip
