@@ -201,6 +201,7 @@ def test_screening():
     time = np.arange(6000) / 50.0
     for name, turning in {
         "rest": time < 0,
+        "end": time > 100,
         "turn": (time > 50) & (time < 70),
         "all": time > 5,
     }.items():

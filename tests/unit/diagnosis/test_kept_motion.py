@@ -7,6 +7,7 @@ import numpy as np
 import gmwm
 from gmwm import Recording
 from gmwm._core.notices import Notice
+from gmwm.diagnosis.check import _clock, _unusable
 from gmwm.diagnosis.gathered import gathered
 from gmwm.diagnosis.joined import _lasting, joined
 from gmwm.diagnosis.motion import find_motion, motion_notices
@@ -21,6 +22,7 @@ from gmwm.diagnosis.motion.motion import (
     _still,
     _tilts_slowly,
     _white,
+    is_moved_with,
 )
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
 from gmwm.diagnosis.still import find_still, rest_of, vibration_notice
@@ -182,6 +184,17 @@ def test_parts_of_motion():
         for steady in (False, True):
             found[f"notices {k} {steady}"] = motion_notices(Motion(some, motion.static, steady))
     found["no rest"] = motion_notices(Motion(many, ()))
+    for jitter in (None, 0.0999, 0.1, 0.3, 0.301):
+        found[f"jitter {jitter}"] = _clock(replace(record(), jitter=jitter))
+    found["moved with"] = edge(
+        lambda a: is_moved_with(gmwm.Channel("a", a * NOISE[0], 1.0, "gyro", "rad/s")), 1e3, 1e9
+    )
+    half = [np.where(np.arange(100) < n, np.nan, 1.0) for n in (50, 51)]
+    found["missing"] = [is_moved_with(gmwm.Channel("a", x, 1.0, "gyro", "rad/s")) for x in half]
+    found["unusable"] = [
+        _unusable(gmwm.Channel("a", x, 1.0, "gyro", "rad/s"))
+        for x in (NOISE[0], 1e80 * NOISE[0], np.array([1.0, np.inf, -np.inf]))
+    ]
     check("diagnosis/parts_of_motion", found)
 
 

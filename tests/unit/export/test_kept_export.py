@@ -136,5 +136,11 @@ def test_axes_and_what_is_refused():
                 found[f"{name} {horizon}"] = imu_of(given, "N+K", horizon, 60.0, False).horizon
             except InputError as error:
                 found[f"{name} {horizon}"] = str(error)
-    found["targets"] = {name: [each.form, each.horizon] for name, each in TARGETS.items()}
+    for name, each in TARGETS.items():
+        kept_of = {key: value for key, value in vars(each).items() if not callable(value)}
+        found[name] = kept_of | {
+            "example": gmwm.export(
+                numbers(each.form if each.form in ("N+K", "N+GM") else "N+K"), name
+            ).splitlines()[-40:]
+        }
     check("calibration/axes", found)
