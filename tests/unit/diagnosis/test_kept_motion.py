@@ -250,6 +250,7 @@ def test_parts_of_rest():
         lambda n: loudness(np.exp(np.where(np.arange(n) < n // 2, 0.0, 2.0))[:, None],
                            np.zeros(1)).loud.any(), range(90, 160),
     )  # fmt: skip
+    assert loud(0.0).ratio == 1.0
     dead = np.exp(0.1 * NOISE[:2, :400].T)
     dead[:90, 0] = 0.0
     dead[200:300] *= 5.0
@@ -269,6 +270,16 @@ def test_whole_recordings():
     found["rough"] = one.content() | {"text": str(one), "repr": repr(one)}
     found["masked"] = [[c.missing, float(np.nansum(c.values * T))]
                        for c in one.masked(rec).values()]  # fmt: skip
+    spiked = NOISE[2].copy()
+    spiked[400] += 90.0
+    slow = 0.25 * NOISE[1] + np.cumsum(NOISE[3]) * 0.02
+    hum = gmwm.Resonance(0.3, 9.0, 0.02).simulate(N, 1 / RATE, 2)
+    odd = record(names=(), gyro_x=np.repeat(spiked[:1000], 3), gyro_y=np.round(slow + hum),
+                 gyro_z=np.append(NOISE[0][:1], np.repeat(spiked, 3)[: N - 1]))  # fmt: skip
+    found["odd"] = gmwm.health(odd).content()
+    for n in (127, 128):
+        rest = {name: channel.values[:n] for name, channel in record().items()}
+        found[f"blocks {n}"] = blocks_of(Recording.from_arrays(rest, RATE, UNITS)) is None
     other = gmwm.health(record())
     found["rest"] = other.content()
     found["joined"] = joined([one, other, one]).content()
