@@ -11,6 +11,7 @@ from gmwm.readers.clock import Clock, timing_of
 from gmwm.readers.clock.civil_time import is_time_of_day
 from gmwm.readers.clock.jumps import Jumps
 from gmwm.readers.clock.stamps import _unwrapped
+from gmwm.readers.clock.tracking import follow
 from gmwm.readers.clock.uneven import _bursts, followed
 from gmwm.readers.layout import find_layout
 from gmwm.readers.reader import read
@@ -77,6 +78,7 @@ def test_limits_of_clocks():
             lambda a: followed_too((EVEN[:n] + a * (EVEN[:n] == 300)) * 0.01), 0.3, 0.7, 12
         ),
         "long": edge(lambda a: outcome((EVEN[:n] + a * (EVEN[:n] > 300)) * 0.01)[2] > 0, 0.1, 1.0, 12),
+        "shortest": [works(EVEN[:n] * step) for step in (0.5e-100, 2e-100, 0.5e100, 2e100)],
         "finest": edge(lambda a: works(a + EVEN[:n] * 0.01), 1e12, 1e16, 12),
         "wrap": edge(lambda a: _unwrapped(np.where(EVEN < 99, EVEN, EVEN - 2.0**16 + a)) is None,
                      2.0, 400.0, 12),
@@ -130,6 +132,45 @@ def test_uneven_clocks_row_by_row():
              for n in (249, 250, 251, 252)]  # fmt: skip
     found["stands"] = still
     check("readers/followed", found)
+
+
+def test_following_a_chunk_at_a_time():
+    found = {}
+    n = 1500
+    noise = NOISE[:n]
+    base = EVEN[:n] + 0.1 * noise
+    costs = np.array([5.0, 5.0, 25.0, 8.0, 0.0])
+    for name, x in {
+        "even": base, "lost": np.delete(base, [299, 300, 301, 600, 601, 650, 900]), "set": base - 40.0 * (EVEN[:n] > 598),
+        "far": base + 40.0 * (EVEN[:n] > 301), "stall": np.maximum(base, 640.0 * (np.abs(EVEN[:n] - 620) < 20)),
+        "gaps": base + 2.0 * (EVEN[:n] > 295) + 3.0 * (EVEN[:n] > 305) + 4.0 * (EVEN[:n] > 310) + 5.0 * (EVEN[:n] > 599),
+        "twice": np.insert(base, [300, 600, 601], base[[299, 599, 600]]), "noisy": EVEN[:n] + 0.45 * noise,
+    }.items():  # fmt: skip
+        same = np.append(False, np.diff(x) == 0.0)
+        for chunk, sigma, memory, age, limit in (
+            (300, 0.1, 128, 16, 1e3),
+            (2000, 0.3, 1024, 16, 30.0),
+            (301, 0.1, 64, 64, 1e3),
+        ):
+            for more in (0.0, 5.0):
+                advance, is_set = np.zeros(x.size, dtype=np.int64), np.zeros(x.size, dtype=bool)
+                spent = follow(
+                    x,
+                    same,
+                    limit,
+                    float(x[0]),
+                    sigma,
+                    memory,
+                    age,
+                    np.append(costs[:4], more),
+                    advance,
+                    is_set,
+                    chunk,
+                )
+                found[f"{name} {chunk} {more}"] = [
+                    spent, np.flatnonzero(advance != 1)[:30], advance[advance != 1][:30], np.flatnonzero(is_set)[:9],
+                ]  # fmt: skip
+    check("readers/follow", found)
 
 
 def test_limits_of_columns(tmp_path):
