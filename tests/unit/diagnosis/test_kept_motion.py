@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - tables
 """Motion, rest, vibration and whole recordings: every stretch, and where each begins."""
 
 from dataclasses import replace
@@ -138,6 +139,13 @@ def test_where_motion_begins():
             lambda a: find_still(record(rates=a * np.sin(2.0 * T))).longest < 20, 1e-4, 0.5, 8
         ),
     }  # fmt: skip
+    found["rest of"] = [
+        [len(find_still(record(between(a, 40, 0.5))).stretches), find_still(record(between(a, 55, 0.5))).longest]
+        for a in (9.6, 10.1, 10.6, 11.1)
+    ]  # fmt: skip
+    found["static of"] = [
+        len(find_motion(record(between(a, 40, 0.5))).static) for a in (9.0, 10.0, 11.0, 12.0, 13.0)
+    ]
     check("diagnosis/motion_edges", found, rel=1e-4)
 
 

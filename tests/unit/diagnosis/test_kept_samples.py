@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - tables
 """Missing, stuck, cut-off and repeated samples: every notice in full, and where each begins."""
 
 import numpy as np
@@ -241,6 +242,13 @@ def test_rounding_and_what_is_dithered():
         found[f"jitter {digits}"] = step_size(
             np.round(SHORT * 8) / 8 + 0.125 * 0.3 * 10.0**-digits * NOISE[4000:8000]
         )
+    found["levels"] = [
+        [step_size(np.resize(NOISE[:n], m)) for m in (n + 1, 2 * n - 1, 2 * n, 2 * n + 1)] for n in (6, 7, 8)
+    ]  # fmt: skip
+    found["counts"] = [
+        [step_size(np.resize(np.arange(n) + 0.01 * NOISE[:n], m)) for m in (2 * n - 1, 2 * n, 2 * n + 1)]
+        for n in (6, 7, 8, 9)
+    ]  # fmt: skip
     places = np.repeat(np.arange(40.0), 3)
     found["lattice"] = edge(lambda a: step_size(places + a * NOISE[:120]) == 0.0, 1e-4, 0.5, 12)
     found["level"] = edge(lambda a: step_size(np.arange(40.0) + a * NOISE[:40]), 1e-4, 0.5, 12)

@@ -102,6 +102,9 @@ def test_clocks():
                 some = clock(EVEN[:200] * step, None, unit)
                 found[f"unit {step} {expected} {unit}"] = timed(some, expected)
     found["in ms"] = timed(clock(lost(50) * 10.0, 1e-3, "ms"))
+    for bits in (16, 32):
+        wrapped = (EVEN * 100.0 * 2.0 ** (bits - 16) + 1000.0) % 2.0**bits
+        found[f"wraps {bits}"] = timed(clock(wrapped, 1e-4 * 2.0 ** (16 - bits), "us"))
     check("readers/clocks", found, rel=1e-6)
 
 

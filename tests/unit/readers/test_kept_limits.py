@@ -284,6 +284,7 @@ def test_limits_of_turning(rate):
         )
         force = force + noise * np.stack([np.roll(NOISE, k) for k in range(3)])
         turn = gyro * (np.stack([rate + 0 * t, 0 * t, 0 * t]) + 0.1 * np.sin(t))
+        force[1, 300:400] = np.nan
         channels = {f"accel_{a}": x[:stop] for a, x in zip("xyz", force, strict=True)}
         channels |= {f"gyro_{a}": x[:stop] for a, x in zip("xyz", turn, strict=True)}
         return Recording.from_arrays(channels, 50.0, SI)
