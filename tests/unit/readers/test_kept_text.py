@@ -142,6 +142,11 @@ TEXTS = {
     "cut": (text()[:-20], {"units": SI}),
     "cut field": (text(form="{:.6f}")[:-3], {"units": SI}),
     "cut taken": (text(form="{:.6f}")[:-3], {"units": SI, "damaged": True}),
+    "cut long": (changed({}, text(form="{:.4f}").replace("\n", "123456\n"))[:-5], {"units": SI}),
+    "slow": (text(None, time=None), {"units": SI, "rate": 0.5}),
+    "slower": (text(None, time=None), {"units": SI, "rate": 1e-310}),
+    "stamps twice": (text(time=0.01 * np.repeat(np.arange(N), [2 if k in (9, 30) else 1 for k in range(N)])[:N]), {"units": SI}),
+    "rows twice": (changed({12: text().splitlines()[10], 40: text().splitlines()[38]}), {"units": SI}),
     "several sensors": (text(NAMES + ",imu_id", np.column_stack([ROWS, np.arange(N) % 3])), {"units": SI}),
     "one sensor": (text(NAMES + ",imu_id", np.column_stack([ROWS, np.arange(N) // 50])), {"units": SI}),
     "dates": (dated(str), {"units": SI}),
@@ -164,6 +169,7 @@ TEXTS = {
     "px4": (text("timestamp,gyro_rad[0],gyro_rad[1],gyro_rad[2],accelerometer_m_s2[0],accelerometer_m_s2[1],accelerometer_m_s2[2]", time=1e4 * np.arange(N), form="{:.12g}"), {}),
     "rostopic": (text("time,field.header.stamp,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z", np.column_stack([1e7 * np.arange(N), ROWS[:, :3]]), 1e7 * np.arange(N) + 5, form="{:.12g}"), {"units": SI}),
     "shimmer": (text("Shimmer_1_Timestamp_CAL\tShimmer_1_Gyro_X_CAL\tShimmer_1_Accel_LN_X_CAL\tShimmer_1_Accel_WR_X_CAL\nms\tdeg/s\tm/(s^2)\tm/(s^2)", ROWS[:, 3:], 10 * np.arange(N), mark="\t"), {}),
+    "shimmer word": (text("Shimmer_1_Timestamp_CAL\tShimmer_1_Gyro_X_CAL\nms\tdeg/s", ROWS[:, 3:4], 10 * np.arange(N), mark="\t").replace("\t0.1", "\tx", 1), {}),
     "gnss logger": (text("# UncalGyro,utc,elapsed"), {}),
 }  # fmt: skip
 
@@ -182,6 +188,8 @@ def test_texts(tmp_path):
     found["sensor logger"] = reading(path)
     path.write_bytes(packed[:-400])
     found["cut off"] = [reading(path), reading(path, damaged=True)]
+    path.write_bytes(packed[:20])
+    found["nothing left"] = [reading(path), reading(path, damaged=True)]
     check("readers/texts", found)
 
 
