@@ -70,8 +70,8 @@ def test_a_ranking(name):
         ranked, slope = rank(wv, Choices(1))
         whole["ranked"] = [numbers(ranked), slope and [slope.value, slope.variance]]
     if name == "white":
-        merged = gmwm.select(wv, rule="merge", max_gauss_markov=2)
-        whole["merged"] = numbers(merged)
+        merged = gmwm.select(wv, rule="merge", max_gauss_markov=3)
+        whole["merged"] = [numbers(merged), merged.fit.params, merged.chosen.model.title()]
     check(f"selection/{name.replace(' ', '_')}", whole, rel=1e-3)
 
 
