@@ -62,8 +62,8 @@ def test_messages():
 
     class Reader:
         start_time, end_time = 100, 200
-        connections = [SimpleNamespace(topic=t, msgtype=f"sensor_msgs/msg/{k}", msgcount=n) for t, k, n in (
-            ("/a", "Imu", 3), ("/a", "Imu", 2), ("/b", "Imu", 0), ("/t", "Temperature", 4), ("/c", "Image", 5))]  # fmt: skip
+        connections = tuple(SimpleNamespace(topic=t, msgtype=f"sensor_msgs/msg/{k}", msgcount=n) for t, k, n in (
+            ("/a", "Imu", 3), ("/a", "Imu", 2), ("/b", "Imu", 0), ("/t", "Temperature", 4), ("/c", "Image", 5)))  # fmt: skip
 
         def __init__(self, later):
             self.later = later
