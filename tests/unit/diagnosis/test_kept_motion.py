@@ -115,13 +115,13 @@ def test_where_motion_begins():
         return bool(find_motion(record(**log)).moves)
 
     found = {
-        "turn": edge(lambda r: moves(rates=between(20, 40, r)), 1e-3, 0.5, 9),
+        "turn": edge(lambda r: moves(rates=between(20, 40, r)), 1e-3, 0.5, 6),
         "noisy turn": edge(
             lambda r: moves(rates=between(20, 40, r), noise=100 * NOISE), 1e-2, 5.0, 9
         ),
-        "tilt": edge(lambda a: moves(angle=step_at(30, a)), 1e-3, 0.5, 9),
-        "slow tilt": edge(lambda a: moves(angle=a * T / 60), 1e-3, 0.5, 9),
-        "wild": edge(lambda a: moves(rates=a * np.sin(9.0 * T) * np.sin(T / 7)), 1e-2, 9.0, 8),
+        "tilt": edge(lambda a: moves(angle=step_at(30, a)), 1e-3, 0.5, 6),
+        "slow tilt": edge(lambda a: moves(angle=a * T / 60), 1e-3, 0.5, 6),
+        "wild": edge(lambda a: moves(rates=a * np.sin(9.0 * T) * np.sin(T / 7)), 1e-2, 9.0, 5),
         "sway": edge(
             lambda a: moves(angle=a * np.sin(T / 4), rates=a / 4 * np.cos(T / 4)), 1e-4, 0.1, 8
         ),
@@ -129,11 +129,11 @@ def test_where_motion_begins():
             lambda f: bool(
                 vibration_notice(record(noise=NOISE * np.where(np.abs(T - 30) < 9, f, 1.0)))
             ),
-            1.0, 20.0, 7,
+            1.0, 20.0, 5,
         ),
         "still turn": edge(
             lambda r: len(find_still(record(rates=between(20, 40, r))).stretches) > 1,
-            1e-3, 0.5, 9,
+            1e-3, 0.5, 6,
         ),
         "still sway": edge(
             lambda a: find_still(record(rates=a * np.sin(2.0 * T))).longest < 20, 1e-4, 0.5, 8

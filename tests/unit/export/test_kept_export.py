@@ -43,7 +43,7 @@ def calibration():
     }  # fmt: skip
     units = {"gyro": "rad/s", "accel": "m/s^2"}
     channels = [
-        Channel(name, truth.simulate(4000, DT, rng), DT, name[:-2], units[name[:-2]])
+        Channel(name, truth.simulate(2000, DT, rng), DT, name[:-2], units[name[:-2]])
         for name, truth in truths.items()
     ]
     recording = Recording(tuple(channels), "bench.csv")
