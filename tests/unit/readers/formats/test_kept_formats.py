@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import bags
 import fuzz_formats as formats
 from gmwm.readers import read_blocks
 from kept import check, reading
@@ -48,6 +49,17 @@ def test_bags(tmp_path, kind):
         found[f"{k} by the log"] = reading(path, clock="log", topic="/imu")
     found["no topic"] = reading(path, topic="/none")
     check(f"readers/bag_{kind.lower()}", found)
+
+
+def test_bags_without_an_imu(tmp_path):
+    found = {}
+    for count in (1, 8, 9):
+        warm = [(bags.START + i, bags.temperature(bags.ROS1, i, 30.0)) for i in range(3)]
+        topics = {f"/warm{k}": (bags.TEMPERATURE_TYPE, warm) for k in range(count)}
+        path = tmp_path / f"{count}.bag"
+        bags.write1(path, topics, None)
+        found[f"{count}"] = reading(path)
+    check("readers/bags_without_an_imu", found)
 
 
 def test_records(tmp_path):
