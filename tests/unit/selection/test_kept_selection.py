@@ -190,3 +190,27 @@ def test_parts_of_choices():
             }), 1.01, 3.0,
         )  # fmt: skip
     check("selection/parts", found, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "is_right"),
+    [
+        (lambda c: None, True), (lambda c: c.update(chosen=2), True), (lambda c: c.update(chosen=3), False),
+        (lambda c: c.update(chosen=-1), False), (lambda c: c.update(ranking=[], chosen=0), False),
+        (lambda c: c["ranking"][0].update(objective=0.0, chi_square=0.0, n_parameters=1), True),
+        (lambda c: c["ranking"][0].update(objective=-0.01), False), (lambda c: c["ranking"][0].update(chi_square=-0.01), False),
+        (lambda c: c["ranking"][0].update(n_parameters=0), False), (lambda c: c.update(ranking=c["ranking"][:1], chosen=0), True),
+    ],
+)  # fmt: skip
+def test_a_stored_selection(change, is_right):
+    fit = gmwm.fit(WhiteNoise(), CASES["short"], 1.0)
+    ranking = tuple(
+        Candidate(WhiteNoise() + RandomWalk(), 1.0 * k, 1.0, 1.0, 2, 3) for k in range(3)
+    )
+    stored = gmwm.Selection(ranking, ranking[0], fit).to_dict()
+    change(stored)
+    if is_right:
+        assert gmwm.Selection.from_dict(stored).to_dict() == stored
+    else:
+        with pytest.raises(gmwm.InputError):
+            gmwm.Selection.from_dict(stored)
