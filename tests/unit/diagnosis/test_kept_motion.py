@@ -1,7 +1,9 @@
 # ruff: noqa: E501 - tables
 """Motion, rest, vibration and whole recordings: every stretch, and where each begins."""
 
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -26,7 +28,7 @@ from gmwm.diagnosis.motion.motion import (
     is_moved_with,
 )
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
-from gmwm.diagnosis.still import find_still, rest_of, vibration_notice
+from gmwm.diagnosis.still import Still, find_still, rest_of, vibration_notice
 from gmwm.diagnosis.still.blocks import blocks_of
 from gmwm.diagnosis.still.loudness import _changes, _split, loudness
 from gmwm.diagnosis.still.stretches import (
@@ -265,6 +267,23 @@ def test_parts_of_rest():
     for step in (0.0, 0.5):
         found[f"dead {step}"] = np.flatnonzero(np.diff(loudness(dead, np.full(2, step)).loud))
     check("diagnosis/parts_of_rest", found)
+
+
+def test_stretches_of_vibration_are_listed(monkeypatch):
+    found = {}
+    for count in (0, 1, 3, 4, 6):
+        loud = tuple((10.0 * k, 10.0 * k + 1 + k % 4) for k in range(count))
+        made = SimpleNamespace(loud_stretches=loud, loudness=SimpleNamespace(ratio=1.75))
+        monkeypatch.setattr(
+            sys.modules["gmwm.diagnosis.still.blocks"], "blocks_of", lambda _, m=made: m
+        )
+        found[f"{count}"] = vibration_notice(record())
+    for count in (1, 8, 9):
+        still = Still(
+            tuple((10.0 * k, 10.0 * k + 5) for k in range(count)), 5.0, ((5.0, 7.0),), 100.0
+        )
+        found[f"still {count}"] = [still.notice(), still.total, still.timeline]
+    check("diagnosis/listed", found)
 
 
 def test_whole_recordings():
