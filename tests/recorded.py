@@ -15,7 +15,7 @@ import numpy as np
 
 from places import GOLDEN
 
-LONGEST = 24
+LONGEST = 16
 """Elements that are recorded one by one."""
 
 
@@ -34,6 +34,8 @@ def parts(found: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from parts(each, f"{path}/{place}")
     elif found is None or isinstance(found, str | bool):
         yield path, found
+    elif isinstance(found, slice):
+        yield path, [found.start, found.stop]
     else:
         yield path, _short(np.asarray(found, dtype=float))
 
@@ -41,15 +43,19 @@ def parts(found: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _short(array: np.ndarray) -> Any:
     flat = array.ravel()
     if array.ndim == 0 or flat.size <= LONGEST:
-        return np.round(flat, 300).tolist()
+        return _rounded(flat)
     there = np.isfinite(flat)
     own, place = np.where(there, flat, 0.0), np.arange(1.0, flat.size + 1.0)
     waves = (np.ones(flat.size), np.cos(place), np.sin(math.sqrt(2.0) * place))
     return {
         "shape": list(array.shape),
         "finite": int(np.sum(there)),
-        "sums": [float(np.sum(np.abs(own))), *(float(own @ wave) for wave in waves)],
+        "sums": _rounded(np.array([np.sum(np.abs(own)), *(own @ wave for wave in waves)])),
     }
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    return [float(f"{value:.10g}") for value in values.tolist()]
 
 
 def _close(found: Any, expected: Any, rtol: float) -> bool:

@@ -1,0 +1,117 @@
+"""Logs that are navigated, and all that is said of them, as recorded."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gmwm.ins import Measured, Navigated, compare
+from gmwm.ins.field.replay import Replay, alignment_of
+from gmwm.ins.field.smoother import smooth
+from gmwm.ins.field.start.alignment import align
+from gmwm.study.emulated_logs import emulated_log, sensors
+from recorded import assert_as_recorded
+
+
+def all_of(navigated):
+    solution = navigated.solution
+    faults = navigated.faults
+    return {
+        "alignment": navigated.alignment, "hole": navigated.hole, "lla": solution.lla,
+        "sd": solution.sd, "text": str(navigated), "content": navigated.to_dict(),
+        "farthest": navigated.farthest, "usual": navigated._usual_size,
+        "accuracy": navigated.accuracy, "notices": navigated.notices,
+        "verdict": navigated.verdict, "tests": [navigated.test(), navigated.test("position")],
+        "found": [
+            {"code": each.code, "where": each.where, "gain": each.gain, "cost": each.cost,
+             "values": each.values, "errors": each.errors}
+            for each in faults.found
+        ],
+        "resolution": faults.resolution, "alternatives": list(faults.alternatives),
+    }  # fmt: skip
+
+
+LOGS = {
+    "car": {"seed": 1},
+    "loiter": {"seed": 3, "vehicle": "loiter"},
+    "no velocity": {"seed": 4, "vehicle": "loiter", "velocity": False},
+    "stamps": {"seed": 5, "faults": ("stamps",)},
+    "arm": {"seed": 6, "vehicle": "loiter", "faults": ("lever arm",)},
+    "far": {"seed": 7, "faults": ("one far",)},
+    "coloured": {"seed": 8, "faults": ("coloured",)},
+    "scale": {"seed": 9, "vehicle": "loiter", "faults": ("gyro scale",)},
+    "white": {"seed": 11, "truth": sensors(gyro=30.0), "believed": sensors()},
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_a_log(name):
+    log, _ = emulated_log(**LOGS[name], duration=60.0, rate=4.0)
+    navigated = Navigated.of(replace(log, start=100.0))
+    assert_as_recorded(f"log_{name.replace(' ', '_')}", all_of(navigated), rtol=1e-4)
+
+
+def test_models_that_are_compared():
+    log, _ = emulated_log(21, duration=240.0, rate=4.0)
+    found = compare(log, {"right": sensors(), "bold": sensors(gyro=0.1, accel=0.1, slow=0.1)}, 20.0)
+    replay = Replay.of(log, align(log.imu, log.aiding, log.sensors))
+    smoothed = smooth(replay, np.array([10.3, 100.0, 200.7]))
+    everything = {
+        "outcomes": found.outcomes, "outages": found.outages, "content": found.to_dict(),
+        "pairs": {"/".join(names): each for names, each in found.pairs.items()},
+        "verdict": found.verdict, "text": str(found), "resolved": found.resolved,
+        "needed": found.length_needed,
+        "smoothed": [smoothed.lla, smoothed.covariance, smoothed.solution.lla],
+    }  # fmt: skip
+    assert_as_recorded("compared", everything, rtol=1e-4)
+
+
+SENSORS = {
+    "gyro": {"N": "10 deg/h/sqrt(Hz)", "GM": [["10 deg/h", 100]]},
+    "accel": {"N": "100 ug/sqrt(Hz)", "GM": [["100 ug", 100]]},
+}
+
+
+def test_files_of_a_log(tmp_path):
+    """Stamps that tremble, samples that are lost, dates, a barometer, standstills."""
+    log, truth = emulated_log(31, duration=60.0, rate=10.0)
+    rng = np.random.default_rng(32)
+    imu, position = log.imu, log.aiding.of("position")
+    stamps = 1000.0 + imu.dt * (1.0 + np.arange(imu.n)) + 1e-3 * rng.uniform(-1.0, 1.0, imu.n)
+    rows = np.column_stack([stamps, imu.rotation / imu.dt, imu.velocity / imu.dt])
+    rows = np.delete(rows, [100, 250], axis=0)
+    np.savetxt(tmp_path / "imu.csv", rows, "%.9g", ",", comments="",
+               header="time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z")  # fmt: skip
+    fixes = np.column_stack([1000.0 + position.time, np.degrees(position.value[:, :2]),
+                             position.value[:, 2]])  # fmt: skip
+    np.savetxt(tmp_path / "fixes.csv", fixes, "%.11g", ",", comments="",
+               header="time_s,latitude_deg,longitude_deg,height_m")  # fmt: skip
+    heights = np.column_stack([1000.5 + np.arange(50.0), truth.lla[5:505:10, 2] + 30.0])
+    np.savetxt(tmp_path / "barometer.csv", heights, "%.9g", ",", comments="",
+               header="time_s,height_m")  # fmt: skip
+    content = {
+        "imu": {"file": "imu.csv", "units": {"gyro": "rad/s", "accel": "m/s^2"}},
+        "gnss_fixes": "fixes.csv", "sensors": SENSORS, "barometer": "barometer.csv",
+        "zero_velocity": 0.05, "lever_arm": [1.0, 0.3, -1.0], "position_sd": [1.0, 1.0, 1.5],
+        "bias": {"gyro": "0.02 deg/s", "accel": "5 mg"}, "gnss_shift": 0.02, "gate": 0.001,
+    }  # fmt: skip
+    measured = Measured.of(content, tmp_path)
+    found = {
+        "imu": measured.imu, "fixes": measured.aiding.fixes, "start": measured.start,
+        "sd": measured.sensors.bias_sd, "gate": measured.aiding.gate,
+        "notices": [(each.code, each.text, each.values) for each in measured.notices],
+        "navigated": all_of(Navigated.of(measured)),
+    }  # fmt: skip
+    assert_as_recorded("log_of_files", found, rtol=1e-4)
+
+
+def test_a_start_at_rest_and_one_with_a_given_attitude():
+    log, _ = emulated_log(33, duration=60.0, rate=10.0)
+    found = {}
+    for name, options in {
+        "plain": {}, "heading": {"heading": 1.0, "heading_sd": 0.02},
+        "attitude": {"attitude": (0.0, 0.01, 1.0), "attitude_sd": 0.02},
+    }.items():  # fmt: skip
+        measured = replace(log, **options)
+        found[name] = alignment_of(measured)
+    assert_as_recorded("alignments", found)
