@@ -27,7 +27,7 @@ N, K = WhiteNoise(0.01), RandomWalk(0.02)
 SLOW, FAST = GaussMarkov(0.05, 1.0), GaussMarkov(0.05, 0.05)
 
 
-def series(truth, n=4000, seed=1, missing=0.0):
+def series(truth, n=3000, seed=1, missing=0.0):
     rng = np.random.default_rng(seed)
     x = truth.simulate(n, DT, rng) + 0.3
     x[rng.random(n) < missing] = np.nan
@@ -66,8 +66,8 @@ MOMENTS = {
     "wrong": (N + Resonance(0.1, 8.0, 0.1), N + K, {}),
     "wrong_slow": (N + K, N + BiasInstability(1.0), {}),
     "resonance": (N + Resonance(0.1, 8.0, 0.1), None, {}),
-    "ar": (AR([1.2, -0.5], 1e-4), None, {}),
-    "arma": (ARMA([0.8], [0.4], 1e-4), None, {}),
+    "ar": (AR([0.9], 1e-4), None, {"n": 1000}),
+    "arma": (ARMA([0.8], [0.4], 1e-4), None, {"n": 1000}),
     "line": (N + Sinusoid(0.1, 3.0), None, {}),
     "bandwidth": (LowPassNoise(0.01, 20.0, 2.0, 0.7), LowPassNoise(order=2.0, damping=0.7), {}),
     "given": (N + SLOW, WhiteNoise() + GaussMarkov(tau=1.0) + RandomWalk(K=0.01), {}),
@@ -103,7 +103,7 @@ def test_robust_and_other_wavelets_and_simulated_moments():
     found = {
         "robust": estimate(model, gmwm.wavelet_variance(x, DT, robust=True)),
         "db4": estimate(model, gmwm.wavelet_variance(x, DT, wavelet="db4")),
-        "simulated": estimate(model, x[:1500], DT, SimulatedMoments(replications=3)),
+        "simulated": estimate(model, x[:600], DT, SimulatedMoments(replications=2)),
     }
     assert_as_recorded("fit_other", {k: all_of(v) for k, v in found.items()}, rtol=1e-4)
 
@@ -120,11 +120,8 @@ def test_likelihoods(method):
         cases["gaps"] = (N + FAST + K, None, {"missing": 0.05})
     if method.name != "em":
         cases["quantized"] = (QuantizationNoise(1e-4) + N + FAST, None, {})
-    if method.name == "mle":
-        cases["ar"] = (N + AR([0.9], 1e-4), None, {})
-        cases["resonance"] = (N + Resonance(0.05, 8.0, 0.1), None, {})
     found = {
-        name: all_of(fitted(truth, model, method, n=400, **options))
+        name: all_of(fitted(truth, model, method, n=300, **options))
         for name, (truth, model, options) in cases.items()
     }
     assert_as_recorded(f"fit_by_{method.name}", found, rtol=1e-4)
@@ -159,10 +156,9 @@ def test_draws_of_a_bootstrap():
 
 def test_bounds_on_errors():
     models = {
-        "n_k": (N + K, 500), "n_gm": (N + FAST, 700), "n_k_long": (N + SLOW + K, 1_000_000),
-        "ramp": (N + SLOW + RateRamp(0.01), 600), "long_ramp": (N + K + RateRamp(0.01), 300_000),
-        "b": (N + BiasInstability(0.01), 5000), "q": (QuantizationNoise(1e-4) + N, 400),
-        "arma": (ARMA([0.8], [0.4], 1e-4), 500), "resonance": (Resonance(0.1, 8.0, 0.1) + N, 900),
+        "n_k": (N + K, 200), "n_k_long": (N + SLOW + K, 1_000_000),
+        "ramp": (N + SLOW + RateRamp(0.01), 200), "long_ramp": (N + K + RateRamp(0.01), 300_000),
+        "arma": (ARMA([0.8], [0.4], 1e-4), 200),
     }  # fmt: skip
     found = {}
     for name, (model, n) in models.items():
@@ -172,8 +168,8 @@ def test_bounds_on_errors():
 
 
 def test_several_recordings():
-    parts = [series(N + SLOW, n, seed) for n, seed in ((3000, 1), (2000, 2), (1500, 3))]
-    other = [*parts[:2], series(WhiteNoise(0.013) + SLOW, 2500, 4)]
+    parts = [series(N + SLOW, n, seed) for n, seed in ((2000, 1), (1500, 2))]
+    other = [*parts, series(WhiteNoise(0.013) + SLOW, 1800, 4)]
     found = {}
     for name, (given, model) in {
         "same": (parts, N + SLOW), "other": (other, N + SLOW + K),
