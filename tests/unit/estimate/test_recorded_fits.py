@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
+from classes import assert_dataclasses_keep_the_rules
 from gmwm import (
     AR,
     ARMA,
@@ -177,3 +178,7 @@ def test_several_recordings():
         fit = estimate(model.opened(), given, DT)
         found[name] = [all_of(fit), fit.agreement, fit.equality_p, fit.curves_p, fit.spread]
     assert_as_recorded("fit_joint", found, rtol=1e-4)
+
+
+def test_no_estimate_dataclass_changes():
+    assert_dataclasses_keep_the_rules("estimate", "Series Moments")

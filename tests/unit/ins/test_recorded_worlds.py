@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from classes import assert_dataclasses_keep_the_rules
 from gmwm import (
     AR,
     BiasInstability,
@@ -213,3 +214,11 @@ def test_a_reduced_model():
     models = {axis: repr(model) for axis, model in found.models.models.items()}
     parts = [found.errors, models, found.inflation]
     assert_as_recorded("reduced", parts, 1e-3)
+
+
+def test_no_ins_dataclass_changes():
+    by_identity = (
+        "Reduction Comparison Explanation Candidate FarStamps Faults ImuLog Measured Navigated "
+        "Replay _Block Scenario Experiment MonteCarlo _Task Validation _Believed"
+    )
+    assert_dataclasses_keep_the_rules("ins", by_identity)

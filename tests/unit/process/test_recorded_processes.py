@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gmwm
+from classes import assert_dataclasses_keep_the_rules
 from gmwm.process import CATALOGUE
 from gmwm.process.catalogue import compiled_levels, shaped_curve, shaped_slope
 from gmwm.process.kinds.arma import _decay_lags
@@ -37,7 +38,7 @@ def all_of(process):
     found["slopes"] = process.unit_haar_slopes(shape, M * DT, DT)
     if shape:
         found["unit"] = process.unit_haar_curves(M * DT, DT)(shape)
-        found["grids"] = [process.shape_grid(DT, n) for n in (3, 40, 5000)]
+        found["grids"] = [np.array(process.shape_grid(DT, n)) for n in (3, 40, 5000)]
     with suppress(gmwm.InputError):
         found["covariance"] = process.autocovariance(np.arange(12), DT)
     with suppress(gmwm.InputError):
@@ -103,3 +104,7 @@ def test_weights_of_gains():
             np.abs(filters.transfer(3, f)),
         ]
     assert_as_recorded("weights_of_gains", found)
+
+
+def test_no_process_dataclass_changes():
+    assert_dataclasses_keep_the_rules("process")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
+from classes import assert_dataclasses_keep_the_rules
 from gmwm.variance import PooledVariance, imodwt, modwt, pilot_psd
 from recorded import assert_as_recorded
 
@@ -120,3 +121,7 @@ def test_pooled_variances_and_pilot_spectra():
     psds = [pilot_psd(p.variance, p.tau / DT, DT)(f, DT) for p in (*parts, pooled)]
     short = pilot_psd(parts[0].variance[:1], np.ones(1), DT)(f, DT)
     assert_as_recorded("pooled", {"all": all_of(pooled), "psds": psds, "short": short})
+
+
+def test_no_variance_dataclass_changes():
+    assert_dataclasses_keep_the_rules("variance")
