@@ -6,6 +6,7 @@ import pkgutil
 import re
 from collections.abc import Iterator
 from dataclasses import fields
+from typing import Any
 
 
 def dataclasses_of(room: str) -> Iterator[type]:
@@ -29,3 +30,31 @@ def assert_dataclasses_keep_the_rules(room: str, by_identity: str = "") -> None:
         assert parameters.frozen, each
         is_compared = not re.search("[aA]rray", held) and each.__name__ not in by_identity.split()
         assert parameters.eq == is_compared, each
+
+
+def signatures_of(room: str) -> dict[str, str]:
+    """Arguments and their defaults, of all that a room shows and of its methods."""
+    face = importlib.import_module(f"gmwm.{room}")
+    names = getattr(face, "__all__", None) or [name for name in vars(face) if name[0] != "_"]
+    found = {}
+    for name in sorted(names):
+        shown = getattr(face, name)
+        if not callable(shown) or not getattr(shown, "__module__", "").startswith("gmwm"):
+            continue
+        methods = vars(shown) if inspect.isclass(shown) else {}
+        members = {f"{name}.{own}": each for own, each in methods.items() if own[0] != "_"}
+        for path, each in {name: shown, **members}.items():
+            function = getattr(each, "__func__", each)
+            if function is shown or (callable(function) and not inspect.isclass(function)):
+                found[path] = _arguments(function)
+    return found
+
+
+def _arguments(function: Any) -> str:
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return ""
+    empty = inspect.Parameter.empty
+    plain = [each.replace(annotation=empty) for each in signature.parameters.values()]
+    return str(inspect.Signature(plain))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from classes import assert_dataclasses_keep_the_rules
+from classes import assert_dataclasses_keep_the_rules, signatures_of
 from gmwm import (
     AR,
     ARMA,
@@ -182,3 +182,7 @@ def test_several_recordings():
 
 def test_no_estimate_dataclass_changes():
     assert_dataclasses_keep_the_rules("estimate", "Series Moments")
+
+
+def test_arguments_of_the_estimate_room_and_their_defaults():
+    assert_as_recorded("interface_estimate", signatures_of("estimate"))

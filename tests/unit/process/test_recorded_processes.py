@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from classes import assert_dataclasses_keep_the_rules
+from classes import assert_dataclasses_keep_the_rules, signatures_of
 from gmwm.process import CATALOGUE
 from gmwm.process.catalogue import compiled_levels, shaped_curve, shaped_slope
 from gmwm.process.kinds.arma import _decay_lags
@@ -108,3 +108,7 @@ def test_weights_of_gains():
 
 def test_no_process_dataclass_changes():
     assert_dataclasses_keep_the_rules("process")
+
+
+def test_arguments_of_the_process_room_and_their_defaults():
+    assert_as_recorded("interface_process", signatures_of("process"))

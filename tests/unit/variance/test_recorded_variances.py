@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from classes import assert_dataclasses_keep_the_rules
+from classes import assert_dataclasses_keep_the_rules, signatures_of
 from gmwm.variance import PooledVariance, imodwt, modwt, pilot_psd
 from recorded import assert_as_recorded
 
@@ -125,3 +125,7 @@ def test_pooled_variances_and_pilot_spectra():
 
 def test_no_variance_dataclass_changes():
     assert_dataclasses_keep_the_rules("variance")
+
+
+def test_arguments_of_the_variance_room_and_their_defaults():
+    assert_as_recorded("interface_variance", signatures_of("variance"))
