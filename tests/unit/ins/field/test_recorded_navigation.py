@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gmwm._core.notices import Notice
 from gmwm.ins import Measured, Navigated, compare
 from gmwm.ins.field.replay import Replay, alignment_of
 from gmwm.ins.field.smoother import smooth
@@ -114,3 +115,57 @@ def test_a_start_at_rest_and_one_with_a_given_attitude():
         measured = replace(log, **options)
         found[name] = alignment_of(measured)
     assert_as_recorded("alignments", found)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    log, _ = emulated_log(1, duration=50.0, rate=4.0)
+    return Navigated.of(replace(log, start=100.0))
+
+
+def made_up(plain, change, notices=(), diverged=None, **faults):
+    """The same log with other innovations, and nothing found that explains them."""
+    solution = plain.solution
+    innovations = solution.innovations
+    factor = change(innovations)
+    innovations = replace(innovations, value=innovations.value * factor[:, None])
+    measured = replace(plain.measured, notices=notices)
+    solution = replace(solution, innovations=innovations, diverged_at=diverged)
+    made = replace(plain, measured=measured, solution=solution)
+    vars(made)["faults"] = replace(plain.faults, **{"found": (), "explained": False, **faults})
+    return made
+
+
+UP = Notice("axis-up", "warning", "accel_z", "", {}, "turn it round")
+STUCK = Notice("stuck", "bad", "gyro_x", "it holds one value")
+
+
+@pytest.mark.parametrize(
+    ("code", "change", "notices"),
+    [
+        ("consistent", lambda i: np.ones(i.kind.size), ()),
+        ("too-small", lambda i: np.full(i.kind.size, 0.5), ()),
+        ("too-large", lambda i: np.full(i.kind.size, 2.0), ()),
+        ("mixed-sizes", lambda i: np.where(i.kind == i.kind[0], 0.4, 3.0), ()),
+        ("outliers", lambda i: np.where(np.arange(i.kind.size) % 20 == 7, 12.0, 1.0), ()),
+        ("lost", lambda i: np.full(i.kind.size, 300.0), ()),
+        ("lost", lambda i: np.full(i.kind.size, 300.0), (UP, STUCK)),
+    ],
+)
+def test_what_innovations_of_a_size_mean(plain, code, change, notices):
+    made = made_up(plain, change, notices)
+    verdict = made.verdict
+    assert verdict.code == code
+    assert made.fits == (code == "consistent")
+    assert ("were its model right, which it is not" in made.accuracy[0]) == (code != "consistent")
+    found = {"verdict": verdict, "accuracy": made.accuracy, "misfits": made._misfits,
+             "text": str(made), "rejected": made.rejections, "usual": made._usual_size}  # fmt: skip
+    assert_as_recorded(f"verdict_{code}{len(notices)}", found, rtol=1e-5)
+
+
+def test_a_filter_that_diverged(plain):
+    made = made_up(plain, lambda i: np.ones(i.kind.size), diverged=20.0)
+    assert made.verdict.code == "diverged"
+    assert not made.fits
+    start = float(made.clock(np.array([20.0]))[0])
+    assert made.accuracy[0] == f"The filter diverged at {start:.10g} s and was stopped"
