@@ -9,6 +9,7 @@ import gmwm
 from classes import assert_dataclasses_keep_the_rules, signatures_of
 from gmwm.process import CATALOGUE
 from gmwm.process.catalogue import compiled_levels, shaped_curve, shaped_slope
+from gmwm.process.kinds import arma
 from gmwm.process.kinds.arma import _decay_lags
 from gmwm.process.spectral import quadrature
 from gmwm.process.wavelet_gain import gain_weights, pair_weights
@@ -112,3 +113,22 @@ def test_no_process_dataclass_changes():
 
 def test_arguments_of_the_process_room_and_their_defaults():
     assert_as_recorded("interface_process", signatures_of("process"))
+
+
+def test_curves_of_coefficients_need_no_integral(monkeypatch):
+    """But between whole samples, and where the memory is longer than is summed."""
+    asked = []
+    real = arma.spectral.haar_variance
+
+    def counted(psd, tau, dt):
+        asked.append(tau)
+        return real(psd, tau, dt)
+
+    monkeypatch.setattr(arma.spectral, "haar_variance", counted)
+    gmwm.AR([0.9], 1.0).haar_variance(M * DT, DT)
+    gmwm.MA([0.5], 1.0).haar_variance(M * DT, DT)
+    assert not asked
+    for process, m in ((gmwm.AR([0.9], 1.0), 1.5), (gmwm.AR([0.9], 1.0), 0.5),
+                       (gmwm.AR([0.99999], 1.0), 4.0)):  # fmt: skip
+        process.haar_variance(np.array([1.0, m]) * DT, DT)
+    assert len(asked) == 3

@@ -7,6 +7,7 @@ import pytest
 
 from gmwm._core.notices import Notice
 from gmwm.ins import Measured, Navigated, compare
+from gmwm.ins.field.explanations import Explanation
 from gmwm.ins.field.replay import Replay, alignment_of
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start.alignment import align
@@ -169,3 +170,30 @@ def test_a_filter_that_diverged(plain):
     assert not made.fits
     start = float(made.clock(np.array([20.0]))[0])
     assert made.accuracy[0] == f"The filter diverged at {start:.10g} s and was stopped"
+
+
+@pytest.mark.parametrize(
+    ("factor", "assumed", "severity"),
+    [(1.2, False, "warning"), (1.2, True, "note"), (4.0, False, "bad"), (4.0, True, "warning")],
+)
+def test_fixes_of_another_noise_and_what_is_believed_then(plain, factor, assumed, severity):
+    """Of a filter that is not right its own accuracy is; a note is no fault of the log."""
+    values = {"factor": factor}
+    fault = Explanation("fix-noise", "position", lambda log: log, plain.faults.replay, 30.0, 8.0,
+                        values)  # fmt: skip
+    sizes = {"north": 1.0, "east": 1.0, "down": 1.5}
+    notice = Notice("sd-assumed", "note", "position", "", sizes, "give position_sd")
+    notices = (notice,) if assumed else ()
+    made = made_up(plain, lambda i: np.ones(i.kind.size), notices, found=(fault,), explained=True)
+    assert (made.verdict.code, made.verdict.severity) == ("fix-noise", severity)
+    assert ("which it is not" in made.accuracy[0]) == (severity != "note")
+    assert ("Only the standard deviations assumed" in made.verdict.text) == assumed
+    assert made.verdict.text.endswith(
+        "With that, the innovations are as large as expected, and white."
+    )
+    left = made_up(plain, lambda i: np.ones(i.kind.size), notices, found=(fault,),
+                   alternatives=("coloured", "outliers"))  # fmt: skip
+    assert (
+        "; nearly as probable: coloured, outliers. That does not explain all" in left.verdict.text
+    )
+    assert left.verdict.values["faults"] == 1
