@@ -81,3 +81,22 @@ def assert_as_recorded(name: str, found: Any, rtol: float = 1e-6) -> None:
     assert list(now) == list(then)
     wrong = {k: (now[k], then[k]) for k in then if not _close(now[k], then[k], rtol)}
     assert not wrong, wrong
+
+
+class Pictures:
+    """What is asked of `gmwm.plotting`, in place of drawing it."""
+
+    def __init__(self, monkeypatch: Any) -> None:
+        from gmwm import plotting
+
+        self.asked: list[Any] = []
+        for name, each in vars(plotting).items():
+            if callable(each) and not name.startswith("_") and not isinstance(each, type):
+                monkeypatch.setattr(plotting, name, self._asked_for(name))
+
+    def _asked_for(self, name: str) -> Any:
+        def ask(*args: Any, **named: Any) -> str:
+            self.asked.append([name, list(args), named])
+            return name
+
+        return ask

@@ -21,7 +21,7 @@ from gmwm import (
 )
 from gmwm.estimate import EM, MLE, AllanLines, SimulatedMoments, Whittle, estimate
 from gmwm.process import as_model
-from recorded import assert_as_recorded
+from recorded import Pictures, assert_as_recorded
 
 DT = 0.01
 N, K = WhiteNoise(0.01), RandomWalk(0.02)
@@ -186,3 +186,14 @@ def test_no_estimate_dataclass_changes():
 
 def test_arguments_of_the_estimate_room_and_their_defaults():
     assert_as_recorded("interface_estimate", signatures_of("estimate"))
+
+
+def test_what_is_drawn_of_fits(monkeypatch):
+    pictures = Pictures(monkeypatch)
+    fit = fitted(N + SLOW, None)
+    fit.plot()
+    fit.plot(units="si")
+    fit.goodness.plot()
+    lines = AllanLines({"N": (0.02, 0.16), "K": (2.56, 10.24)})
+    fitted(N + K, None, lines, n=8000).plot()
+    assert_as_recorded("drawn_fits", pictures.asked, rtol=1e-4)

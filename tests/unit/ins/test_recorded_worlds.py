@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from classes import assert_dataclasses_keep_the_rules, signatures_of
 from gmwm import (
@@ -16,6 +17,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
+from gmwm.errors import InputError
 from gmwm.ins import (
     Accelerate,
     Climb,
@@ -52,7 +54,7 @@ from gmwm.ins import (
 )
 from gmwm.ins.montecarlo.outage_errors import sizes
 from gmwm.readers import Recording
-from recorded import assert_as_recorded
+from recorded import Pictures, assert_as_recorded
 
 START = (0.8, 0.15, 400.0)
 MODELS = SensorModels.of(
@@ -225,3 +227,16 @@ def test_no_ins_dataclass_changes():
 
 def test_arguments_of_the_ins_room_and_their_defaults():
     assert_as_recorded("interface_ins", signatures_of("ins"))
+
+
+def test_what_is_drawn_of_many_runs(monkeypatch):
+    pictures = Pictures(monkeypatch)
+    filters = {"right": MODELS, "poor": POOR}
+    made = Validation.of(Experiment(world(), Simulated(MODELS), filters, MODELS, 2, 7))
+    made.plot_track()
+    made.plot_errors(1)
+    made.plot_growth()
+    for wrong in (-1, 2):
+        with pytest.raises(InputError, match="experiment has 2 of them"):
+            made.plot_errors(wrong)
+    assert_as_recorded("drawn_runs", pictures.asked, rtol=1e-5)

@@ -5,8 +5,9 @@ import pytest
 
 import gmwm
 from classes import assert_dataclasses_keep_the_rules, signatures_of
+from gmwm.readers import Channel
 from gmwm.variance import PooledVariance, imodwt, modwt, pilot_psd
-from recorded import assert_as_recorded
+from recorded import Pictures, assert_as_recorded
 
 DT = 0.01
 MODEL = gmwm.WhiteNoise(0.1) + gmwm.GaussMarkov(1.0, 0.5) + gmwm.RandomWalk(0.3)
@@ -129,3 +130,14 @@ def test_no_variance_dataclass_changes():
 
 def test_arguments_of_the_variance_room_and_their_defaults():
     assert_as_recorded("interface_variance", signatures_of("variance"))
+
+
+@pytest.mark.parametrize("units", ["field", "si"])
+def test_what_is_drawn_of_variances(units, monkeypatch):
+    pictures = Pictures(monkeypatch)
+    channel = Channel("gyro_x", 1e-4 * series(1500, 15), DT, "gyro", "rad/s")
+    gmwm.wavelet_variance(channel, confidence=0.9).plot(units=units)
+    if units == "si":
+        pytest.importorskip("allantools")
+        gmwm.deviations(channel, kinds=("total", "modified")).plot()
+    assert_as_recorded(f"drawn_variances_{units}", pictures.asked)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from gmwm._core.notices import Notice
-from gmwm.ins import Measured, Navigated, compare
+from gmwm.ins import Measured, Navigated, Outage, compare
 from gmwm.ins.field.explanations import Explanation
+from gmwm.ins.field.outage_pictures import outage_pictures
 from gmwm.ins.field.replay import Replay, alignment_of
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start.alignment import align
 from gmwm.study.emulated_logs import emulated_log, sensors
-from recorded import assert_as_recorded
+from recorded import Pictures, assert_as_recorded
 
 
 def all_of(navigated):
@@ -197,3 +198,18 @@ def test_fixes_of_another_noise_and_what_is_believed_then(plain, factor, assumed
         "; nearly as probable: coloured, outliers. That does not explain all" in left.verdict.text
     )
     assert left.verdict.values["faults"] == 1
+
+
+def test_what_is_drawn_of_a_log(monkeypatch):
+    """With two times without fixes, one of them too short to be shown."""
+    log, _ = emulated_log(3, "loiter", duration=90.0, rate=4.0)
+    log = replace(log, aiding=log.aiding.without((Outage(60.0, 12.0), Outage(80.0, 3.0))))
+    navigated = Navigated.of(log)
+    pictures = Pictures(monkeypatch)
+    navigated.plot_track()
+    navigated.plot_innovations()
+    titles = [title for title, _ in outage_pictures(navigated)]
+    assert len(titles) == 1
+    models = {"right": sensors(), "bold": sensors(gyro=0.1, accel=0.1, slow=0.1)}
+    compare(emulated_log(21, duration=190.0, rate=2.0)[0], models, 15.0).plot()
+    assert_as_recorded("drawn_log", [titles, pictures.asked], rtol=1e-4)
