@@ -8,6 +8,9 @@ from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, Ra
 from gmwm.estimate.likelihood.scoring import deviations, gradient, maximise, regular_inverse
 from gmwm.estimate.likelihood.whittle import _edges
 from gmwm.estimate.moments import Design, Profile, dictionary_fit, search
+from gmwm.estimate.moments.checks import level_notices, limit_notices
+from gmwm.estimate.moments.conclusion import _unrestricted
+from gmwm.estimate.moments.discrepancy import suffices
 from gmwm.estimate.problem import (
     Coordinates,
     FittedMoments,
@@ -110,3 +113,53 @@ def test_what_an_estimation_is_judged_by():
     wv = variance(NOISE)
     at = FittedMoments.of(NOISE, wv, ("N", "sigma", "tau"), 0.0, 0.02)
     assert_as_recorded("fitted_moments", at)
+
+
+def test_more_parameters_than_levels():
+    assert level_notices(4, 4) == []
+    (notice,) = level_notices(3, 4)
+    assert (notice.code, notice.severity) == ("too-few-levels", "bad")
+    assert notice.text.startswith("3 levels cannot determine 4 parameters")
+
+
+def test_shapes_at_the_limit_of_the_search():
+    design = Design(WhiteNoise() + GaussMarkov(), Scales.of(variance(NOISE)))
+    (low,), (high,) = design.bounds
+    for z, found in (
+        (low + 0.049, 1), (low + 0.051, 0), (high - 0.049, 1), (high - 0.051, 0),
+        (0.5 * (low + high), 0),
+    ):  # fmt: skip
+        shapes = design.unpack(np.array([z]), [(), (1.0,)])
+        assert len(limit_notices(design, shapes, np.array([1.0, 1.0]))) == found
+        assert limit_notices(design, shapes, np.array([1.0, 0.0])) == []
+
+
+def test_an_amplitude_that_is_zero_were_it_free():
+    """Regression: on one column, and on what another one leaves of it."""
+    rng = np.random.default_rng(2)
+    curve, other, residual = rng.normal(size=(3, 8))
+    root = rng.normal(size=(8, 8))
+    covariance = root @ root.T + np.eye(8)
+    inverse = np.linalg.inv(covariance)
+    alone = _unrestricted(np.zeros((8, 0)), curve, residual, covariance)
+    information = curve @ inverse @ curve
+    assert alone == pytest.approx((curve @ inverse @ residual / information, information**-0.5))
+    columns = np.column_stack([curve, other])
+    normal = np.linalg.inv(columns.T @ inverse @ columns)
+    # What is left of the residual is orthogonal to the other column already.
+    left = residual - other * (other @ inverse @ residual) / (other @ inverse @ other)
+    beside = _unrestricted(other[:, None], curve, left, covariance)
+    expected = (normal @ columns.T @ inverse @ left)[0]
+    assert beside == pytest.approx((expected, np.sqrt(normal[0, 0])))
+    assert _unrestricted(np.zeros((8, 0)), np.zeros(8), residual, covariance) == (0.0, np.inf)
+
+
+def test_a_discrepancy_that_suffices():
+    """One as large as the misfit at each of many levels makes the sum of squares their number."""
+    target, residual = np.full(20, 2.0), np.full(20, 0.2)
+    covariance = 1e-8 * np.eye(20)
+    assert suffices(0.11, residual, covariance, target, target, 20)
+    assert not suffices(0.09, residual, covariance, target, target, 20)
+    assert not suffices(0.0, residual, covariance, target, target, 20)
+    assert suffices(0.0, 1e-4 * np.ones(20), covariance, target, target, 20)
+    assert not suffices(0.0, np.full(20, 2.1), covariance, target, target, 20)
