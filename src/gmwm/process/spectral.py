@@ -45,7 +45,7 @@ _MAX_LEVEL = 62
 _MARGIN = 0.25  # a spectrum f^-a needs a < 2 r + 1 - _MARGIN: the lowest octaves then add up
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quadrature:
     """Nodes and gains for a set of averaging times.
 

@@ -11,7 +11,7 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StateSpace:
     """``x[k+1] = F x[k] + w[k]``, ``y[k] = h' x[k] + v[k]`` at a fixed sampling interval.
 

@@ -94,3 +94,10 @@ def test_eigenvalues_of_a_circle_are_the_power_of_its_series():
     for _ in range(1500):
         power += np.abs(np.fft.rfft(synthesis.circulant(spectrum, 8, rng))) ** 2 / 8 / 1500
     np.testing.assert_allclose(power, spectrum, rtol=0.12, atol=1e-20)
+
+
+def test_state_spaces_can_be_compared():
+    """It ended in an error of numpy: arrays have no one answer."""
+    form = RandomWalk(2.0).state_space(0.25)
+    assert form == form
+    assert form != RandomWalk(2.0).state_space(0.25)

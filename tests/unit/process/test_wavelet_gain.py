@@ -114,6 +114,11 @@ def test_quantization_noise_at_coarse_levels_holds_every_octave_of_the_band():
     np.testing.assert_allclose(found, expected, rtol=1e-11)
 
 
+def test_a_ramp_is_seen_by_db1_as_by_haar_which_it_is():
+    ramp = gmwm.RateRamp(0.3)
+    np.testing.assert_array_equal(of(ramp, "db1"), of(ramp, "haar"))
+
+
 def test_ramp_leaves_nothing_with_two_vanishing_moments():
     np.testing.assert_array_equal(of(gmwm.RateRamp(0.3), "db2"), 0.0)
 

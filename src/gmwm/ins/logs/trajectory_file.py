@@ -38,7 +38,7 @@ _UNEVEN = 0.1  # of the sampling interval: at 20 m/s and 100 Hz, 2 cm
 _LARGEST_ANGLE = 1e4  # rad; a log that counts turns stays far below
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Log:
     """What a file says.
 

@@ -199,7 +199,7 @@ def perform(
     return Trajectory.from_arrays(dt, lla, rpy)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Course:
     """Speed, heading and rate of climb, and their derivatives, at epochs and half-way."""
 

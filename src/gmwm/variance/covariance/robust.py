@@ -71,7 +71,7 @@ def excess_series(efficiency: float) -> FloatArray:
     return result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.estimate.moments import Design, Profile, dictionary_fit, gmwm as method, search
+from gmwm.estimate.moments import (
+    Design,
+    Profile,
+    dictionary_fit,
+    gmwm as method,
+    profile,
+    search,
+)
 from gmwm.estimate.problem import Scales, weight_root
 from gmwm.process import compiled_levels, quadrature, shaped_curve, shaped_slope
 
@@ -87,6 +94,41 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
             design.pack(compiled.shapes), design.pack(stepwise.shapes), atol=1e-4
         )
         np.testing.assert_allclose(compiled.x, profile.at(compiled.shapes).x, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("model", "shapes"),
+    [
+        (gmwm.WhiteNoise() + gmwm.GaussMarkov(), [(), (1e3,)]),
+        (gmwm.WhiteNoise() + gmwm.GaussMarkov(), [(), (1e-2,)]),
+        (gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), [(), (0.3,), (0.2,)]),
+        (
+            gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-4) + 2 * gmwm.GaussMarkov(),
+            [(), (), (30.0,), (900.0,)],
+        ),
+        (
+            gmwm.LowPassNoise(order=2.0, damping=0.7)
+            + gmwm.Resonance(damping=0.05)
+            + gmwm.GaussMarkov(),
+            [(40.0, 2.0, 0.7), (4.0, 0.05), (0.5,)],
+        ),
+    ],
+    ids=str,
+)
+def test_the_compiled_search_goes_where_minpack_goes_step_by_step(model, shapes, wv, monkeypatch):
+    """From far away, with steps that are rejected and such that are held back."""
+    design = Design(model, Scales.of(wv))
+    root = weight_root(dictionary_fit(wv, wv.variance).covariance)
+    search_of = Profile(design, wv.variance, root)
+    start = search_of.at(shapes)
+    z = design.pack(shapes)
+    for evaluations in range(2, 32):
+        monkeypatch.setattr(profile, "_MAX_EVALUATIONS", evaluations)
+        compiled = search_of._compiled(z, start, design.bounds)
+        stepwise = search_of._stepwise(z, start, design.bounds)
+        np.testing.assert_allclose(
+            design.pack(compiled.shapes), design.pack(stepwise.shapes), atol=3e-9
+        )
 
 
 def test_curves_beside_a_term_are_those_of_terms_of_a_model(wv):

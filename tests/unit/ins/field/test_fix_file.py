@@ -5,6 +5,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import read_fixes, read_imu
+from gmwm.ins.field.fix_file import _quantities
 from gmwm.ins.field.imu_file import read_imu_log
 
 ROWS = [[100.0 + i, 46.0 + 1e-5 * i, 7.0 + 2e-5 * i, 400.0 + i] for i in range(5)]
@@ -242,3 +243,23 @@ def test_a_channel_that_is_stuck(tmp_path: Path, first: int) -> None:
     assert stuck.where == "gyro_y"
     assert stuck.values["length"] == pytest.approx(6.0)
     assert stuck.values["start"] == pytest.approx(0.02 * first)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [
+        ("time_s", "time"), ("latitude_deg", "latitude"), ("gps_lon", "longitude"),
+        ("Alt [m]", "height"), ("h", "height"), ("vn", "velocity north"),
+        ("ve_mps", "velocity east"), ("vd [m/s]", "velocity down"), ("vu", "velocity up"),
+        ("velocity_north_mps", "velocity north"), ("VelU [m/s]", "velocity up"),
+        ("up_velocity", "velocity up"), ("vel_d_m_s", "velocity down"),
+        ("sd_north", "sd north"), ("sd_east_m", "sd east"), ("sd_down", "sd down"),
+        ("sd_up", "sd down"), ("latitude_sd", "sd north"), ("longitude_sd", "sd east"),
+        ("height_sd", "sd down"), ("sd_velocity_north", "sd velocity north"),
+        ("sd_vn", "sd velocity north"), ("sd_vu", "sd velocity down"),
+        ("north", ""), ("temperature", ""), ("velocity", ""), ("latitude_velocity", ""),
+        ("sd_horizontal", "sd north,sd east"), ("number of satellites", ""),
+    ],
+)  # fmt: skip
+def test_what_a_column_of_fixes_holds(name, quantity):
+    assert ",".join(_quantities(name)) == quantity

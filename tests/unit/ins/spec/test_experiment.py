@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins.field import measured
 from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.montecarlo.scenario import Scenario
 from gmwm.ins.spec import experiment
 from gmwm.ins.spec.document import read_document
 from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec, experiment_from
+from gmwm.ins.spec.fields import Spec
 from gmwm.process import RandomWalk
 from places import REPOSITORY
+from recorded import assert_as_recorded
 
 MODELS = {"gyro": {"N": 1e-4}, "accel": {"N": 1e-2}}
 LEAST = {
@@ -165,3 +168,53 @@ def test_a_key_that_is_there_twice_is_named_with_its_line(tmp_path: Path) -> Non
     path.write_text("trajectory: car\nrate: 100\nrate: 200\n", "utf-8")
     with pytest.raises(InputError, match="line 3: 'rate' is there twice"):
         read_document(path)
+
+
+def test_a_trajectory_from_a_file(tmp_path: Path) -> None:
+    """It has its own rate, and may be cut to what is in it."""
+    t = 0.1 * np.arange(301)
+    table = np.stack([t, 46 + 1e-5 * t, 7 + 1e-5 * t, 400 + t, 0 * t, 0 * t, 9 * t], axis=-1)
+    header = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
+    np.savetxt(tmp_path / "way.csv", table, "%.12g", ",", header=header, comments="")
+    given = {"trajectory": "way.csv", "truth": MODELS, "filters": {"A": "truth"}}
+    assert experiment_from(given, tmp_path).scenario.trajectory.duration == pytest.approx(30.0)
+    for duration in (12.0, 30.0):
+        cut = experiment_from(given | {"duration": duration}, tmp_path).scenario.trajectory
+        assert cut.duration == pytest.approx(duration)
+        assert cut.dt == pytest.approx(0.1)
+    for wrong, words in (
+        ({"duration": 30.1}, "give at most that"),
+        ({"rate": 10}, "has its own"),
+        ({"trajectory": "gone.csv"}, "is not a file"),
+    ):
+        with pytest.raises(InputError, match=words):
+            experiment_from(given | wrong, tmp_path)
+
+
+def test_recordings_have_the_rate_of_the_trajectory(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    names = "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+    np.savetxt(tmp_path / "imu.csv", rng.normal(size=(1400, 6)), "%.6g", ",", header=names,
+               comments="")  # fmt: skip
+    truth = {"recordings": ["imu.csv"], "rate": 20,
+             "units": {"gyro": "rad/s", "accel": "m/s^2"}}  # fmt: skip
+    given = LEAST | {"truth": truth, "filters": {"A": MODELS}}
+    found = experiment_from(given, tmp_path)
+    assert found.source.available == 2  # of 30 s in 70 s
+    assert found.truth is None
+    with pytest.raises(InputError, match="20 Hz and the trajectory 25 Hz"):
+        experiment_from(given | {"rate": 25}, tmp_path)
+
+
+def test_what_is_not_given_is_as_documented() -> None:
+    defaults = {
+        f"{kind.__name__}.{name}": repr(field.default)
+        for kind in (
+            ExperimentSpec, MeasuredSpec, *(
+                each for module in (experiment, measured) for each in vars(module).values()
+                if isinstance(each, type) and issubclass(each, Spec)
+            ),
+        )
+        for name, field in kind.model_fields.items() if not field.is_required()
+    }  # fmt: skip
+    assert_as_recorded("spec_defaults", defaults)

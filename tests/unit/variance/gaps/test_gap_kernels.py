@@ -5,6 +5,8 @@ import pytest
 
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.process import haar_gain
+from gmwm.variance.gaps import Runs
+from gmwm.variance.gaps.effects import Gaps, window_centres, window_count
 from gmwm.variance.gaps.filling import _deviation, _gain, _nodes
 from gmwm.variance.gaps.kernels import fill, neighbours
 from gmwm.variance.kernels import cumulative
@@ -123,3 +125,33 @@ def test_lobes_that_are_not_resolved_are_replaced_by_their_mean():
             # Twenty lobes about the node, or the node itself.
             near = f[place] + np.linspace(-10.0, 10.0, 20_001) / m * (m > 100.0)
             assert found[place] == pytest.approx(np.mean(haar_gain(m, near)), rel=0.05)
+
+
+def test_only_runs_that_hold_a_window_have_centres():
+    runs = np.array([[0, 3], [5, 20], [30, 37], [40, 48]])
+    assert window_centres(runs, 8).tolist() == [[9, 17], [44, 45]]
+    assert window_count(runs, 8.0) == 9.0
+
+
+def test_gaps_of_a_pattern_by_hand():
+    """Samples missing at 20, at 30 to 32, and at 60 to 231 but for two, an island."""
+    values = np.zeros(400)
+    values[[20, *range(30, 33), *range(60, 142), *range(144, 232)]] = np.nan
+    gaps = Gaps.of(Runs.of(values))
+    assert gaps.edges.tolist() == [[20, 21], [30, 33], [60, 232]]
+    assert gaps.octave.tolist() == [0, 2, 8]  # 1, 3 and 172 samples
+    assert gaps.block.tolist() == [1, 1, 4]  # 172 samples are 43 blocks of four
+    assert gaps.length.tolist() == [1, 3, 43]
+    # Nine samples to the next gap hold boxes to 1, 2, 4 and 8; the single one is passed by far
+    # longer gaps, not by one of three samples.
+    assert gaps.boxes.tolist() == [4, 4, 4]
+    assert (gaps.span, gaps.runs.present, gaps.runs.longest) == (400, 226, 168)
+    assert [gaps.filled(m).tolist() for m in (2.0, 4.0, 8.0, 16.0, 512.0, 1024.0)] == [
+        [False, False, False], [True, False, False], [True, False, False],
+        [True, True, False], [True, True, False], [True, True, True],
+    ]  # fmt: skip
+    assert gaps.joined(4.0).tolist() == [[0, 30], [33, 60], [142, 144], [232, 400]]
+    assert gaps.joined(16.0).tolist() == [[0, 60], [142, 144], [232, 400]]
+    # Of 8 samples in a row, 8 windows cover sample 20; of 32, as many as begin at 0 to 20.
+    assert gaps.covered(4).tolist() == [8 / 8]
+    assert gaps.covered(16).tolist() == [21 / 32, 29 / 32]

@@ -331,3 +331,13 @@ def test_a_sum_keeps_what_larger_numbers_would_swallow():
     for value in (1.0, 1e100, 1.0, -1e100):
         window_kernels.add(total, 0, 1, value)
     assert total.sum() == 2.0
+
+
+def test_parts_of_every_length_are_joined_about_one_reference():
+    """Also where a row of the second holds a single value: it stayed about its own reference."""
+    x = noise(9000, 12, offset=5.0)
+    for size in (*range(1, 12), *range(1023, 1030), *range(2046, 2052), 3071, 3072, 3073, 4097):
+        for first in (2000, 9):
+            part = x[: first + size]
+            one, two = streamed(part[:first]), streamed(part[first:], start=first)
+            assert_same(one.merge(two).result(), streamed(part).result(), rtol=1e-11)
