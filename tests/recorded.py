@@ -1,4 +1,4 @@
-"""Whole results of small inputs against those that were recorded when they were checked.
+"""Whole results of small inputs against those that the code gave before: they notice changes.
 
 What a result holds, however nested, is compared by its path. Of long arrays a few projections are
 kept, which no change of any element leaves as they are. ``RECORD=1 pytest ...`` records anew.

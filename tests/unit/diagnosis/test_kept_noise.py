@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import Recording
+from gmwm.diagnosis import drift, events as shocks
 from gmwm.diagnosis.contamination import (
     Tails,
     _clustering,
@@ -12,15 +13,14 @@ from gmwm.diagnosis.contamination import (
     heavy_tails,
     tails_notice,
 )
-from gmwm.diagnosis.drift import drift_notice, part_means, variance_notice
+from gmwm.diagnosis.drift import part_means
 from gmwm.diagnosis.events import (
     _level,
     _longest_chain,
-    event_notice,
     find_events,
     with_single_outliers,
 )
-from gmwm.diagnosis.innovations import innovations, robust_scale, running_scale
+from gmwm.diagnosis.innovations import Signal, innovations, robust_scale, running_scale
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
 from kept import check, edge, first
 
@@ -29,6 +29,18 @@ NOISE = RNG.normal(size=20_000)
 SHORT = NOISE[:4000]
 WALK = np.cumsum(RNG.normal(size=20_000))
 GYRO = ("gyro_x", "rad/s")
+
+
+def event_notice(name, unit, dt, values, found, scatter):
+    return shocks.event_notice(Signal(name, unit, dt, scatter=scatter), values, found)
+
+
+def variance_notice(name, unit, dt, errors, usable, step, **more):
+    return drift.variance_notice(Signal(name, unit, dt, step), errors, usable, **more)
+
+
+def drift_notice(name, unit, dt, values):
+    return drift.drift_notice(Signal(name, unit, dt), values)
 
 
 def summary(errors):

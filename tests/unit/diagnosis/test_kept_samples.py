@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from gmwm import Channel
-from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis import resolution, samples
+from gmwm.diagnosis.innovations import Signal, innovations
 from gmwm.diagnosis.repeated import (
     held_notice,
     held_share,
@@ -15,25 +16,44 @@ from gmwm.diagnosis.repeated import (
     repetition_notice,
     thinned,
 )
-from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
+from gmwm.diagnosis.resolution import is_coarse, step_size
 from gmwm.diagnosis.samples import (
     _longest_by_chance,
     _slowest_fall,
-    abrupt_end_notice,
     dead_notice,
     gap_notices,
-    hole_notice,
     is_dithered,
     length_notice,
-    repeated_value_notice,
-    saturation_notice,
-    stuck_notice,
 )
 from kept import check, edge, first
 
 NOISE = np.random.default_rng(7).normal(size=20_000)
 SHORT = NOISE[:4000]
 GYRO = ("gyro_x", "rad/s")
+
+
+def stuck_notice(name, unit, dt, values, step, errors):
+    return samples.stuck_notice(Signal(name, unit, dt, step), values, errors)
+
+
+def saturation_notice(name, unit, values, quiet, step):
+    return samples.saturation_notice(Signal(name, unit, step=step), values, quiet)
+
+
+def abrupt_end_notice(name, unit, values, step, scatter):
+    return samples.abrupt_end_notice(Signal(name, unit, 1.0, step, scatter), values)
+
+
+def hole_notice(name, unit, values, step, scatter):
+    return samples.hole_notice(Signal(name, unit, 1.0, step, scatter), values)
+
+
+def repeated_value_notice(name, unit, values, step, scatter):
+    return samples.repeated_value_notice(Signal(name, unit, 1.0, step, scatter), values)
+
+
+def rounding_notice(name, unit, step, scatter, *more):
+    return resolution.rounding_notice(Signal(name, unit, 1.0, step, scatter), *more)
 
 
 def channel(values, name="gyro_x", dt=0.01):
