@@ -58,7 +58,8 @@ def _cell(row: Mapping[str, float], key: str, scale: float) -> str:
 def _lines(width: int, names: Sequence[str], cells: Sequence[Sequence[str]]) -> list[str]:
     """The table, in equal parts beneath each other where it is wider than a page."""
     widths = [max(9, *map(len, column)) for column in zip(*cells, strict=True)]
-    count = -(-sum(each + 1 for each in widths) // (WIDTH - width))
+    room = max(WIDTH - width, 1)  # a name may be as wide as the page
+    count = -(-sum(each + 1 for each in widths) // room)
     size = -(-len(widths) // count)
     return [
         (f"{name:<{width}}" + "".join(f" {row[i]:>{widths[i]}}" for i in part)).rstrip()

@@ -144,17 +144,22 @@ class ArrayTable:
 
     def _column(self, index: int) -> FloatArray:
         like, place = self.arrays[index].like, f"{self.source}, column {label(self.names, index)}"
-        if like.dtype.kind not in "iuf":
-            kind = _KINDS.get(like.dtype.kind, "something else than numbers")
-            raise InputError(f"{place} holds {kind}: save real numbers")
+        _check_real(place, like.dtype)
         if like.ndim != 1:
             raise InputError(f"{place} has shape {like.shape}: save one axis as one column")
         with damage_named(self.source):
             array = self.arrays[index].read()
+        _check_real(place, array.dtype)  # a damaged file may hold other numbers than it declares
         with np.errstate(all="ignore"):  # what leaves the range of float64 is refused below
             values = np.array(array, dtype=np.float64)
         check_usable(place, values, self.where)
         return values
+
+
+def _check_real(place: str, dtype: np.dtype[Any]) -> None:
+    if dtype.kind not in "iuf":
+        kind = _KINDS.get(dtype.kind, "something else than numbers")
+        raise InputError(f"{place} holds {kind}: save real numbers")
 
 
 def check_usable(place: str, values: FloatArray, where: Callable[[int], str]) -> None:
