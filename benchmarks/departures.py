@@ -1,4 +1,4 @@
-"""Steps, transients and slow periods: false alarms, and the sizes that are found.
+"""Steps, pulses, transients and slow periods: false alarms, and the sizes that are found.
 
 Records of two hours at 1 Hz with the white noise of a gyro of 1e-4 rad/s/sqrt(Hz). Sizes are in
 standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
@@ -43,6 +43,7 @@ NOISES = {
 TIME = DT * np.arange(LENGTH)
 KINDS = {
     "step at 0.6": TIME > 0.6 * LENGTH * DT,
+    "pulse of 120 s": (TIME > 0.6 * LENGTH * DT) & (TIME < 0.6 * LENGTH * DT + 120.0),
     "exp(-t/600 s)": np.exp(-TIME / 600.0),
     "drift to 900 s": np.maximum(1.0 - TIME / 900.0, 0.0),
     "period 1500 s": np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0),

@@ -37,7 +37,7 @@ def with_departures(
         replace(notice, source=source if len(sources) > 1 else "")
         for source, there, gone, both in zip(sources, found, removed, curves, strict=True)
         for notice in (
-            *(departure_notice(each, unit, stays=removing) for each in there),
+            *_found_notices(there, unit, removing=removing),
             *(_removed_notice(each, unit) for each in gone),
             *(_taken_notices(gone, *both) if gone else ()),
         )
@@ -72,6 +72,25 @@ def _taken_notices(
     return notices
 
 
+def _found_notices(found: Sequence[Departure], unit: str, *, removing: bool) -> list[Notice]:
+    """Of what was not taken off: where there is so much of it, the slow terms stand for it."""
+    evident = [each for each in found if each.is_evident]
+    if removing or len(evident) <= tuning.MOST_REMOVED:
+        return [departure_notice(each, unit, stays=removing) for each in found]
+    text = (
+        f"{len(evident)} departures: a level that changes so often is noise of the sensor, for "
+        "which the slow terms of the model stand"
+    )
+    values = {"removed": 0, "two_levels": _is_between_two_levels(evident)}
+    many = Notice("departures-many", "warning", "", text, values, "find what switches so")
+    return [many, *(_alone(departure_notice(each, unit)) for each in evident)]
+
+
+def _alone(notice: Notice) -> Notice:
+    """What it is, without what follows from it."""
+    return replace(notice, severity="note", text=notice.text.partition(";")[0], action="")
+
+
 def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
     """Whether three steps in a row go up and down by the same, within their errors."""
     steps = sorted((each.time[0], each.size) for each in removed if each.kind == "step")
@@ -88,10 +107,8 @@ def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
 
 def _removed_notice(found: Departure, unit: str) -> Notice:
     """Of what a fit is without."""
-    notice = departure_notice(found, unit)
-    text = notice.text.partition(";")[0]
-    values = {**notice.values, "removed": True}
-    return replace(notice, severity="note", text=text, values=values, action="taken off")
+    notice = _alone(departure_notice(found, unit))
+    return replace(notice, values={**notice.values, "removed": True}, action="taken off")
 
 
 def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Notice:

@@ -108,23 +108,20 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
                 break
         else:
             basic = _basis(np.vstack([basic, means.differences(best.neighbours)]))
-    # The first were found with those after them in the data.
-    tests = [test for _, test in found]
-    for i, test in enumerate(tests[:-1]):
-        others = [means.differences(each.neighbours) for each in tests if each is not test]
-        known = _basis(np.vstack([basic, *others]))
-        tests[i] = _Test.of(test.family, means, [noise.beside(known) for noise in noises])
-    return tuple(
-        Departure(
-            test.family.kind,
-            test.time,
-            test.size,
-            evidence,
-            _share(test.curve, means.step, fitted),
-            test.phase,
-        )
-        for test, (evidence, _) in zip(tests, found, strict=True)
-    )
+    places = [(*each, *place) for each in found for place in each[1].places(kinds[0])]
+    departed = []
+    # Each was found with those after it in the data.
+    for i, (evidence, whole, family, _) in enumerate(places):
+        others = [means.differences(near) for k, (*_, near) in enumerate(places) if k != i]
+        known = _basis(np.vstack([basic, *others])) if others else basic
+        test = _Test.of(family, means, [noise.beside(known) for noise in noises])
+        curve = whole.curve if whole.family.is_pulse else test.curve
+        share = _share(curve, means.step, fitted)
+        departed += [
+            Departure(family.kind, time, size, evidence, share, test.phase)
+            for time, size in zip(test.times, test.sizes, strict=True)
+        ]
+    return tuple(departed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,50 +227,38 @@ class _Test:
 
     evidence: (G,), logarithm of the evidence of each member.
     weight: (C,), probability of each noise beside the most evident member.
-    sizes, variances: (C, r), of the curves of that member under each noise.
+    estimates, variances: (C, r), of the sizes of that member's curves under each noise.
     """
 
     family: Family
     evidence: FloatArray
     weight: FloatArray
-    sizes: FloatArray
+    estimates: FloatArray
     variances: FloatArray
 
     @classmethod
     def of(cls, family: Family, means: _Means, noises: list[_Noise]) -> _Test:
         data = means.differences(means.blocks)
-        members, rank, _ = family.curves.shape
-        curves = means.differences(family.curves).reshape(members * rank, -1)
+        curves: FloatArray | csr_array = means.differences(family.curves)
         few = csr_array(curves)  # of a step, two differences
         if few.nnz < tuning.FEW * curves.size:
             curves = few
-        alone, scores, products = [], [], []
-        for noise in noises:
-            solved = noise.inverse @ data
-            alone.append(noise.log_weight - 0.5 * float(data @ solved))
-            scores.append((curves @ solved).reshape(members, rank))
-            products.append(_products(curves, noise.inverse, members, rank))
-        score, information = np.array(scores), np.array(products)
-        # A curve that known ones explain has none.
-        information += tuning.NO_INFORMATION * np.max(information) * np.eye(rank)
-        estimate = np.linalg.solve(information, score[..., None])[..., 0]
-        square = np.sum(score * estimate, axis=-1)  # (C, G), chi-square of r degrees of freedom
-        g = tuning.PRIOR_SIZES[:, None, None]
-        gain = logsumexp(-0.5 * rank * np.log1p(g) + 0.5 * square * g / (1.0 + g), axis=0) - np.log(
-            g.size
-        )
+        alone = [each.log_weight - 0.5 * float(data @ each.inverse @ data) for each in noises]
         posterior = np.array(alone) - logsumexp(alone)
-        beside = posterior[:, None] + gain
-        evidence = logsumexp(beside, axis=0)
+        squares = np.array([_squares(family, curves, each, data) for each in noises])
+        beside = posterior[:, None] + _gain(squares, family.rank)
+        evidence = np.asarray(logsumexp(beside, axis=0))
         best = int(np.argmax(evidence))
         weight = np.asarray(np.exp(beside[:, best] - evidence[best]), dtype=float)
-        variances = np.diagonal(np.linalg.inv(information[:, best]), axis1=-2, axis2=-1)
+        rows = means.differences(family.curves[family.members[best]])
+        inverse = [np.linalg.pinv(rows @ noise.inverse @ rows.T) for noise in noises]
+        scores = [rows @ (noise.inverse @ data) for noise in noises]
         return cls(
             family,
-            np.asarray(evidence),
+            evidence,
             weight,
-            np.asarray(estimate[:, best], dtype=float),
-            variances,
+            np.array([each @ score for each, score in zip(inverse, scores, strict=True)]),
+            np.array([np.diag(each) for each in inverse]),
         )
 
     @property
@@ -282,46 +267,110 @@ class _Test:
         return float(logsumexp(self.evidence) - np.log(self.evidence.size))
 
     @property
+    def best(self) -> int:
+        """The most evident member."""
+        return int(np.argmax(self.evidence))
+
+    @property
     def curve(self) -> FloatArray:
         """The most evident member with its size, u, (B,)."""
-        shape = self.family.curves[int(np.argmax(self.evidence))]
-        return np.asarray((self.weight @ self.sizes) @ shape)
+        shape = self.family.curves[self.family.members[self.best]]
+        return np.asarray((self.weight @ self.estimates) @ shape)
 
     @property
     def neighbours(self) -> FloatArray:
-        """The members about the most evident one, whose sum is one between them, (k, B)."""
-        best = int(np.argmax(self.evidence))
-        near = self.family.curves[max(best - tuning.NEAR, 0) : best + tuning.NEAR + 1]
-        return near.reshape(-1, near.shape[-1])
+        """The curves about those of the most evident member; one between them is their sum."""
+        return self._near(self.family.members[self.best])
+
+    def places(self, steps: Family) -> list[tuple[Family, FloatArray]]:
+        """What the most evident member is sought in again, and the curves about it.
+
+        The steps of a pulse one by one, finer and of any sizes; but not where they are so near that
+        the curves about one are those about the other.
+        """
+        ends = self.family.members[self.best]
+        if self.family.is_pulse and np.ptp(ends) > 2 * tuning.NEAR:
+            return [(steps, self._near(end)) for end in ends]
+        return [(self.family, self.neighbours)]
+
+    def _near(self, curves: IntArray) -> FloatArray:
+        of = self.family.curves
+        apart = 2 if self.family.has_phase else 1
+        near = curves.reshape(-1, 1) + apart * np.arange(-tuning.NEAR, tuning.NEAR + 1)
+        return of[np.unique(near[(near >= 0) & (near < len(of))])]
 
     @property
-    def size(self) -> tuple[float, float, float]:
-        """Size of the most evident member and its 95 % interval; an amplitude if it has phases."""
-        each = self.weight @ self.sizes
-        variance = self.weight @ (self.variances + (self.sizes - each) ** 2)
-        if each.size == 1:
-            value, error = float(each[0]), float(np.sqrt(variance[0]))
-            return value, value - WIDE * error, value + WIDE * error
-        value = float(np.hypot(*each))
-        error = float(np.sqrt(each**2 @ variance)) / value
-        return value, max(value - WIDE * error, 0.0), value + WIDE * error
+    def sizes(self) -> list[tuple[float, float, float]]:
+        """Of each departure of the most evident member, and its 95 % interval.
+
+        An amplitude if it has phases.
+        """
+        each = self.weight @ self.estimates
+        variance = self.weight @ (self.variances + (self.estimates - each) ** 2)
+        if self.family.has_phase:
+            value = float(np.hypot(*each))
+            error = float(np.sqrt(each**2 @ variance)) / value
+            return [(value, max(value - WIDE * error, 0.0), value + WIDE * error)]
+        half = WIDE * np.sqrt(variance)
+        ends = ((each - half).tolist(), (each + half).tolist())
+        return list(zip(each.tolist(), *ends, strict=True))
 
     @property
     def phase(self) -> float:
         """Of the most evident member, rad; 0 if it has none."""
-        each = self.weight @ self.sizes
-        return float(np.arctan2(each[1], each[0])) if each.size > 1 else 0.0
+        each = self.weight @ self.estimates
+        return float(np.arctan2(each[1], each[0])) if self.family.has_phase else 0.0
 
     @property
-    def time(self) -> tuple[float, float, float]:
-        """Of the most evident member, and the interval that holds 95 % of the evidence, s."""
-        order = np.argsort(self.family.times)
-        times = self.family.times[order]
-        edges = np.concatenate([times[:1], 0.5 * (times[1:] + times[:-1]), times[-1:]])
-        sums = np.cumsum(np.exp(self.evidence - logsumexp(self.evidence))[order])
-        low, high = np.searchsorted(sums, [0.025, 0.975])
-        best = float(self.family.times[int(np.argmax(self.evidence))])
-        return best, float(edges[low]), float(edges[min(high, order.size - 1) + 1])
+    def times(self) -> list[tuple[float, float, float]]:
+        """Of each departure of the most evident member, and what holds 95 % of the evidence, s."""
+        share = np.exp(self.evidence - logsumexp(self.evidence))
+        return [_time(each, share, float(each[self.best])) for each in self.family.times.T]
+
+
+def _time(times: FloatArray, share: FloatArray, best: float) -> tuple[float, float, float]:
+    """One of them, and the ends of the middle 95 %."""
+    different, which = np.unique(times, return_inverse=True)
+    middles = 0.5 * (different[1:] + different[:-1])
+    edges = np.concatenate([different[:1], middles, different[-1:]])
+    sums = np.cumsum(np.bincount(which, share))
+    low, high = np.searchsorted(sums, [0.025, 0.975])
+    return best, float(edges[low]), float(edges[min(high, different.size - 1) + 1])
+
+
+def _squares(
+    family: Family, curves: FloatArray | csr_array, noise: _Noise, data: FloatArray
+) -> FloatArray:
+    """Chi-square that each member takes away, (G,): a pulse with one size, up and back.
+
+    curves: (M, D), differences of those of the family.
+    """
+    solved = np.asarray(curves @ noise.inverse)
+    scores = solved @ data
+    information = np.asarray((curves * solved).sum(axis=1))
+    # A curve that known ones explain has none.
+    least = tuning.NO_INFORMATION * np.max(information)
+    first = family.members[:, 0]
+    a, s = information[first] + least, scores[first]
+    if family.members.shape[1] == 1:
+        return np.asarray(s**2 / a)
+    second = family.members[:, 1]
+    b, c, t = np.asarray(curves @ solved.T)[first, second], information[second], scores[second]
+    if family.is_pulse:
+        return np.asarray((s - t) ** 2 / (a + c - 2.0 * b))
+    c = c + least
+    return np.asarray((c * s**2 - 2.0 * b * s * t + a * t**2) / (a * c - b**2))
+
+
+def _gain(square: FloatArray, rank: int) -> FloatArray:
+    """Logarithm of a Bayes factor, averaged over g, from the chi-square of so many curves.
+
+    It is nearly linear: read from a table to 1e-6.
+    """
+    table = np.linspace(0.0, np.sqrt(np.max(square)), tuning.TABLE) ** 2
+    g = tuning.PRIOR_SIZES[:, None]
+    each = -0.5 * rank * np.log1p(g) + 0.5 * table * g / (1.0 + g)
+    return np.interp(square, table, logsumexp(each, axis=0) - np.log(g.size))
 
 
 def _basis(rows: FloatArray) -> FloatArray:
@@ -330,17 +379,6 @@ def _basis(rows: FloatArray) -> FloatArray:
         rows / np.linalg.norm(rows, axis=1)[:, None], full_matrices=False
     )
     return np.asarray(basis[sizes > tuning.SPANNED * sizes[0]])
-
-
-def _products(
-    curves: FloatArray | csr_array, inverse: FloatArray, members: int, rank: int
-) -> FloatArray:
-    """Of the curves of each member with each other, (G, r, r)."""
-    solved = np.asarray(curves @ inverse)
-    if isinstance(curves, csr_array):
-        return np.asarray(curves.multiply(solved).sum(axis=1)).reshape(members, 1, 1)
-    each, other = (rows.reshape(members, rank, -1) for rows in (curves, solved))
-    return np.asarray(each @ other.swapaxes(-1, -2))
 
 
 def _share(curve: FloatArray, step: float, fitted: Fit) -> float:

@@ -77,6 +77,9 @@ WALK_AT = 0.25
 PRIOR_SIZES = 4.0 ** np.arange(2.0, 12.0)
 """g: squares of the size beforehand, over the variance of its estimate."""
 
+TABLE = 4096
+"""Points of the Bayes factor of a chi-square, even in its root."""
+
 RATIO_OF_TIMES = 1.2
 """Of neighbouring time constants and ends."""
 

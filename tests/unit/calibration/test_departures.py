@@ -314,6 +314,32 @@ def test_a_pulse_is_two_steps_of_one_size_and_both_are_removed():
     assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)
 
 
+@pytest.mark.parametrize(("start", "stop"), [(3000.0, 3120.0), (5004.0, 6100.0), (3010.0, 3040.0)])
+def test_a_pulse_whose_steps_are_not_evident_alone(start, stop):
+    # A Gauss-Markov process follows it, which then predicts twice the deviation for minutes.
+    size = 2.2 * SAMPLE / np.sqrt(stop - start)  # 20 standard errors of its mean
+    x = noise(19, WHITE) + size * ((start < TIME) & (stop > TIME))
+    found = departures(fitted(x, WhiteNoise() + GaussMarkov()))
+    assert [each.kind for each in found] == ["step", "step"]
+    up, down = sorted(found, key=lambda each: each.time[0])
+    assert up.is_evident and down.is_evident
+    assert up.time[1] - 30.0 <= start <= up.time[2]
+    assert down.time[1] <= stop <= down.time[2] + 30.0
+    if stop - start > 60.0:  # longer than blocks
+        assert up.size[1] < size < up.size[2]
+        assert down.size[1] < -size < down.size[2]
+    fit = gmwm.calibrate(recording(x), WhiteNoise(), remove_departures=True)["gyro_x"]
+    assert fit.valid
+    assert fit.params["N"] == pytest.approx(1e-4, rel=0.02)
+
+
+def test_a_pulse_of_two_sizes_keeps_them():
+    x = noise(20, WHITE) + 0.4 * SAMPLE * ((TIME > 2000.0) - 0.6 * (TIME > 4000.0))
+    up, down = sorted(departures(fitted(x)), key=lambda each: each.time[0])
+    assert up.size[0] == pytest.approx(0.4 * SAMPLE, rel=0.03)
+    assert down.size[0] == pytest.approx(-0.24 * SAMPLE, rel=0.03)
+
+
 def test_what_was_taken_off_is_what_the_model_lacks():
     # One step of a telegraph bias looks like an accident, and is no less of its error.
     rec = recording(noise(10, WHITE) + 0.4 * SAMPLE * STEP)
@@ -358,5 +384,11 @@ def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
     (notice,) = [one for one in fit.notices if one.code == "departures-many"]
     assert notice.values["removed"] == len([n for n in fit.notices if n.values.get("evident")])
     assert [name for name, holds in fit.reasons.items() if not holds] == ["stationary"]
-    # A slow term describes it, and nothing needs to be taken off.
-    assert gmwm.calibrate(rec, WhiteNoise() + RandomWalk(), screening=())["gyro_x"].valid
+    # A slow term stands for it, and nothing needs to be taken off.
+    fit = gmwm.calibrate(rec, WhiteNoise() + RandomWalk(), screening=())["gyro_x"]
+    assert fit.valid
+    (notice,) = [one for one in fit.notices if one.code == "departures-many"]
+    assert (notice.severity, notice.values["removed"]) == ("warning", 0)
+    steps = [one for one in fit.notices if one.code == "step"]
+    assert len(steps) > 4
+    assert {(one.severity, one.action) for one in steps} == {("note", "")}

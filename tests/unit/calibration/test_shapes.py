@@ -8,10 +8,13 @@ from gmwm.calibration.shapes import families
 
 BLOCKS, STEP, FINE = 40, 0.5, 400
 T = (np.arange(BLOCKS * FINE) + 0.5) / FINE  # in blocks
-FAMILIES = {family.kind: family for family in families(BLOCKS, STEP)}
+FAMILIES = {
+    "pulse" if family.is_pulse else family.kind: family for family in families(BLOCKS, STEP)
+}
 
 SHAPES = {
     "step": lambda at: [at < T],
+    "pulse": lambda at, until: [(at < T) & (until > T)],
     "transient": lambda tau: [np.exp(-T / tau)],
     "drift-at-start": lambda end: [np.where(end > T, T / end - 1.0, 0.0)],
     "slow-period": lambda length: [
@@ -24,9 +27,11 @@ SHAPES = {
 @pytest.mark.parametrize("kind", SHAPES)
 def test_block_means_are_those_of_the_shape(kind):
     family = FAMILIES[kind]
-    assert family.curves.shape[0] == family.times.size
-    for time, curves in zip(family.times, family.curves, strict=True):
-        expected = np.array(SHAPES[kind](time / STEP), dtype=float).reshape(-1, BLOCKS, FINE)
+    assert len(family.members) == len(family.times)
+    for member, times in enumerate(family.times):
+        curves = family.curves[family.members[member]]
+        curves = curves[:1] - curves[1:] if kind == "pulse" else curves
+        expected = np.array(SHAPES[kind](*times / STEP), dtype=float).reshape(-1, BLOCKS, FINE)
         expected = expected.mean(axis=2)
         if kind == "drift-at-start":  # up to a sign and a level, as a slope
             curves, expected = (each / np.ptp(each) for each in (curves, np.abs(expected)))
@@ -36,11 +41,15 @@ def test_block_means_are_those_of_the_shape(kind):
 
 @pytest.mark.parametrize(
     ("kind", "low", "high"),
-    [("step", 1.0, 39.0), ("transient", 1.0, 40 / 3), ("drift-at-start", 4.0, 80 / 3),
+    [("step", 1.0, 39.0), ("pulse", 1.0, 39.0),
+     ("transient", 1.0, 40 / 3), ("drift-at-start", 4.0, 80 / 3),
      ("slow-period", 40 / (tuning.MOST_CYCLES - 0.25), 20.0), ("drift", 40.0, 40.0)],
 )  # fmt: skip
 def test_times_reach_over_the_record(kind, low, high):
-    times = FAMILIES[kind].times / STEP
+    times = FAMILIES[kind].times[:, 0] / STEP
+    if kind == "pulse":
+        times = np.unique(FAMILIES[kind].times / STEP)
+        assert len(FAMILIES[kind].times) == times.size * (times.size - 1) // 2
     assert np.min(times) == pytest.approx(low) and np.max(times) == pytest.approx(high)
     if kind in ("transient", "drift-at-start"):
         ratios = times[1:] / times[:-1]
@@ -48,3 +57,5 @@ def test_times_reach_over_the_record(kind, low, high):
         assert ratios[0] == pytest.approx(tuning.RATIO_OF_TIMES, rel=0.3)
     elif kind == "step":
         np.testing.assert_allclose(np.diff(times), 0.5)
+    elif kind == "pulse":
+        np.testing.assert_allclose(np.diff(times), 1.0)
