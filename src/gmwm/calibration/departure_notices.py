@@ -92,12 +92,14 @@ def _alone(notice: Notice) -> Notice:
 
 
 def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
-    """Whether three steps in a row go up and down by the same, within their errors."""
+    """Whether three steps in a row, of sizes that are well known, go up and down by the same."""
     steps = sorted((each.time[0], each.size) for each in removed if each.kind == "step")
     sizes = np.array([size * (-1) ** i for i, (_, (size, _, _)) in enumerate(steps)])
     errors = np.array([(high - low) / (2.0 * WIDE) for _, (_, low, high) in steps])
     for i in range(sizes.size - 2):
         three, weights = sizes[i : i + 3], errors[i : i + 3] ** -2.0
+        if np.any(errors[i : i + 3] > tuning.WELL_KNOWN * np.abs(three)):
+            continue
         rest = three - np.average(three, weights=weights)
         alike = chi2.sf(float(weights @ rest**2), 2) > tuning.OTHER_SIZE
         if alike and abs(float(np.sum(np.sign(three)))) == three.size:

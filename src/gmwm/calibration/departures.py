@@ -16,6 +16,7 @@ Kass & Raftery (1995), *JASA* 90, 773-795; Liang et al. (2008), *JASA* 103, 410-
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -51,7 +52,8 @@ class Departure:
     size: Height of the step; of the transient or the drift at the start of the record; amplitude of
         the period; and the ends of its 95 % interval, u.
     evidence: Ratio of the probability of the data with it to that without.
-    share: Largest fraction of the wavelet variance of the model that it accounts for.
+    share: Largest fraction of the wavelet variance of the model that it accounts for; of a pulse,
+        that both its steps do.
     phase: Of a period, ``size cos(2 pi t / time - phase)``, rad.
     """
 
@@ -94,9 +96,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     for _ in range(tuning.MOST_DEPARTURES):
         beside = [noise.beside(known) for noise in noises]
         tests = [_Test.of(family, means, beside) for family in kinds]
-        # Each kind is as likely beforehand.
-        log_evidence = float(logsumexp([test.log_evidence for test in tests])) - np.log(len(tests))
-        evidence = float(np.exp(min(log_evidence, tuning.LARGEST_LOG_EVIDENCE)))
+        evidence = _evidence(tests)
         best = max(tests, key=lambda test: test.log_evidence)
         if evidence < tuning.POSSIBLE:
             break
@@ -115,7 +115,11 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
         others = [means.differences(near) for k, (*_, near) in enumerate(places) if k != i]
         known = _basis(np.vstack([basic, *others])) if others else basic
         test = _Test.of(family, means, [noise.beside(known) for noise in noises])
-        curve = whole.curve if whole.family.is_pulse else test.curve
+        curve = test.curve
+        if whole.family.is_pulse and not family.is_pulse:
+            curve, evidence = whole.curve, min(evidence, _evidence([test]))
+        if evidence < tuning.POSSIBLE:
+            continue  # what came back was no step
         share = _share(curve, means.step, fitted)
         departed += [
             Departure(family.kind, time, size, evidence, share, test.phase)
@@ -285,12 +289,14 @@ class _Test:
     def places(self, steps: Family) -> list[tuple[Family, FloatArray]]:
         """What the most evident member is sought in again, and the curves about it.
 
-        The steps of a pulse one by one, finer and of any sizes; but not where they are so near that
-        the curves about one are those about the other.
+        The steps of a pulse one by one, finer and of any sizes, where the pulse may have them; but
+        not where they are so near that the curves about one are those about the other.
         """
         ends = self.family.members[self.best]
         if self.family.is_pulse and np.ptp(ends) > 2 * tuning.NEAR:
-            return [(steps, self._near(end)) for end in ends]
+            spans = [(low, high) for _, low, high in self.times]
+            near = [self._near(end) for end in ends]
+            return [(steps.within(*span), each) for span, each in zip(spans, near, strict=True)]
         return [(self.family, self.neighbours)]
 
     def _near(self, curves: IntArray) -> FloatArray:
@@ -371,6 +377,12 @@ def _gain(square: FloatArray, rank: int) -> FloatArray:
     g = tuning.PRIOR_SIZES[:, None]
     each = -0.5 * rank * np.log1p(g) + 0.5 * table * g / (1.0 + g)
     return np.interp(square, table, logsumexp(each, axis=0) - np.log(g.size))
+
+
+def _evidence(tests: Sequence[_Test]) -> float:
+    """Averaged over kinds, each of which is as likely beforehand."""
+    found = float(logsumexp([test.log_evidence for test in tests])) - np.log(len(tests))
+    return float(np.exp(min(found, tuning.LARGEST_LOG_EVIDENCE)))
 
 
 def _basis(rows: FloatArray) -> FloatArray:

@@ -31,6 +31,11 @@ class Family:
         members = np.arange(curves.size // curves.shape[-1]).reshape(len(times), -1)
         return cls(kind, times[:, None], curves.reshape(-1, curves.shape[-1]), members)
 
+    def within(self, low: float, high: float) -> Family:
+        """Its members of times between two."""
+        some = np.all((low <= self.times) & (high >= self.times), axis=1)
+        return Family(self.kind, self.times[some], self.curves, self.members[some])
+
     @property
     def is_pulse(self) -> bool:
         """Whether each member is a step and the same back."""

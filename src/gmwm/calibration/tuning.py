@@ -56,6 +56,9 @@ OTHER_SIZE = 1e-3
 """Chance of three steps up and down between two levels to differ by as much: of two levels, steps
 have one size (benchmarks/departures.py jumps)."""
 
+WELL_KNOWN = 0.1
+"""Relative standard error of sizes up to which it says something that three are the same."""
+
 MOST_MEANS = 256
 """Block means; dense matrices of them are made."""
 

@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gmwm._core.text import per_cent
 from gmwm.calibration import Calibration
 from gmwm.estimate import Fit
+from gmwm.process import Model
 from gmwm.report.numbers import SHOWN
 from gmwm.report.text import duration_text
 
 _AIM = 0.1  # relative standard error of a deviation or a parameter that is well enough known
 
 
-def known_at(fit: Fit, tau: float) -> float:
-    """Relative standard error of the model's Allan deviation at an averaging time."""
+def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
+    """Relative standard error of the model's Allan deviation at an averaging time.
+
+    rivals: Models that describe the data as well: as far as the farthest of them.
+    """
     if not fit.keys or fit.wv.dt > tau:
         return float("nan")
     with np.errstate(all="ignore"):
-        value, _, upper = fit.deviation_interval(np.array([tau]), 0.6827)
-    return float(upper[0] / value[0] - 1.0) if value[0] > 0.0 else float("nan")
+        value, lower, upper = fit.deviation_interval(np.array([tau]), 0.6827, rivals)
+    if not value[0] > 0.0:
+        return float("nan")
+    return float(max(upper[0] / value[0], value[0] / lower[0]) - 1.0)
 
 
 def _known(calibration: Calibration, horizon: float) -> Mapping[str, float]:
-    known = {name: known_at(fit, horizon) for name, fit in calibration.items()}
+    known = {
+        name: known_at(fit, horizon, calibration.rivals.get(name, ()))
+        for name, fit in calibration.items()
+    }
     return {name: each for name, each in known.items() if np.isfinite(each)}
 
 

@@ -231,6 +231,16 @@ def test_curves_add_up():
     assert np.all((low < value) & (value < high))
 
 
+def test_the_interval_of_a_deviation_reaches_over_models_that_tie():
+    fit = example_fit()
+    tau = np.array([1.0, 100.0])
+    value, low, high = fit.deviation_interval(tau)
+    double = fit.model.with_params({key: 2.0 * fit.params[key] for key in fit.keys})
+    both = fit.deviation_interval(tau, rivals=[double])
+    expected = np.sqrt(2.0 * double.haar_variance(tau, fit.wv.dt)) * high / value
+    np.testing.assert_allclose(both, [value, low, expected], rtol=1e-9)
+
+
 def test_plot_shows_data_model_and_components():
     axes = example_fit().plot()
     labels = [text.get_text() for text in axes.get_legend().get_texts()]

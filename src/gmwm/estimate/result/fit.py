@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -272,15 +272,21 @@ class Fit(Document, Printed):
         return FittedMoments.of(self.model, self.wv, self.keys, slope_error, self.discrepancy)
 
     def deviation_interval(
-        self, tau: FloatArray, level: float = 0.95
+        self, tau: FloatArray, level: float = 0.95, rivals: Sequence[Model] = ()
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Allan deviation of the fitted model with its interval, at any averaging times.
+
+        It holds if the model is the right one. Where others describe the data as well, which is
+        frequent beyond a tenth of the record, give them: the interval then reaches over all.
 
         Parameters
         ----------
         tau : array_like
             Averaging times, s.
         level : float, optional
+        rivals : sequence of Model, optional
+            Others with their values (`Calibration.rivals`, `Selection.rivals`); each counts with
+            the relative error of this one.
 
         Returns
         -------
@@ -304,7 +310,8 @@ class Fit(Document, Printed):
         spread = np.sqrt(np.einsum("ij,ik,kj->j", gradient, self.covariance, gradient))
         value = np.sqrt(2.0 * curve)
         ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
-        return value, value / ratio, value * ratio
+        all_ = np.array([value, *(np.sqrt(2.0 * scales.curve(each)) for each in rivals)])
+        return value, np.min(all_, axis=0) / ratio, np.max(all_, axis=0) * ratio
 
     # -- looks ------------------------------------------------------------------------------------
 
