@@ -43,20 +43,35 @@ def read_document(path: Path) -> dict[str, Any]:
 def _load(text: str) -> Any:
     import yaml
 
-    # PyYAML has no types of its own; with types-PyYAML installed there is nothing to ignore.
-    class Strict(yaml.SafeLoader):  # type: ignore[misc,unused-ignore]
-        """YAML lets a later key replace an earlier one; two filters of one name are a slip."""
+    loader = yaml.SafeLoader(text)
+    try:
+        node = loader.get_single_node()
+        _check_keys(node, set())
+        return None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
 
-        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            seen: set[str] = set()
-            for key, _ in node.value:
-                name = str(key.value)
-                if key.tag != "tag:yaml.org,2002:merge" and name in seen:
-                    raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
-                seen.add(name)
-            return super().construct_mapping(node, deep)
 
-    return yaml.load(text, Loader=Strict)
+def _check_keys(node: Any, checked: set[int]) -> None:
+    """YAML lets a later key replace an earlier one; two filters of one name are a slip.
+
+    checked: Nodes that were; an alias is the node that it stands for.
+    """
+    if node is None or isinstance(node.value, str) or id(node) in checked:
+        return
+    checked.add(id(node))
+    seen: set[str] = set()
+    for item in node.value:
+        if not isinstance(item, tuple):
+            _check_keys(item, checked)
+            continue
+        key, value = item
+        name = str(key.value)
+        if key.tag != "tag:yaml.org,2002:merge" and name in seen:
+            raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
+        seen.add(name)
+        _check_keys(key, checked)
+        _check_keys(value, checked)
 
 
 def _reason(error: Exception) -> str:
