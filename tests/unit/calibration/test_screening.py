@@ -2,12 +2,13 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from gmwm import Resonance, Sinusoid, WhiteNoise
+from gmwm import Channel, Recording, Resonance, Sinusoid, WhiteNoise
 from gmwm._core.notices import Notice
 from gmwm.calibration import tuning
-from gmwm.calibration.screening import _is_much, terms_of, with_outcomes
+from gmwm.calibration.screening import _is_much, stretches_at_rest, terms_of, with_outcomes
 from gmwm.process import as_model
 
 LINES = [(10.0 + k, 1.0 - 0.1 * k) for k in range(tuning.MOST_TERMS + 2)]
@@ -49,3 +50,23 @@ def test_events_are_much_beyond_a_share():
     most = round(tuning.MOST_LEFT_OUT * 1000)
     assert not _is_much([(0, most - 5), (100, 105)], 1000)
     assert _is_much([(0, most - 5), (100, 106)], 1000)
+
+
+def test_of_two_rates_each_has_its_stretches_at_rest():
+    rng = np.random.default_rng(1)
+    slow, fast = 1e-3 * rng.standard_normal(12_000), 1e-3 * rng.standard_normal(24_000)
+
+    def recording(values):
+        channels = (Channel("gyro_x", values, 0.01, "gyro", "rad/s"),
+                    Channel("gyro_y", fast, 0.005, "gyro", "rad/s"))  # fmt: skip
+        return Recording(channels, "log.csv")
+
+    still = recording(slow)
+    assert stretches_at_rest(still) == (still,)
+    moving = slow + np.where(np.abs(np.arange(slow.size) - 6000) < 1000, 0.5, 0.0)
+    parts = [
+        (part.n, part.inertial[0].name, part.rate) for part in stretches_at_rest(recording(moving))
+    ]
+    assert parts[-1] == (24_000, "gyro_y", 200.0)
+    assert [part[1:] for part in parts[:-1]] == [("gyro_x", 100.0)] * 2
+    assert all(4000 < part[0] < 5000 for part in parts[:-1])

@@ -33,6 +33,16 @@ def test_no_model_of_the_region_is_far_above_those_found(resonant):
     assert np.max(largest / estimate) > 1.1
 
 
+def test_a_parameter_goes_to_the_ends_of_its_interval_in_even_ratios(resonant):
+    region = ParameterRegion.of(resonant, 0.95)
+    for i, key in enumerate(region.keys):
+        centre, low, high = resonant.params[key], region.lower[i], region.upper[i]
+        assert 0.0 < low < centre < high
+        ways = [region.value(i, along) for along in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+        between = [np.sqrt(centre * low), centre, np.sqrt(centre * high)]
+        assert ways == pytest.approx([low, *between, high])
+
+
 def test_the_gradient_is_that_of_the_density(resonant):
     region = ParameterRegion.of(resonant, 0.95)
     spectrum = module._Spectrum.of(region, DT)

@@ -8,6 +8,7 @@ import pytest
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import tuning
+from gmwm.ins.filter import filter_kernels
 from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss
 from gmwm.ins.filter.filter import navigate
 from gmwm.ins.imu.emulation import emulate
@@ -35,6 +36,26 @@ def drive():
 def fixes(drive):
     """A position a second with noise of 1 m, the seeds of the tests beside it."""
     return gnss(drive[0], position_sd=1.0).noisy(np.random.default_rng(2))
+
+
+def test_a_gate_opens_after_so_many_in_a_row_and_closes_after_as_many():
+    """Of one kind; others keep their own count."""
+    rejected, patience = np.array([7, 0]), tuning.GATE_PATIENCE
+
+    def seen(squares, *, gated=True):
+        return filter_kernels._is_accepted(squares, 9.0, gated, 1, rejected), int(rejected[1])
+
+    for count in range(1, patience):
+        assert seen(9.1) == (False, count)
+    assert seen(9.0) == (True, 0)  # not in a row
+    for _ in range(patience - 1):
+        seen(9.1)
+    assert seen(9.1) == (False, 2 * patience)
+    assert seen(9.1, gated=False) == (True, 2 * patience)
+    for count in range(2 * patience - 1, patience - 1, -1):
+        assert seen(8.9, gated=False) == (True, count)
+    assert seen(8.9) == (True, 0)
+    assert rejected[0] == 7
 
 
 def outlying(aiding, rows, size):
