@@ -80,8 +80,8 @@ WALK_AT = 0.25
 PRIOR_SIZES = 4.0 ** np.arange(2.0, 12.0)
 """g: squares of the size beforehand, over the variance of its estimate."""
 
-TABLE = 4096
-"""Points of the Bayes factor of a chi-square, even in its root."""
+TABLE = 8192
+"""Points at which the Bayes factor of a chi-square is computed."""
 
 RATIO_OF_TIMES = 1.2
 """Of neighbouring time constants and ends."""
@@ -104,6 +104,9 @@ SPANNED = 1e-6
 
 FEW = 0.05
 """Fraction of differences that are not zero, below which those of a family are kept as sparse."""
+
+NO_EVIDENCE = 30.0
+"""Logarithm by which a noise explains less than another, beyond which it counts no more (1e-13)."""
 
 LARGEST_LOG_EVIDENCE = 700.0
 """Whose exponential is a number."""
