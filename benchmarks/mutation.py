@@ -14,6 +14,7 @@ The folder keeps results; a second call goes on with what is there.
 from __future__ import annotations
 
 import argparse
+import ast
 import contextlib
 import json
 import os
@@ -73,6 +74,13 @@ def mutants_of(path: Path, tree: Path) -> Iterator[Mutant]:
             yield Mutant(str(path.relative_to(tree)), name, occurrence, line, column)
 
 
+def _is_change(mutant: Mutant, tree: Path) -> bool:
+    """Whether it is one: 1e60 + 1 is 1e60."""
+    source = (tree / mutant.path).read_text()
+    changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
+    return ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source))
+
+
 def drawn(tree: Path, count: int, seed: int, rooms: Sequence[str] = ROOMS) -> list[Mutant]:
     """As many of each room; at most one of each place in the source."""
     rng = np.random.default_rng(seed)
@@ -84,7 +92,7 @@ def drawn(tree: Path, count: int, seed: int, rooms: Sequence[str] = ROOMS) -> li
         for k in rng.permutation(len(everything)):
             mutant = everything[k]
             place = (mutant.path, mutant.line, mutant.column)
-            if place not in seen:
+            if place not in seen and _is_change(mutant, tree):
                 seen.add(place)
                 chosen.append(mutant)
             if len(seen) == -(-count // len(rooms)):
