@@ -279,7 +279,7 @@ def test_absurd_steps(timed, step, name, rate):
 
 def test_time_by_name_index_or_not_at_all(write, samples):
     slow, fast = np.arange(80) / 10.0, np.arange(80) / 50.0
-    path = write(np.column_stack([slow, fast, samples[:, 0]]), "time,when,gx")
+    path = write(np.column_stack([slow, fast, 1e-3 * samples[:, 0]]), "time,when,gx")
     assert read(path, units=UNITS).rate == pytest.approx(10)
     assert read(path, units=UNITS, time="when").rate == pytest.approx(50)
     assert read(path, units=UNITS, time=1).rate == pytest.approx(50)
