@@ -7,6 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
+from gmwm.readers.clock import change_notice
 from gmwm.readers.clock.jumps import find_change
 
 
@@ -149,6 +150,14 @@ def test_a_rate_that_changes(long):
     assert found.values["after"] == pytest.approx(71.0, rel=1e-3)
     assert found.values["time"] == pytest.approx(60.0, abs=0.1)
     assert "from 100 to 71 Hz at about 60 s" in found.text
+
+
+@pytest.mark.parametrize(
+    ("rates", "said"),
+    [((100.0, 71.0), "100 to 71"), ((50.0, 49.9962), "50 to 49.996"), ((50.0, 50.0), "50 to 50")],
+)
+def test_rates_have_the_digits_in_which_they_differ(rates, said):
+    assert f"goes from {said} Hz near line 5" in change_notice(rates, 50.0, "line 5").text
 
 
 @pytest.mark.parametrize("then", [50.0, 30.0, 200.0, 300.0])
