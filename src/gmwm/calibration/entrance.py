@@ -38,6 +38,9 @@ from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.variance import MIN_SAMPLES
 
+_TAKING = ("sentinel", "event", "outliers", "held")
+"""Codes of notices of what makes samples missing."""
+
 
 @one_blas_thread()
 def calibrate(
@@ -264,7 +267,7 @@ def _usable(
         for channel in each.recording.inertial:
             straight = (n for n in each.notices if n.code == "interpolated")
             why = next((n for n in straight if n.where == channel.name), None)
-            why = why or _reason_to_skip(channel)
+            why = why or _reason_to_skip(channel, each.notices)
             if why is not None:
                 dead.setdefault(channel.name, why)
             else:
@@ -287,12 +290,15 @@ def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) 
     )
 
 
-def _reason_to_skip(channel: Channel) -> Notice | None:
-    """Why a channel is skipped, if it is."""
+def _reason_to_skip(channel: Channel, notices: Iterable[Notice]) -> Notice | None:
+    """Why a channel is skipped, if it is; of missing samples, what took them, if that was said."""
+    if channel.is_constant and channel.missing <= channel.n / 2:
+        text = f"constant at {channel.mean:.6g} {channel.unit}"
+        return Notice("constant", "bad", channel.name, text, {"missing": channel.missing})
+    why = mostly_missing(channel.name, channel.missing, channel.n)
+    if why is None:
+        return None
     if channel.missing == channel.n:
-        code, text = "all-missing", "all samples missing"
-    elif channel.is_constant and channel.missing <= channel.n / 2:
-        code, text = "constant", f"constant at {channel.mean:.6g} {channel.unit}"
-    else:
-        return mostly_missing(channel.name, channel.missing, channel.n)
-    return Notice(code, "bad", channel.name, text, {"missing": channel.missing})
+        why = replace(why, code="all-missing", text="all samples missing")
+    causes = (n.text for n in notices if n.where == channel.name and n.code in _TAKING)
+    return replace(why, text=": ".join([why.text, *causes]))

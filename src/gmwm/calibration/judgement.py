@@ -13,8 +13,12 @@ _SPOILING = {
     "not-static": ("gyro", "accel"),
     "tilt": ("accel",),
     "rate-changes": ("gyro", "accel"),
+    "counts": ("gyro", "accel"),
+    "gravity": ("gyro", "accel"),
+    "swapped": ("gyro", "accel"),
 }
-"""Codes of issues of a whole recording that make the fits of some sensors invalid."""
+"""Codes of issues of a recording, or of a sensor, that make fits invalid where bad, and of which
+sensors."""
 
 _SPOILING_CHANNEL = frozenset(
     {
@@ -102,9 +106,13 @@ def judged(
     issues: Of the recordings and their channels.
     still: Whether a recording that was not static is an issue.
     """
-    spoiling = {issue.code: issue for issue in issues if issue.code in _SPOILING}
+    spoiling = {
+        (issue.code, issue.where): issue
+        for issue in issues
+        if issue.code in _SPOILING and issue.severity == "bad"
+    }
     if not still:
-        spoiling.pop("not-static", None)  # as the caller says
+        spoiling.pop(("not-static", ""), None)  # as the caller says
     return {
         name: each
         if isinstance(each, Notice)
@@ -116,7 +124,7 @@ def judged(
 def _of_sensor(found: ChannelModel, spoiling: Iterable[Notice]) -> list[Notice]:
     """Those issues of the whole recording that concern its sensor."""
     sensor = found.fit.wv.quantity or "gyro"
-    return [issue for issue in spoiling if sensor in _SPOILING[issue.code]]
+    return [e for e in spoiling if sensor in _SPOILING[e.code] and e.where in ("", sensor)]
 
 
 def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:

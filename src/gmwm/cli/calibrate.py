@@ -49,7 +49,7 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 
 _OF_RECORDING = (
     "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance",
+    "held", "filled", "value-repeated", "variance", "counts", "gravity", "swapped",
 )  # fmt: skip
 """Codes of notices of a fit that are those of the recording."""
 

@@ -32,6 +32,8 @@ HINTS = {
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "sensor-absent": "record them too, or calibrate the rest alone, --channels {sensor}",
+    "sensors-in-turns": "keep the rows of one, or, if there is but one, --rate {rate:.6g} "
+    "--time none",
     "time-unit": "--rate {rate:.6g}, or name the column {column}",
     "topic": "--topic NAME",
     "topics-apart": "--topic NAME or --clock log",

@@ -19,6 +19,7 @@ from gmwm.diagnosis.contamination import (
     contamination,
     contamination_notice,
     heavy_tails,
+    light_tails_notice,
     tails_notice,
 )
 from gmwm.diagnosis.drift import drift_notice, variance_notice
@@ -226,15 +227,19 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         held = 0.0  # most of what is held is held in a few places
     is_even = held > 0.0 and not leaves_runs(values)
     noise = known_of(quiet)
-    found = [
-        held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
+    ended = (
         saturation_notice(signal, present, noise)
         or abrupt_end_notice(signal, noise)
-        or hole_notice(signal, noise),
+        or hole_notice(signal, noise)
+    )
+    found = [
+        held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
+        ended,
         repeated_value_notice(signal, present),
         event_notice(signal, values, motion.outside(events, dt)),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
+        light_tails_notice(name, errors) if ended is None else None,
         rounding_notice(signal, noise),
         variance_notice(signal, errors, usable, is_heavy=tails is not None),
         drift_notice(signal, quiet),

@@ -86,8 +86,8 @@ class Health(Document, Printed):
         reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
         "infinite", "size", "stuck", "held", "saturation", "abrupt-end", "value-repeated",
         "repeated-samples", "interpolated", "filled", "event",
-        "outliers", "heavy-tails", "rounding", "line",
-        "resonance", "drift", "variance", "temperature", "crosstalk" and "clean".
+        "outliers", "heavy-tails", "light-tails", "rounding", "line", "resonance",
+        "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str

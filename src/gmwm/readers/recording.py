@@ -23,7 +23,7 @@ READING = frozenset(
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
     | {"rate-unlikely"}
     | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
-    | {"stamps-in-turns", "clock-shifts", "sentinel", "gravity-absent"}
+    | {"stamps-in-turns", "sensors-in-turns", "clock-shifts", "sentinel", "gravity-absent"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
     | {"partial-record", "still-stretches", "summer-time"}
 )

@@ -48,6 +48,25 @@ LEAST_CONE, LAGS_OF_TURN, FEWEST_TURNING = 0.01, (1, 4, 16), 20
 """rad by which gravity leaves its mean where a sensor turns steadily (at rest by 0.3 deg), seconds
 over which its changes are compared, and how many of these a recording has at least."""
 
+MOST_IN_TURNS, TURNS_ALIKE, SURE_OF_TURNS, SENSORS_APART = 4, 0.99, 8.0, 0.3
+"""Rows of one stamp up to which as many sensors are as likely as a batch of one, part of the stamps
+that have as many, standard errors (one in 1e10 by chance), and standard deviations of a sample,
+more than the tones of converters at half of their rate."""
+
+BLOCKS_OF_TURNS, SHORTER_OF_TURNS, FEWEST_OF_TURNS, WANDERS = 64, 16, 16, 3.0
+"""Blocks whose means are compared, by how much shorter others are, rows of one at least, and the
+ratio of their variances, each times its length: eleven standard errors above that of white
+noise."""
+
+ROWS_OF_COUNTS, NOISE_OF_COUNTS = 4096, 2.0
+"""First samples that are to be whole numbers before all are looked at, and their noise, above which
+these are no steps of a coarse output: no gyro has noise of 2 deg/s, no accelerometer of 2 m/s^2."""
+
+NEAREST_UNITS, FAR_UNITS, AXES_ALIKE = 2.0, 3.4, ((0.25, 0.07), (1.6, 0.5))
+"""Logarithm of the ratio of two units that are not taken for each other (mg and cm/s^2 have 0.02,
+deg/h and mdeg/s 1.3), and of noise that the axes of one sensor never have. For ratios below and
+above this, by how much two axes may differ, and by how much the third may miss the ratio."""
+
 USUAL_BIAS = 0.052
 """rad/s (3 deg/s): biases at rest of most MEMS gyros are smaller by their data sheets; those of the
 cheapest are not."""

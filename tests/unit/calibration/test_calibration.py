@@ -204,6 +204,19 @@ def test_missing_samples_are_passed_over(recording):
     assert low < gmwm.process.as_model(ACCEL).params["N"] < high
 
 
+@pytest.mark.parametrize("lost", [0.6, 1.0])
+def test_what_made_most_samples_missing_is_named(tmp_path, lost):
+    rng = np.random.default_rng(2)
+    rows = 1e-3 * rng.standard_normal((5000, 2))
+    rows[: int(lost * 5000), 1] = [-999.0]
+    rows[:70, 1] = 1e-3
+    path = tmp_path / "a.csv"
+    np.savetxt(path, rows, delimiter=",", header="gyro_x [rad/s],gyro_y [rad/s]", comments="")
+    result = gmwm.calibrate(gmwm.read(path, rate=100.0), WhiteNoise())
+    text = result.skipped["gyro_y"].text
+    assert "more than half: " in text and "samples are -999, an error code" in text
+
+
 def test_channels_of_which_too_much_is_missing_are_skipped(recording):
     n = recording.n
     values = recording["accel_y"].values.copy()

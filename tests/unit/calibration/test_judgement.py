@@ -94,6 +94,11 @@ def issue(code, severity="bad", where=""):
         ([issue("tilt")], True, ("accel_y",)),
         ([issue("tilt")], False, ("accel_y",)),
         ([issue("rate-changes")], False, NAMES),
+        ([issue("gravity")], True, NAMES),  # increments, the gyro's too
+        ([issue("gravity", "bad", "accel")], True, ("accel_y",)),
+        ([issue("gravity", "warning", "accel")], True, ()),
+        ([issue("counts", "bad", "gyro")], True, ("gyro_x",)),
+        ([issue("swapped")], True, NAMES),
         ([issue("stuck", "bad", "gyro_x")], True, ("gyro_x",)),
         ([issue("stuck", "warning", "gyro_x")], True, ()),
         ([issue("drift", "bad", "gyro_x")], True, ()),

@@ -108,3 +108,57 @@ def test_what_outliers_leave_is_white(record, size):
 
 def test_a_notice_has_the_share_of_gaussian_noise_beyond_four_standard_deviations():
     assert "where noise has 0.0063 %" in contamination_notice("gyro_x", 0.01).text
+
+
+def compressed(x, at):
+    return at * np.tanh(x / at)
+
+
+@pytest.mark.parametrize(
+    ("at", "kurtosis"), [(1.5, -0.97), (2.0, -0.76), (3.0, -0.48), (4.0, -0.33), (8.0, None)]
+)
+@pytest.mark.parametrize("walks", [False, True])
+def test_compressed_samples_have_light_tails(record, at, kurtosis, walks):
+    rng = np.random.default_rng(3)
+    values = compressed(rng.standard_normal(N), at)
+    found = gmwm.health(record(gyro_x=with_walk(values, rng) if walks else values))
+    notices = found.of("gyro_x", "light-tails")
+    assert len(notices) == (kurtosis is not None)
+    for notice in notices:
+        assert notice.severity == "note"
+        assert notice.values["kurtosis"] == pytest.approx(kurtosis, abs=0.1)
+
+
+def light(kind, rng):
+    white, time = rng.standard_normal(N), np.arange(N) / 100.0
+    return {
+        "rounded": np.round(2.0 * white) / 2.0,
+        "rounded to one": np.round(white),
+        "coarse": np.round(white / 3.0) * 3.0,
+        "dither": white + rng.uniform(-1.0, 1.0, N),
+        "angles": np.diff(np.round(np.cumsum(white)), prepend=0.0),
+        "line": white + 30.0 * np.sin(2 * np.pi * 7.13 * time),
+        "wandering line": white
+        + 3.0 * np.sin(44 * time + np.cumsum(rng.standard_normal(N)) * 0.05),
+        "fast line": white + 3.0 * np.sin(2 * np.pi * 45.0 * time),
+        "two levels": white + 2.0 * (np.cumsum(rng.random(N) < 1e-3) % 2),
+        "swells": white * (1.0 + 0.5 * np.sin(time)),
+    }[kind]
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "rounded", "rounded to one", "coarse", "dither", "angles", "line", "wandering line",
+        "fast line", "two levels", "swells",
+    ],
+)  # fmt: skip
+def test_rounding_and_lines_are_no_light_tails(record, kind):
+    found = gmwm.health(record(gyro_x=light(kind, np.random.default_rng(4))))
+    assert not found.of("gyro_x", "light-tails")
+
+
+def test_an_abrupt_end_is_said_once(record):
+    rng = np.random.default_rng(5)
+    found = gmwm.health(record(gyro_x=rng.uniform(-1.0, 1.0, N)))
+    assert found.of("gyro_x", "abrupt-end") and not found.of("gyro_x", "light-tails")

@@ -264,7 +264,7 @@ def test_parts_of_rest():
     dead = np.exp(0.1 * NOISE[:2, :400].T)
     dead[:90, 0] = 0.0
     dead[200:300] *= 5.0
-    for step in (0.0, 0.5):
+    for step in (0.0, 0.5, 2.0):
         found[f"dead {step}"] = np.flatnonzero(np.diff(loudness(dead, np.full(2, step)).loud))
     check("diagnosis/parts_of_rest", found)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gmwm import Channel, Recording
+from gmwm import Channel, Recording, health
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.still.loudness import _changes, _split, loudness
 from gmwm.diagnosis.still.stretches import (
@@ -15,6 +15,7 @@ from gmwm.diagnosis.still.stretches import (
     _runs,
     _vibrates,
     find_still,
+    rest_of,
 )
 
 LONG = tuning.BLOCKS_OF_FLOOR
@@ -170,6 +171,22 @@ def test_loud_blocks_are_those_between_two_changes():
     few = loudness(scatter[:116], np.zeros(3))  # less than thirty times four blocks
     assert not few.loud.any() and few.ratio == 1.0
     assert not loudness(scatter, np.full(3, 10.0)).loud.any()  # below the step
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-8])
+def test_zeros_written_for_lost_samples_are_no_rest(step):
+    rng = np.random.default_rng(5)
+    values = 1e-3 * rng.normal(size=(2, 60_000)) + 3e-4
+    for start in range(2000, 60_000, 3000):
+        values[:, start : start + 250] = 0.0
+    if step:
+        values = np.round(values / step) * step
+    channels = {f"gyro_{axis}": x for axis, x in zip("xy", values, strict=True)}
+    recording = Recording.from_arrays(channels, 50.0, {"gyro": "rad/s"})
+    assert rest_of(recording) is None
+    found = health(recording)
+    assert not found.of(code="vibration")
+    assert all("stuck 20 times" in found.of(name, "stuck")[0].text for name in channels)
 
 
 def test_stretches_end_a_block_before_motion_and_with_the_recording():

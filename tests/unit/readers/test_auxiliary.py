@@ -106,7 +106,7 @@ def test_equal_names_are_told_apart_by_their_place(write, columns):
 
 def test_one_that_cannot_be_read_is_left_out(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("gx,temp,supply [V]\n" + "1,cold,5\n" * 80)
+    path.write_text("gx,temp,supply [V]\n" + "0.01,cold,5\n" * 80)
     recording = read(path, rate=50, units=UNITS)
     assert list(recording) == ["gyro_x", "supply"]
     assert codes(recording) == ["columns-auxiliary", "columns-unreadable"]

@@ -122,6 +122,84 @@ def test_a_rate_that_no_unit_explains(write):
     assert "a mean rate of 85.9 deg/s" in found.text
 
 
+@pytest.mark.parametrize("axes", [1, 2])
+def test_fewer_axes_have_noise_as_well(write, axes):
+    path = write(in_units(imu(), "mdeg/s", "g")[:, :axes], header("deg/s", "g", NAMES[:axes]))
+    (found,) = notices(read(path, rate=100.0))
+    assert found.code == "gyro-unit" and "mdeg/s" in found.action
+
+
+def counted(rows, gyro, accel):
+    return np.rint(rows / ([gyro] * 3 + [accel] * 3))
+
+
+@pytest.mark.parametrize(
+    ("unit", "bit", "reported"),
+    [
+        ("deg/s", 3e-4, True),  # noise of 23 counts
+        ("rad/s", 1e-3, True),
+        ("deg/s", 5e-3, False),  # of 1.4: a coarse output, if one of another world
+        ("mdeg/s", 3e-4, False),
+        ("deg/h", 3e-4, False),
+    ],
+)
+def test_counts_are_no_unit(write, unit, bit, reported):
+    rows = counted(imu(), bit, 1e-4)
+    recording = read(write(rows[:, :3], header(unit, "", NAMES[:3])), rate=100.0)
+    found = [each for each in recording.notices if each.where == "gyro"]
+    assert ("counts" in {each.code for each in found}) is reported
+    if reported:  # in one notice
+        (notice,) = found
+        assert notice.severity == "bad" and "gyro_x, gyro_y, gyro_z" in notice.text
+        assert notice.values["noise"] == pytest.approx(7e-3 / bit, rel=0.1)
+
+
+def test_counts_of_an_accelerometer(write):
+    rows = counted(imu(), 3e-4, 1.7e-3)
+    recording = read(write(rows[:, 3:5], header("", "m/s^2", NAMES[3:5])), rate=100.0)
+    assert [each.where for each in recording.notices if each.code == "counts"] == ["accel"]
+    # One sample that is none is enough.
+    rows[4999, 3:] += 0.5
+    recording = read(write(rows[:, 3:5], header("", "m/s^2", NAMES[3:5])), rate=100.0)
+    assert "counts" not in {each.code for each in recording.notices}
+
+
+@pytest.mark.parametrize(
+    ("column", "is_in", "stated", "times"),
+    [
+        (1, "deg/s", "rad/s", 57.3), (2, "rad/s", "deg/s", 1 / 57.3), (0, "mdeg/s", "deg/s", 1e3),
+        (3, "g", "m/s^2", 1 / 9.807),
+    ],
+)  # fmt: skip
+def test_one_axis_in_another_unit(write, column, is_in, stated, times):
+    units = (stated, "m/s^2") if column < 3 else ("deg/s", stated)
+    rows = in_units(imu(gyro=7e-5, bias=(0.0, 0.0, 0.0)), *units)
+    path = write(rows, header(*units))
+    assert "axis-unit" not in {each.code for each in read(path, rate=100.0).notices}
+    rows[:, column] /= factor(is_in, "rad/s" if column < 3 else "m/s^2")
+    rows[:, column] *= factor(stated, "rad/s" if column < 3 else "m/s^2")
+    recording = read(write(rows, header(*units)), rate=100.0)
+    (found,) = [each for each in recording.notices if each.code == "axis-unit"]
+    assert found.where == NAMES[column] and found.severity == "warning"
+    assert found.values["ratio"] == pytest.approx(times, rel=0.05)
+    assert found.values["likely"] == is_in
+    # Of two axes as well.
+    if column == 1:
+        recording = read(write(rows[:, :2], header(*units, NAMES[:2])), rate=100.0)
+        assert found.where in {e.where for e in recording.notices if e.code == "axis-unit"}
+
+
+@pytest.mark.parametrize("sensor", ["gyro", "accel"])
+def test_axes_of_unequal_noise_are_no_units(write, sensor):
+    rng, wrong = np.random.default_rng(4), 0
+    names = [name for name in NAMES if name.startswith(sensor)]
+    for _ in range(100):
+        rows = 1e-3 * np.exp(rng.uniform(-np.log(5), np.log(5), 3)) * rng.normal(size=(500, 3))
+        recording = read(write(rows, header("rad/s", "m/s^2", names)), rate=100.0)
+        wrong += "axis-unit" in {each.code for each in recording.notices}
+    assert wrong <= (0 if sensor == "gyro" else 2)
+
+
 def test_missing_axes_and_samples_are_survived(write):
     rows = in_units(imu(), "deg/s", "g")
     rows[::2] = np.nan

@@ -7,6 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
+from gmwm.readers.clock import change_notice
 from gmwm.readers.clock.jumps import find_change
 
 
@@ -151,6 +152,14 @@ def test_a_rate_that_changes(long):
     assert "from 100 to 71 Hz at about 60 s" in found.text
 
 
+@pytest.mark.parametrize(
+    ("rates", "said"),
+    [((100.0, 71.0), "100 to 71"), ((50.0, 49.9962), "50 to 49.996"), ((50.0, 50.0), "50 to 50")],
+)
+def test_rates_have_the_digits_in_which_they_differ(rates, said):
+    assert f"goes from {said} Hz near line 5" in change_notice(rates, 50.0, "line 5").text
+
+
 @pytest.mark.parametrize("then", [50.0, 30.0, 200.0, 300.0])
 def test_a_rate_that_changes_so_much_that_rows_seem_to_be_missing(long, then):
     stamps = np.cumsum(np.r_[np.full(5000, 0.01), np.full(7000, 1.0 / then)])
@@ -279,7 +288,7 @@ def test_absurd_steps(timed, step, name, rate):
 
 def test_time_by_name_index_or_not_at_all(write, samples):
     slow, fast = np.arange(80) / 10.0, np.arange(80) / 50.0
-    path = write(np.column_stack([slow, fast, samples[:, 0]]), "time,when,gx")
+    path = write(np.column_stack([slow, fast, 1e-3 * samples[:, 0]]), "time,when,gx")
     assert read(path, units=UNITS).rate == pytest.approx(10)
     assert read(path, units=UNITS, time="when").rate == pytest.approx(50)
     assert read(path, units=UNITS, time=1).rate == pytest.approx(50)

@@ -197,7 +197,7 @@ def test_what_moves_is_no_error_code(kind):
 def test_rows_written_again_change_neither_rate_nor_samples(again, how):
     n, rng = 20_000, np.random.default_rng(4)
     time = 0.01 * (np.arange(n) + 0.05 * rng.standard_normal(n))
-    values = rng.standard_normal(n)
+    values = 1e-3 * rng.standard_normal(n)
     rows = np.arange(n)
     stop = rows[again][-1] + 1
     order = np.concatenate([rows[:stop], rows[again], rows[stop:]])

@@ -94,6 +94,7 @@ def test_increments_are_named(off, said):
     size = G / RATE * (1.0 + off)
     found = notices(recorded(accel=(0.0, 0.0, size), noise=(1e-4, 1e-4)))
     assert ["increments" in each.text for each in found] == [True] * said
+    assert [(each.severity, each.where) for each in found] == [("bad", "")] * said
 
 
 @pytest.mark.parametrize(

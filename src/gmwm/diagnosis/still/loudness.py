@@ -38,8 +38,9 @@ def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
     Returns: no loud block where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
-    # Without rounding a block that does not scatter at all is dead, not quiet.
-    dead = (scatter == 0.0) & (step == 0.0)
+    # A block that does not scatter at all is dead, not quiet, if all others do by more than a step.
+    smallest = np.nanmin(np.where(scatter > 0.0, scatter, np.inf), axis=0, initial=np.inf)
+    dead = (scatter == 0.0) & (step**2 < smallest)
     known = np.flatnonzero(~np.any(np.isnan(scatter) | dead, axis=1))
     count = known.size // tuning.BLOCKS_OF_LEVEL
     if count < tuning.FEWEST_BLOCKS:

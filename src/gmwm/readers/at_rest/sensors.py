@@ -13,7 +13,7 @@ from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.at_rest.rotation import block_means, triad, turning_gravity
+from gmwm.readers.at_rest.rotation import block_means, turning_gravity
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
 
@@ -22,6 +22,7 @@ _EARTH = 7.292115e-5  # rad/s, WGS 84
 _DENSITY = factor("deg/s", SI_UNIT["gyro"])  # rad/s/sqrt(Hz) in deg/s/sqrt(Hz)
 _ACCEL_UNITS = ("m/s^2", "g", "mg", "ug", "cm/s^2")
 _GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+_LEAST_COUNT = {"gyro": _DENSITY, "accel": 1.0}  # 1 deg/s and 1 m/s^2: no last bit is as large
 
 
 def rest_notices(
@@ -48,41 +49,52 @@ def rest_notices(
     swapped = _swapped(recording, rate, force, are_columns_given)
     if swapped:
         return swapped
-    gravity = _gravity(recording, force, given, has_layout)
-    return (*gravity, *(_gyro_unit(recording, rate) or _mean_rate(rate)))
+    found = [
+        *_gravity(recording, force, given, has_layout),
+        *(_gyro_unit(recording, rate) or _mean_rate(rate)),
+    ]
+    counts = _counts(recording, unit_of)
+    explained = {notice.where for notice in counts}
+    rest = [each for each in found if each.severity == "bad" or each.where not in explained]
+    one = (*_axis_unit(recording, "gyro", rate), *_axis_unit(recording, "accel", force))
+    return (*counts, *rest, *one)
 
 
 class _Sensor:
-    """Three axes in one unit: their mean and their noise.
+    """The axes of a sensor in one unit: their mean and their noise.
 
     unit: In the file.
+    names: Of the axes that are there.
     size: Length of the mean vector, SI.
     usual: Median length of the means of a second, SI, which no motion changes much.
-    scatter: Standard deviation of the fast noise of an axis, SI.
+    fast, scatter: Standard deviation of the fast noise of each axis, and the largest, SI.
     density: White noise of the noisiest axis, SI/sqrt(Hz): the least that samples and means of a
         second leave, so that neither a filter's band nor a drift counts.
     size_error: Standard deviation of the length from the fast noise, SI.
     """
 
-    def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:
-        self.unit = unit
+    def __init__(self, unit: str, channels: Mapping[str, FloatArray], dt: float) -> None:
+        self.unit, self.names = unit, tuple(channels)
+        axes = list(channels.values())
         self.size = float(np.linalg.norm([np.nanmean(values) for values in axes]))
         second = max(round(1.0 / dt), 1)
         means = block_means(axes, second)
         lengths = known_of(np.linalg.norm(means, axis=1))
         self.usual = median(lengths) if lengths.size else self.size
-        fast, slow = _steps(axes), _steps(means.T)
-        self.scatter = float(np.max(fast))
-        densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
+        self.fast, slow = _steps(axes), _steps(means.T)
+        self.scatter = float(np.max(self.fast))
+        densities = np.minimum(self.fast * math.sqrt(dt), slow * math.sqrt(second * dt))
         self.density = float(np.max(densities))
         self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
 
     @classmethod
     def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
-        """None if an axis is missing or empty, or the axes have several units."""
-        axes = triad(recording, sensor)
-        units = {unit_of[name] for name in unit_of if name in {f"{sensor}_{a}" for a in AXES}}
-        if axes is None or len(units) > 1 or any(np.all(np.isnan(values)) for values in axes):
+        """None if all axes are missing or empty, of an accelerometer one, or have several units."""
+        names = [name for axis in AXES if (name := f"{sensor}_{axis}") in recording]
+        units = {unit_of[name] for name in names if name in unit_of}
+        axes = {name: recording[name].values for name in names}
+        axes = {name: values for name, values in axes.items() if not np.all(np.isnan(values))}
+        if len(axes) < (1 if sensor == "gyro" else len(AXES)) or len(units) > 1:
             return None
         found = cls(units.pop(), axes, recording.dt)
         return found if found.size > 0.0 else None
@@ -178,7 +190,7 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
         text += ", gravity over one sampling interval: increments of velocity, not accelerations"
         action = "divide them, and those of the gyro, by the sampling interval"
-        return (Notice("gravity", "bad", "accel", text, values, action),)
+        return (Notice("gravity", "bad", "", text, values, action),)
     is_none = (
         force.usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * force.usual
     )
@@ -198,7 +210,9 @@ def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]
         for unit in _GYRO_UNITS
     }
     others = {unit: ratio for unit, ratio in ratios.items() if abs(math.log(ratio)) > 0.1}
-    found = _by_turning(recording, others) or _by_size(rate, others) or _by_earth(rate, others)
+    found = _by_turning(recording, others) or _by_size(rate, others)
+    if found is None and len(rate.names) == len(AXES):
+        found = _by_earth(rate, others)
     if found is None:
         return ()
     text, likely = found
@@ -220,6 +234,73 @@ def _mean_rate(rate: _Sensor | None) -> tuple[Notice, ...]:
     )
     action = "make sure that it was at rest"
     return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, action),)
+
+
+def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, ...]:
+    """Whole numbers with noise of several, in a unit of which no sensor's last bit is one."""
+    notices = []
+    for sensor, largest in _LEAST_COUNT.items():
+        units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
+        sizes = {name: factor(unit, SI_UNIT[sensor]) for name, unit in units.items()}
+        found = [
+            name
+            for name, size in sizes.items()
+            if size >= largest and _is_counted(recording[name].values, size)
+        ]
+        if not found:
+            continue
+        noise = float(np.max(_steps([recording[name].values / sizes[name] for name in found])))
+        text = (
+            f"{', '.join(found)}: every sample is a whole number, with noise of {noise:.3g} of "
+            f"them: counts of the converter, not {units[found[0]]}"
+        )
+        action = "multiply them by what a count is worth by the data sheet"
+        notices.append(Notice("counts", "bad", sensor, text, {"noise": noise}, action))
+    return tuple(notices)
+
+
+def _is_counted(values: FloatArray, size: float) -> bool:
+    """Whether samples are multiples of a size, and their noise is several of it."""
+    for part in (values[: tuning.ROWS_OF_COUNTS], values):
+        numbers = known_of(part) / size
+        off = np.abs(numbers - np.rint(numbers))
+        if not numbers.size or np.max(off) > 1e-6:
+            return False
+    return bool(_steps([values])[0] > tuning.NOISE_OF_COUNTS * size)
+
+
+def _axis_unit(recording: Recording, sensor: str, found: _Sensor | None) -> tuple[Notice, ...]:
+    """One axis that scatters more or less than the others by the ratio of two units."""
+    if found is None or len(found.names) < 2 or not np.all(found.fast > 0.0):
+        return ()
+    used, logs = factor(found.unit, SI_UNIT[sensor]), np.log(found.fast)
+    for unit in _GYRO_UNITS if sensor == "gyro" else _ACCEL_UNITS:
+        ratio = math.log(used / factor(unit, SI_UNIT[sensor]))
+        alike, near = tuning.AXES_ALIKE[abs(ratio) > tuning.FAR_UNITS]
+        for i, name in enumerate(found.names):
+            rest = np.delete(logs, i)
+            far = float(logs[i] - np.mean(rest))
+            is_near = abs(ratio) > tuning.NEAREST_UNITS and abs(far - ratio) < near
+            if not is_near or np.ptp(rest) > alike or _moves(recording, found.names, i, ratio):
+                continue
+            times = math.exp(far)
+            text = (
+                f"its noise is {times:.3g} times that of the other axes, as if it were in {unit}, "
+                f"not {found.unit}"
+            )
+            action = f"if so, name its unit in the header: {name} [{unit}]"
+            values = {"ratio": times, "likely": unit}
+            return (Notice("axis-unit", "warning", name, text, values, action),)
+    return ()
+
+
+def _moves(recording: Recording, names: Sequence[str], axis: int, ratio: float) -> bool:
+    """Whether third differences, in which motion falls out, lack a ratio of an axis' noise."""
+    noise = _steps([np.diff(recording[name].values, 2) for name in names])
+    if not np.all(noise > 0.0):
+        return True
+    far = math.log(noise[axis]) - float(np.mean(np.log(np.delete(noise, axis))))
+    return abs(far - ratio) > tuning.AXES_ALIKE[1][1]
 
 
 def _by_turning(recording: Recording, others: Mapping[str, float]) -> tuple[str, list[str]] | None:
