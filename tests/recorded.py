@@ -39,7 +39,7 @@ def assert_as_recorded(name: str, found: Any, rtol: float = 1e-5) -> None:
     now = json.loads(json.dumps(_plain(found)))
     if os.environ.get("RECORD"):
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text("{\n" + ",\n".join(_lines(_entries(now))) + "\n}\n", encoding="utf-8")
+        file.write_text("{" + ",\n".join(_lines(_entries(now))) + "}\n", encoding="utf-8")
     then = json.loads(file.read_text(encoding="utf-8"))
     for key, each in then.items():
         if isinstance(each, str) and each.startswith(_SAME) and each[len(_SAME) :] in then:

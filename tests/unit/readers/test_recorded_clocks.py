@@ -132,7 +132,6 @@ def test_where_clocks_change():
             ), 1e-3, 0.4, 12,
         ),
         "beat": edge(lambda a: told("stamps-in-turns", EVEN + a * (EVEN % 2)), 0.05, 0.3, 10),
-        "unlikely": edge(lambda a: told("rate-unlikely", EVEN * a), 1.0, 1e4, 16),
         "no clock": edge(lambda a: told("clock", EVEN + a * NOISE), 0.1, 9.0, 5),
         "astray": edge(lambda a: told("stamps-astray", EVEN + a * (EVEN == 500)), 0.6, 99.0, 6),
         "units": [
