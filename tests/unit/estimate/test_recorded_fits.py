@@ -162,7 +162,7 @@ def test_draws_of_a_bootstrap():
 def test_bounds_on_errors():
     models = {
         "n_k": (N + K, 200), "n_k_long": (N + SLOW + K, 1_000_000),
-        "ramp": (N + SLOW + RateRamp(0.01), 200), "long_ramp": (N + K + RateRamp(0.01), 300_000),
+        "long_ramp": (N + K + RateRamp(0.01), 30_000),
         "arma": (ARMA([0.8], [0.4], 1e-4), 200),
     }  # fmt: skip
     found = {}

@@ -258,10 +258,7 @@ def at_rest(gyro=GYRO, accel=ACCEL, units=IN_SI, given=SI, columns=False, layout
     channels = {f"gyro_{a}": x for a, x in rows[0]} | {f"accel_{a}": x for a, x in rows[1]}
     scaled = {name: x * factor(units[name], SI_UNIT[name[:-2]]) for name, x in channels.items()}
     recording = Recording.from_arrays(scaled, rate, SI, source="log")
-    try:
-        return rest_notices(recording, units, given, columns, has_layout=layout)
-    except InputError as error:
-        return [str(error), error.code, dict(error.values)]
+    return refused(lambda: rest_notices(recording, units, given, columns, has_layout=layout))
 
 
 def test_sensors_at_rest():
@@ -328,9 +325,6 @@ def test_layouts():
                  "float32,1,2,rates,big", "float64, 1, 2, little", "int64,1,1,increments", "int8,1,1",
                  "int16,1", "int16,0,1", "int16,1,0", "int16,1e999,1", "int16,1,1e999", "int16,1.2.3,1",
                  "int32,1,1,odd", "int32,-1,1", ""):  # fmt: skip
-        try:
-            made = layout_of(text)
-            found[text] = [made, str(made.record)]
-        except InputError as error:
-            found[text] = [str(error), error.code]
+        made = refused(lambda t=text: layout_of(t))
+        found[text] = made if isinstance(made, list) else [made, str(made.record)]
     assert_as_recorded("readers/layouts", found)
