@@ -182,7 +182,7 @@ def _is_close(found: Any, expected: Any, rtol: float, of_largest: float) -> bool
     if b.dtype.kind == "i":
         return bool(np.array_equal(a, b))
     largest = np.max(np.abs(b[np.isfinite(b)]), initial=0.0)
-    return a.shape == b.shape and np.allclose(a, b, rtol, max(of_largest * largest, 1e-15))
+    return a.shape == b.shape and np.allclose(a, b, rtol, max(of_largest * largest, 1e-13))
 
 
 def edge(holds: Callable[[float], Any], low: float, high: float, tries: int = 12) -> float | None:

@@ -117,19 +117,17 @@ def test_robust_and_other_wavelets_and_simulated_moments():
 
 @pytest.mark.parametrize("method", [MLE(), Whittle(), EM(tolerance=1e-7)], ids=lambda m: m.name)
 def test_likelihoods(method):
-    cases = {
-        "ramp": (N + FAST + RateRamp(0.02), None, {}),
-        "needless": (N + FAST, N + FAST + K, {}),
-    }
+    cases = {"needless": (N + FAST, N + FAST + K, {})}
     if method.name != "whittle":
         cases["gaps"] = (N + FAST + K, None, {"missing": 0.05})
     if method.name != "em":
+        cases["ramp"] = (N + RateRamp(0.2), None, {})
         cases["quantized"] = (QuantizationNoise(1e-4) + N + FAST, None, {})
     found = {
         name: all_of(fitted(truth, model, method, n=300, **options))
         for name, (truth, model, options) in cases.items()
     }
-    assert_as_recorded(f"estimate/fit_by_{method.name}", found, rtol=1e-4)
+    assert_as_recorded(f"estimate/fit_by_{method.name}", found, rtol=2e-3)
 
 
 def test_lines_of_the_allan_plot():
