@@ -79,7 +79,6 @@ def answers(recording):
 LOGS = {
     "rest": {}, "turn": {"rates": between(20, 30, 0.5)},
     "tilt": {"angle": step_at(25, 0.1)},
-    "tilt and turn": {"angle": step_at(15, 0.3), "rates": between(35, 44, -0.2)},
     "long move": {"rates": between(12, 44, 0.1), "angle": step_at(30, 0.4)},
     "begins moving": {"rates": between(0, 11, 1.0)},
     "short rests": {"rates": sum(between(a, a + 4, 0.3) for a in range(3, 60, 11))},
@@ -100,8 +99,6 @@ def test_motion_and_rest():
     found["loud"] = answers(record(noise=loud))
     humming = NOISE + 4.0 * np.sin(12.0 * 2 * np.pi * T) * ((T > 5) & (T < 30))
     found["humming"] = answers(record(between(30, 33, 0.5), noise=humming))
-    knocks = NOISE + 300.0 * (np.arange(N) % 700 == 350)
-    found["knocks"] = answers(record(noise=knocks))
     short = [record(noise=NOISE)[name].values for name in NAMES]
     for n in (1499, 1500, 96, 95):
         cut = Recording.from_arrays(

@@ -47,7 +47,6 @@ from gmwm.ins import (
     over_time,
     perform,
     preintegrate,
-    reduce,
     spread,
     standstills,
     through,
@@ -201,20 +200,6 @@ def test_covariances_without_runs():
         found[name] = [analysis, analysis.sd, analysis.predicted_sd, analysis.nees(),
                        analysis.score(slice(0, 6))]  # fmt: skip
     assert_as_recorded("ins/covariance_analysis", found)
-
-
-def test_a_reduced_model():
-    full = SensorModels.of(
-        {
-            "gyro": WhiteNoise(5e-5) + GaussMarkov(4e-4, 5.0) + GaussMarkov(1e-4, 300.0),
-            "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 3.0) + GaussMarkov(2e-3, 200.0),
-        }
-    )
-    truth = fixed_wing_loiter(duration=60.0, dt=0.5)
-    scenario = Scenario(truth, gnss(truth), (Outage(40.0, 15.0),), interval=50.0, step=1.0)
-    found = reduce(full, "N+GM", scenario=scenario)
-    # Where the optimum is flat, the parameters are known to the search's tolerance.
-    assert_as_recorded("ins/reduced", [found.errors, found.inflation], 2e-2)
 
 
 def test_no_ins_dataclass_changes():

@@ -282,21 +282,21 @@ def test_sensors_at_rest():
         return any(getattr(each, "code", "") == code for each in at_rest(**more))
 
     found["edges"] = [
-        edge(lambda a: told("mean-rate", gyro=GYRO + a), 1e-2, 0.2, 14),
-        edge(lambda a: told("gyro-unit", gyro=GYRO * a), 1.0, 900.0, 14),
-        edge(lambda a: told("gyro-unit", gyro=GYRO + a), 0.1, 9.0, 14),
-        edge(lambda a: told("gyro-unit", gyro=GYRO * 1e-3 + a), 1e-5, 1e-2, 14),
-        edge(lambda a: told("gyro-unit", gyro=GYRO * a + 1e-3), 1e-4, 1.0, 14),
-        edge(lambda a: told("gyro-unit", gyro=GYRO * 1e-5 + 7.292115e-5 * 57.29578 / 3**0.5 * a), 0.9, 1.0, 14),
-        edge(lambda a: told("gravity", accel=ACCEL * a), 1.0, 1.8, 14),
-        edge(lambda a: told("gravity", accel=ACCEL * a), 0.3, 1.0, 14),
-        edge(lambda a: told("gravity", accel=ACCEL * a), 0.05, 0.3, 14),
-        edge(lambda a: told("gravity", accel=ACCEL * 0.5 + a * NOISE), 0.1, 5.0, 14),
-        edge(lambda a: told("swapped", gyro=ACCEL * a, accel=GYRO, columns=True), 1.0, 1.2, 14),
-        edge(lambda a: told("swapped", gyro=ACCEL + a * NOISE, accel=GYRO, columns=True), 0.05, 3.0, 14),
-        edge(lambda a: told("swapped", gyro=ACCEL, accel=ACCEL * a, columns=True), 1.0, 1.4, 14),
-        edge(lambda a: isinstance(at_rest(accel=ACCEL * a, layout=True, given={}), list), 0.21, 0.9, 14),
-        edge(lambda a: isinstance(at_rest(accel=ACCEL * a, layout=True, given={}), list), 1.2, 3.0, 14),
+        edge(lambda a: told("mean-rate", gyro=GYRO + a), 1e-2, 0.2, 9),
+        edge(lambda a: told("gyro-unit", gyro=GYRO * a), 1.0, 900.0, 9),
+        edge(lambda a: told("gyro-unit", gyro=GYRO + a), 0.1, 9.0, 9),
+        edge(lambda a: told("gyro-unit", gyro=GYRO * 1e-3 + a), 1e-5, 1e-2, 9),
+        edge(lambda a: told("gyro-unit", gyro=GYRO * a + 1e-3), 1e-4, 1.0, 9),
+        edge(lambda a: told("gyro-unit", gyro=GYRO * 1e-5 + 7.292115e-5 * 57.29578 / 3**0.5 * a), 0.9, 1.0, 9),
+        edge(lambda a: told("gravity", accel=ACCEL * a), 1.0, 1.8, 9),
+        edge(lambda a: told("gravity", accel=ACCEL * a), 0.3, 1.0, 9),
+        edge(lambda a: told("gravity", accel=ACCEL * a), 0.05, 0.3, 9),
+        edge(lambda a: told("gravity", accel=ACCEL * 0.5 + a * NOISE), 0.1, 5.0, 9),
+        edge(lambda a: told("swapped", gyro=ACCEL * a, accel=GYRO, columns=True), 1.0, 1.2, 9),
+        edge(lambda a: told("swapped", gyro=ACCEL + a * NOISE, accel=GYRO, columns=True), 0.05, 3.0, 9),
+        edge(lambda a: told("swapped", gyro=ACCEL, accel=ACCEL * a, columns=True), 1.0, 1.4, 9),
+        edge(lambda a: isinstance(at_rest(accel=ACCEL * a, layout=True, given={}), list), 0.21, 0.9, 9),
+        edge(lambda a: isinstance(at_rest(accel=ACCEL * a, layout=True, given={}), list), 1.2, 3.0, 9),
     ]  # fmt: skip
     t = EVEN / 100.0
     for rate in (0.02, 0.3, 2.0):

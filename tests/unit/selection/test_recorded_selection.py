@@ -47,7 +47,6 @@ CASES = {
     "white": series(WhiteNoise(1.0), 3000),
     "walk": series(WhiteNoise(1.0) + RandomWalk(0.03), 3000),
     "fast and slow": series(WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 300.0), 6000),
-    "rounded": series(WhiteNoise(1.0) + QuantizationNoise(3.0), 3000),
     "ramp": series(WhiteNoise(1.0) + RateRamp(RAMP), 3000),
     "slow": series(WhiteNoise(1.0) + RateRamp(0.22 * RAMP), 3000, 4),
     "filtered": np.convolve(series(WhiteNoise(1.0), 6003), np.ones(4) / 4, "valid"),

@@ -34,13 +34,11 @@ def all_of(navigated):
 
 LOGS = {
     "car": {"seed": 1},
-    "loiter": {"seed": 3, "vehicle": "loiter"},
     "no velocity": {"seed": 4, "vehicle": "loiter", "velocity": False},
     "stamps": {"seed": 5, "faults": ("stamps",)},
     "arm": {"seed": 6, "vehicle": "loiter", "faults": ("lever arm",)},
     "coloured": {"seed": 8, "faults": ("coloured",)},
     "scale": {"seed": 9, "vehicle": "loiter", "faults": ("gyro scale",)},
-    "white": {"seed": 11, "truth": sensors(gyro=30.0), "believed": sensors()},
 }
 
 
