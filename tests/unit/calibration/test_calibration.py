@@ -131,6 +131,15 @@ def test_files_keep_rivals_and_what_was_left_out(calibration, tmp_path):
     assert again.left_out == changed.left_out
 
 
+def test_files_of_before_rivals_and_what_was_left_out_were_kept(calibration):
+    stored = calibration.to_dict()
+    del stored["rivals"], stored["left_out"]
+    again = type(calibration).from_dict(stored)
+    assert again.rivals == again.left_out == {}
+    spans = type(calibration).from_dict({**stored, "left_out": {"gyro_x": [[10, 20], [40, 41]]}})
+    assert spans.left_out == {"gyro_x": ((10, 20), (40, 41))}
+
+
 def test_unknown_channel_lists_those_there_are(calibration):
     with pytest.raises(InputError, match="'gyro_w': it has gyro_x, accel_x, accel_y"):
         calibration["gyro_w"]

@@ -47,7 +47,7 @@ def test_slopes_and_whether_they_are_any():
     model = WhiteNoise(0.3) + GaussMarkov(0.5, 8.0)
     found["dof"] = slope_dof(model, ["sigma", "tau"], np.diag([0.01, 1.0]), 6000, DT)
     found["growth"] = error_growth(model, ["N", "sigma", "tau"], 6000, DT)
-    assert_as_recorded("slopes", found, rtol=1e-5)
+    assert_as_recorded("estimate/slopes", found, rtol=1e-5)
 
 
 def test_upper_bounds():
@@ -63,7 +63,7 @@ def test_upper_bounds():
     found += [upper_amplitude(coordinates, walk, 0, 0.0, 1e-2, 0.0, wv)]
     # Half a normal distribution has its 95 % quantile where the whole one has 97.5 %.
     assert quantile_above_zero(0.0, 2.0) == pytest.approx(2.0 * 1.959963985)
-    assert_as_recorded("upper_bounds", found, rtol=1e-5)
+    assert_as_recorded("estimate/upper_bounds", found, rtol=1e-5)
 
 
 def test_first_weights_and_starts():
@@ -78,7 +78,7 @@ def test_first_weights_and_starts():
     ):  # fmt: skip
         best = search(Profile(Design(model, Scales.of(wv)), wv.variance, root))
         found[repr(model)] = [list(best.shapes), best.x, best.objective]
-    assert_as_recorded("starts", found, rtol=1e-4)
+    assert_as_recorded("estimate/starts", found, rtol=1e-4)
 
 
 def test_information_of_a_spectrum():
@@ -87,7 +87,7 @@ def test_information_of_a_spectrum():
         coordinates = Coordinates(truth.opened())
         information = spectral_information(coordinates, truth.terms, 3000, DT)
         found[repr(truth)] = [information, deviations(information), regular_inverse(information)]
-    assert_as_recorded("information", found)
+    assert_as_recorded("estimate/information", found)
 
 
 def test_a_maximum_of_a_curved_ridge():
@@ -102,17 +102,17 @@ def test_a_maximum_of_a_curved_ridge():
     np.testing.assert_allclose(slope, [1.0 + 40.0 * 0.05, -40.0 * 0.05], rtol=1e-3)
     short = maximise(objective, np.array([-1.0, 1.2]), np.diag([10.0, 30.0]), max_steps=4)
     assert not short.converged
-    assert_as_recorded("ridge", [found, short.z], rtol=1e-4)
+    assert_as_recorded("estimate/ridge", [found, short.z], rtol=1e-4)
 
 
 def test_edges_of_bands():
-    assert_as_recorded("edges", [_edges(count) for count in (1, 5, 8, 9, 16, 100, 4097)])
+    assert_as_recorded("estimate/edges", [_edges(count) for count in (1, 5, 8, 9, 16, 100, 4097)])
 
 
 def test_what_an_estimation_is_judged_by():
     wv = variance(NOISE)
     at = FittedMoments.of(NOISE, wv, ("N", "sigma", "tau"), 0.0, 0.02)
-    assert_as_recorded("fitted_moments", at)
+    assert_as_recorded("estimate/fitted_moments", at)
 
 
 def test_more_parameters_than_levels():

@@ -135,6 +135,14 @@ def test_tables_fit_a_terminal():
     assert text == (GOLDEN / "filter_numbers.txt").read_text()
 
 
+def test_names_as_wide_as_a_page_have_a_column_a_row():
+    """Regression: there was no room for a column, which was a division by zero."""
+    for name, columns in (("x" * 90, 1), ("x" * 60, 1), ("x" * 58, 2)):
+        lines = SensorNumbers({name: WALK}).text("si").splitlines()
+        rows = [line.split() for line in lines if line.startswith(name)]
+        assert [len(row) - 1 for row in rows[:2]] == ([1, 1] if columns == 1 else [2, 1])
+
+
 def test_table():
     pandas = pytest.importorskip("pandas")
     table = SENSOR.to_frame()

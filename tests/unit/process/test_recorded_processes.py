@@ -14,48 +14,51 @@ from gmwm.process.kinds.arma import _decay_lags
 from gmwm.process.spectral import quadrature
 from gmwm.process.wavelet_gain import gain_weights, pair_weights
 from gmwm.process.wavelets import wavelet
-from recorded import assert_as_recorded
+from recorded import assert_as_recorded, summed
 
 DT = 0.02
 M = np.array([1.0, 2.0, 3.0, 8.0, 100.0, 4096.0])
 F = np.array([1e-4, 0.03, 1.0, 7.0, 24.0])
 FLAGS = (
-    "label", "prefix", "repeatable", "separable_shape", "ordered_by", "is_white", "compiled_kind",
-    "is_band_limited", "is_walk", "is_drift", "is_line", "has_finite_state_space",
-    "is_repeatable", "is_open",
+    "separable_shape", "is_white", "is_band_limited", "is_walk", "is_drift", "is_line",
+    "has_finite_state_space", "is_repeatable", "is_open",
 )  # fmt: skip
 
 
-def all_of(process):
-    found = {flag: getattr(process, flag) for flag in FLAGS}
-    found |= {
-        "parameters": list(process.parameters), "text": [repr(process), process.named()],
-        "dict": process.to_dict(), "psd": process.psd(F, DT), "lines": list(process.lines()),
-        "drift": process.drift_rate(), "haar": process.haar_variance(M * DT, DT),
-    }  # fmt: skip
+def curves_of(process):
     shape = tuple(process.values[each.name] for each in process.shape_parameters)
+    found = {
+        "psd": process.psd(F, DT), "haar": process.haar_variance(M * DT, DT),
+        "slopes": process.unit_haar_slopes(shape, M * DT, DT),
+        "space": summed(process.state_space(DT)),
+    }  # fmt: skip
     free = process.shape_to_free(shape)
     found["free"] = [free, process.shape_from_free(free)]
-    found["slopes"] = process.unit_haar_slopes(shape, M * DT, DT)
-    if shape:
-        found["unit"] = process.unit_haar_curves(M * DT, DT)(shape)
-        found["grids"] = [np.array(process.shape_grid(DT, n)) for n in (3, 40, 5000)]
     with suppress(gmwm.InputError):
         found["covariance"] = process.autocovariance(np.arange(12), DT)
     with suppress(gmwm.InputError):
         found["db3"] = process.wavelet_variance(M[[0, 1, 3]] * DT, DT, "db3")
-    form = process.state_space(DT)
-    found["space"] = form
-    if isinstance(process, gmwm.Resonance | gmwm.AR | gmwm.ARMA | gmwm.ARIMA):
-        return found  # roots of covariances have any sign
-    found["drawn"] = process.simulate(50, DT, 1)
+    if shape:
+        found["unit"] = process.unit_haar_curves(M * DT, DT)(shape)
+    if not isinstance(process, gmwm.Resonance | gmwm.AR | gmwm.ARMA | gmwm.ARIMA):
+        found["drawn"] = process.simulate(50, DT, 1)  # roots of covariances have any sign
     return found
 
 
 @pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.__name__)
 def test_a_process(kind):
-    found = {repr(process): all_of(process) for process in kind.examples()}
-    assert_as_recorded(f"process_{kind.__name__}", found)
+    examples = kind.examples()
+    one = examples[0]
+    found = {
+        "flags": [flag for flag in FLAGS if getattr(one, flag)], "texts": [one.label, one.named()],
+        "order": [one.prefix, one.repeatable, one.ordered_by, one.compiled_kind],
+        "parameters": [f"{p.name} {p.unit} {p.role} {p.lower} {p.upper}" for p in one.parameters],
+        "lines": list(one.lines()), "drift": one.drift_rate(), "dict": one.to_dict(),
+    }  # fmt: skip
+    if one.shape_parameters:
+        found["grids"] = [np.array(one.shape_grid(DT, n)) for n in (3, 40, 5000)]
+    found |= {repr(process): curves_of(process) for process in examples}
+    assert_as_recorded(f"process/process_{kind.__name__}", found)
 
 
 def test_grids_of_coefficients():
@@ -67,7 +70,7 @@ def test_grids_of_coefficients():
     np.testing.assert_allclose(found["AR(ar=1)"][:, 0], np.tanh([-1.5, -0.3, 0.5, 1.5, 3.0]))
     orders = (((), (0.3, 0.2)), ((0.5,), ()), ((0.9, -0.5), (0.1,)))
     found["lags"] = [_decay_lags(*each) for each in orders]
-    assert_as_recorded("grids", found)
+    assert_as_recorded("process/grids", found)
 
 
 def test_compiled_curves():
@@ -86,7 +89,7 @@ def test_compiled_curves():
         [curve(kind, np.array(shape), levels) for curve in (shaped_curve, shaped_slope)]
         for kind, shape in cases
     ]
-    assert_as_recorded("compiled_curves", found)
+    assert_as_recorded("process/compiled_curves", found)
 
 
 def test_weights_of_gains():
@@ -104,7 +107,7 @@ def test_weights_of_gains():
             [filters.levels(n) for n in (1, 7, 8, 9, 100)],
             np.abs(filters.transfer(3, f)),
         ]
-    assert_as_recorded("weights_of_gains", found)
+    assert_as_recorded("process/weights_of_gains", found)
 
 
 def test_no_process_dataclass_changes():
@@ -112,7 +115,7 @@ def test_no_process_dataclass_changes():
 
 
 def test_arguments_of_the_process_room_and_their_defaults():
-    assert_as_recorded("interface_process", signatures_of("process"))
+    assert_as_recorded("process/interface_process", signatures_of("process"))
 
 
 def test_curves_of_coefficients_need_no_integral(monkeypatch):

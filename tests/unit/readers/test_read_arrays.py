@@ -7,6 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
+from gmwm.readers.formats.arrays import Array, ArrayTable
 from gmwm.readers.names import CANONICAL
 
 
@@ -160,6 +161,14 @@ def test_entries_that_are_not_wanted_may_be_anything(save, samples):
 def test_bad_array(save, array, words):
     units = SI if array.shape[1:] == (6,) else {"gyro": "rad/s"}
     assert words in problem(save(array), units=units)
+
+
+def test_other_numbers_than_a_file_declares():
+    """Regression: damaged files of MATLAB had complex numbers, which were cut with a warning."""
+    like = np.zeros(80)
+    table = ArrayTable("a.mat", ("gyro_x",), (Array(like, lambda: like + 1j),))
+    with pytest.raises(InputError, match=r"^a\.mat, column 'gyro_x' holds complex numbers: save"):
+        table.load([0])
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 1e200])

@@ -120,3 +120,12 @@ def test_what_a_name_states_of_its_time(name, stated):
 def test_columns_of_dates_are_times_in_seconds(name, dates):
     assert of_dates(name) == dates
     assert meaning(dates).seconds == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "dates"),
+    [("gps stamp", "gps stamp [s]"), ("day of boot", "day of boot time [s]"), ("17", "17 [s]"),
+     ("utc 17", "utc 17 time [s]")],
+)  # fmt: skip
+def test_the_last_word_of_a_column_of_dates_says_whether_it_is_vague(name, dates):
+    assert of_dates(name) == dates

@@ -102,4 +102,9 @@ def test_a_given_shape_is_fixed_where_its_term_is_there(sigma, kind):
     model = WhiteNoise(1.0) + GaussMarkov(sigma, 10.0)
     rows = {row.key: row for row in estimates_of(model, "", {"N": 0.1}, {"N": (0.9, 1.1)}, {})}
     assert rows["tau"].kind == kind
+    assert rows["sigma"].kind == "fixed"  # zero is as given as any other
     assert rows["N"].kind == "estimated"
+    stderr, intervals = {"sigma": 0.1, "tau": 2.0}, {"sigma": (0.0, 0.3), "tau": (5.0, 20.0)}
+    rows = {row.key: row for row in estimates_of(model, "", stderr, intervals, {"sigma": 0.3})}
+    assert [row.kind for row in rows.values()] == ["fixed", "bound", "estimated"]
+    assert (rows["N"].lower, rows["N"].upper, rows["N"].stderr) == (1.0, 1.0, None)

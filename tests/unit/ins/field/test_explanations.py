@@ -126,69 +126,35 @@ def test_what_chance_gains_has_its_share_of_the_false_alarms():
     assert cost(1, 40) == pytest.approx(0.5 * chi2.isf(LEVEL / 40, 1), rel=1e-6)
 
 
+STEP = {"after": 3.0, "before": 5.5}
+AXES = {"x": 0.002, "y": 0.002, "z": 0.002}
+ARM = {"forward": 1.0, "right": -0.3, "down": 2.0}
+WANDER = {"north": 2.0, "east": 1.5, "down": 3.0, "tau": 60.0, "factor": 0.8}
 FAULTS = [
     ("time-offset", "", {"time offset": 0.234}, {"time offset": 0.01}),
     ("time-offset", "", {"time offset": -17.8}, {"time offset": 0.01}),
-    ("clock-step", "", {"time offset": 0.5, "after": 3.0, "before": 5.5}, {"time offset": 0.02}),
-    ("clock-step", "", {"time offset": -0.5, "after": 3.0, "before": 5.5}, {"time offset": 0.02}),
+    ("clock-step", "", {"time offset": 0.5, **STEP}, {"time offset": 0.02}),
+    ("clock-step", "", {"time offset": -0.5, **STEP}, {"time offset": 0.02}),
     ("clock-drift", "", {"drift": 5e-4}, {"drift": 1.2e-5}),
     ("clock-drift", "", {"drift": -5e-4}, {"drift": 1.2e-5}),
-    (
-        "scale-error",
-        "gyro",
-        {"x": 0.03, "y": -0.001, "z": 0.02},
-        {"x": 0.002, "y": 0.002, "z": 0.002},
-    ),
-    (
-        "scale-error",
-        "accel",
-        {"x": 0.001, "y": 0.001, "z": 0.02},
-        {"x": 0.002, "y": 0.002, "z": 0.002},
-    ),
-    (
-        "scale-error",
-        "accel",
-        {"x": 0.003, "y": 0.001, "z": 0.002},
-        {"x": 0.002, "y": 0.002, "z": 0.002},
-    ),
-    (
-        "lever-arm",
-        "",
-        {"forward": 1.0, "right": -0.3, "down": 2.0},
-        {"forward": 0.1, "right": 0.1, "down": 0.1},
-    ),
-    (
-        "lever-arm",
-        "",
-        {"forward": 1.0, "right": -0.3, "down": 2.0},
-        {"forward": 0.1, "right": 2.0, "down": 2.0},
-    ),
-    (
-        "lever-arm",
-        "",
-        {"forward": 1.0, "right": -0.3, "down": 2.0},
-        {"forward": 3.0, "right": 2.0, "down": 2.0},
-    ),
+    ("scale-error", "gyro", {"x": 0.03, "y": -0.001, "z": 0.02}, AXES),
+    ("scale-error", "accel", {"x": 0.001, "y": 0.001, "z": 0.02}, AXES),
+    ("scale-error", "accel", {"x": 0.003, "y": 0.001, "z": 0.002}, AXES),
+    ("lever-arm", "", ARM, dict.fromkeys(ARM, 0.1)),
+    ("lever-arm", "", ARM, {"forward": 0.1, "right": 2.0, "down": 2.0}),
+    ("lever-arm", "", ARM, {"forward": 3.0, "right": 2.0, "down": 2.0}),
     ("heading", "", {"heading": 1.5}, {"heading": 0.02}),
     ("axis-signs", "gyro", {"x": -1.0, "y": 1.0, "z": 0.0}, {}),
     ("axis-signs", "accel", {"x": 0.0, "y": 1.0, "z": 0.0}, {}),
     ("axis-signs", "accel", {"x": -1.0, "y": 1.0, "z": -1.0}, {}),
     ("outliers", "position", {"count": 1.0, "fraction": 0.01, "time": 4.0}, {}),
     ("outliers", "position", {"count": 3.0, "fraction": 0.05, "time": 4.0}, {}),
-    (
-        "coloured",
-        "position",
-        {"north": 2.0, "east": 1.5, "down": 3.0, "tau": 60.0, "factor": 0.8},
-        {},
-    ),
-    ("fix-noise", "position", {"factor": 1.2}, {}),
-    ("fix-noise", "velocity", {"factor": 3.0}, {}),
-    ("fix-noise", "height", {"factor": 0.3}, {}),
-    ("sensor-white-noise", "gyro", {"factor": 5.0}, {}),
-    ("sensor-white-noise", "gyro", {"factor": 900.0}, {}),
-    ("sensor-slow-errors", "accel", {"factor": 0.2}, {}),
-    ("sensor-slow-errors", "accel", {"factor": 900.0}, {}),
-]
+    ("coloured", "position", WANDER, {}),
+    *(("fix-noise", kind, {"factor": factor}, {}) for kind, factor in (
+        ("position", 1.2), ("velocity", 3.0), ("height", 0.3))),
+    *(("sensor-white-noise", "gyro", {"factor": factor}, {}) for factor in (5.0, 900.0)),
+    *(("sensor-slow-errors", "accel", {"factor": factor}, {}) for factor in (0.2, 900.0)),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -201,11 +167,11 @@ def test_words_for_every_fault(known):
         kind: Notice("sd-assumed", "note", kind, "", sizes, f"give {kind}_sd")
         for kind in ("position", "velocity") if known
     }  # fmt: skip
-    found = [
-        fault_notice(
+    found = {
+        f"{place} {code} {where}": fault_notice(
             Explanation(code, where, lambda log: log, replay, 20.0, 8.0, values, errors),
             100.0, assumed,
         )
-        for code, where, values, errors in FAULTS
-    ]  # fmt: skip
-    assert_as_recorded("fault_words_assumed" if known else "fault_words", found)
+        for place, (code, where, values, errors) in enumerate(FAULTS)
+    }  # fmt: skip
+    assert_as_recorded(f"ins/fault_words{'_assumed' * known}", found)

@@ -217,4 +217,4 @@ def test_what_is_not_given_is_as_documented() -> None:
         )
         for name, field in kind.model_fields.items() if not field.is_required()
     }  # fmt: skip
-    assert_as_recorded("spec_defaults", defaults)
+    assert_as_recorded("ins/spec_defaults", defaults)

@@ -174,6 +174,21 @@ def test_topics_of_two_rates(d435):
     assert set(only) == {"gyro_x", "gyro_y", "gyro_z", "temperature"}
 
 
+@pytest.mark.parametrize(
+    ("topics", "names"),
+    [(["/imu/warm"], ["temperature"]),
+     (["/imu/warm", "/case"], ["imu_warm_temperature", "case_temperature"])],
+)  # fmt: skip
+def test_of_several_thermometers_each_has_the_name_of_its_topic(tmp_path, topics, names):
+    warm = {
+        name: (TEMPERATURE_TYPE, [(t, temperature(ROS1, t, 30.0 + k)) for t in stamps(200)])
+        for k, name in enumerate(topics)
+    }
+    found = gmwm.read(write1(tmp_path / "a.bag", {"/imu": imu_topic(ROS1, X), **warm}))
+    assert [name for name in found if "temperature" in name] == names
+    assert [found[name].mean for name in names] == [30.0, 31.0][: len(names)]
+
+
 @pytest.mark.parametrize("storage", ["ROS1", "SQLITE3", "MCAP"])
 @pytest.mark.parametrize(
     ("absent", "there", "word"),
