@@ -19,7 +19,16 @@ model may have; the wavelet variances of channels with more outliers than can be
 robust."""
 
 # Codes of advice that only the user can follow.
-_ADVICE = ("stuck", "held", "filled", "saturation", "abrupt-end", "temperature", "variance")
+_ADVICE = (
+    "stuck",
+    "held",
+    "filled",
+    "saturation",
+    "abrupt-end",
+    "temperature",
+    "variance",
+    "resets",
+)
 
 
 @dataclass(frozen=True)

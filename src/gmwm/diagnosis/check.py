@@ -22,7 +22,7 @@ from gmwm.diagnosis.contamination import (
     light_tails_notice,
     tails_notice,
 )
-from gmwm.diagnosis.drift import drift_notice, variance_notice
+from gmwm.diagnosis.drift import drift_notice, reset_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, Signal, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
@@ -243,6 +243,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         rounding_notice(signal, noise),
         variance_notice(signal, errors, usable, is_heavy=tails is not None),
         drift_notice(signal, quiet),
+        reset_notice(signal, quiet),
     ]
     notices = [one for one in found if one is not None]
     standardized = _standardized(errors, usable)

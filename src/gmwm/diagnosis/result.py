@@ -87,7 +87,7 @@ class Health(Document, Printed):
         "infinite", "size", "stuck", "held", "saturation", "abrupt-end", "value-repeated",
         "repeated-samples", "interpolated", "filled", "event",
         "outliers", "heavy-tails", "light-tails", "rounding", "line", "resonance",
-        "drift", "variance", "temperature", "crosstalk" and "clean".
+        "drift", "resets", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str

@@ -168,6 +168,15 @@ RAMP = 20.0
 """Change over the record, in rms of the wander: 1 of 1000 random walks has more (200,000
 simulated)."""
 
+SHORTEST_RESET, PARTS_OF_RESET, MOST_PARTS, FEWEST_RESETS = 30.0, (8.0, 16.0), 512, 6
+"""s, of steps at equal times; parts in the time between two of them, whose means are compared;
+parts at most, the first ones; and steps of a record at least."""
+
+LARGEST_SQUARE, ABOVE_OTHERS, ABOVE_REST, CHANCE_OF_RESETS = 9.0, 2.0, 3.0, 1e-4
+"""Of a step of the level, in variances, so that few are not taken for many; how many times larger
+steps are at equal times than at any other place between (of a slow period as large at two), and
+than in the mean of these; and the chance of noise: a real accelerometer that wanders has 6e-4."""
+
 TENTHS = 10
 """Parts of the record among which the loudest is looked for."""
 

@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, Resonance, WhiteNoise
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.drift import _change_notice, drift_notice, part_means, variance_notice
+from gmwm.diagnosis.drift import (
+    _change_notice,
+    drift_notice,
+    part_means,
+    reset_notice,
+    variance_notice,
+)
 from gmwm.diagnosis.innovations import Innovations, Signal
 
 N = 2 * tuning.PARTS * tuning.SHORT_MEAN
@@ -131,3 +138,63 @@ def test_noise_below_half_a_step_is_not_compared(step, there):
     errors = errors_of([1.0] * 5 + [2.0] * 5)
     found = variance_notice(Signal("gyro_x", "rad/s", 0.01, step), errors, errors.known)
     assert (found is not None) is there
+
+
+def reset(values, every, mean, rate=50.0):
+    """Of which the mean of some seconds is taken off again and again."""
+    values, every, mean = values.copy(), round(every * rate), round(mean * rate)
+    for start in range(0, values.size, every):
+        values[start : start + every] -= np.mean(values[start : start + mean])
+    return values
+
+
+WALK = WhiteNoise(1e-4) + RandomWalk(2e-6)
+
+
+@pytest.mark.parametrize(
+    ("every", "seed", "gap"),
+    [(60.0, 1, False), (60.0, 2, True), (120.0, 3, True), (300.0, 2, False)],
+)
+def test_resets_at_equal_times(every, seed, gap):
+    values = reset(WALK.simulate(180_000, 0.02, seed), every, 1.0)
+    if gap:
+        values[70_000:75_000] = np.nan
+    notice = reset_notice(Signal("gyro_x", "rad/s", 0.02), values)
+    assert notice.severity == "warning"
+    ratio = notice.values["period"] / every
+    assert ratio == pytest.approx(round(ratio), rel=0.03)
+    assert 6 <= notice.values["times"] <= 3600.0 / every
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        WhiteNoise(1e-4), WALK, WhiteNoise(1e-4) + GaussMarkov(1e-4, 10.0),
+        WhiteNoise(1e-5) + QuantizationNoise(1e-5), WhiteNoise(1e-4) + Resonance(5e-5, 0.02, 0.02),
+    ],
+)  # fmt: skip
+def test_noise_is_not_reset(model):
+    for seed in range(5):
+        assert reset_notice(Signal("", "", 0.02), model.simulate(180_000, 0.02, seed)) is None
+
+
+@pytest.mark.parametrize("kind", ["sine", "steps", "swells", "knocks", "telegraph"])
+def test_what_is_no_reset_either(kind):
+    time = 0.02 * np.arange(180_000)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        white = WhiteNoise(1e-4).simulate(time.size, 0.02, seed)
+        ends = np.sort(rng.uniform(0.0, 3600.0, 8))
+        values = {
+            "sine": white + 1e-3 * np.sin(2.0 * np.pi * time / 200.0),
+            "steps": white + 1e-4 * rng.normal(size=9)[np.searchsorted(ends, time)],
+            "swells": white * (1.0 + 0.8 * np.sin(time / 500.0)),
+            "knocks": white + 0.02 * (rng.random(time.size) < 1e-4),
+            "telegraph": white + 1e-4 * (np.cumsum(rng.random(time.size) < 0.02 / 300.0) % 2),
+        }[kind]
+        assert reset_notice(Signal("", "", 0.02), values) is None
+
+
+def test_a_short_or_constant_record_has_no_resets():
+    for values in (np.zeros(180_000), np.full(180_000, np.nan), np.arange(1000.0)):
+        assert reset_notice(Signal("", "", 0.02), values) is None

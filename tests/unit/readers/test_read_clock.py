@@ -7,7 +7,6 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
-from gmwm.readers.clock import change_notice
 from gmwm.readers.clock.jumps import find_change
 
 
@@ -152,12 +151,13 @@ def test_a_rate_that_changes(long):
     assert "from 100 to 71 Hz at about 60 s" in found.text
 
 
-@pytest.mark.parametrize(
-    ("rates", "said"),
-    [((100.0, 71.0), "100 to 71"), ((50.0, 49.9962), "50 to 49.996"), ((50.0, 50.0), "50 to 50")],
-)
-def test_rates_have_the_digits_in_which_they_differ(rates, said):
-    assert f"goes from {said} Hz near line 5" in change_notice(rates, 50.0, "line 5").text
+def test_a_rate_that_comes_and_goes(long):
+    time = np.arange(60_000) / 50.0
+    recording = read(long(time + 3.0 * np.sin(2.0 * np.pi * time / 600.0)), units=UNITS)
+    (found,) = [notice for notice in recording.notices if notice.code == "rate-changes"]
+    first, then = sorted((found.values["before"], found.values["after"]))
+    assert first == pytest.approx(48.5, abs=0.2) and then == pytest.approx(51.6, abs=0.2)
+    assert f"{found.values['before']:.4g} to {found.values['after']:.4g} Hz" in found.text
 
 
 @pytest.mark.parametrize("then", [50.0, 30.0, 200.0, 300.0])

@@ -24,10 +24,9 @@ def change_notice(
     time: When, s, if that is known.
     """
     first, then = rates
-    digits = next((d for d in range(4, 12) if f"{first:.{d}g}" != f"{then:.{d}g}"), 12)
     when = f"near {row}" if time is None else f"at about {time:.4g} s"
     text = (
-        f"the sampling rate goes from {first:.{digits}g} to {then:.{digits}g} Hz {when}, and "
+        f"the sampling rate goes from {first:.4g} to {then:.4g} Hz {when}, and "
         f"{used:.6g} Hz is taken for all of it"
     )
     values = {"before": first, "after": then, "rate": used}

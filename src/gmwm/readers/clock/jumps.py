@@ -132,7 +132,8 @@ def find_change(stamps: FloatArray) -> Change | None:
     the one from part to part, a few missing rows the other.
 
     stamps: (n,), increasing.
-    Returns: the largest from one part to the next.
+    Returns: the largest from one part to the next; of a rate that comes and goes, so that the
+        parts before and after it differ by less than half as much, to the fastest or the slowest.
     """
     steps = np.diff(stamps)
     parts = min(tuning.RATE_PARTS, steps.size // tuning.LEAST_PART)
@@ -154,6 +155,10 @@ def find_change(stamps: FloatArray) -> Change | None:
     edge = int(np.argmax(np.abs(np.diff(np.log(means))))) + 1
     row = sum(part.size for part in rows[:edge])
     before, after = (float(1.0 / np.median(some)) for some in (means[:edge], means[edge:]))
+    if 2.0 * abs(np.log(before / after)) < _distance(means, fast, slow):
+        first, then = sorted((fast, slow))
+        row = sum(part.size for part in rows[:then])
+        before, after = float(1.0 / means[first]), float(1.0 / means[then])
     return Change(row, (before, after))
 
 
