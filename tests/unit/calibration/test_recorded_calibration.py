@@ -52,15 +52,15 @@ def fit(x, model=None, dt=1.0):
 
 
 CURVES = {
-    "both": 0.8 * (T > 900) - 0.9 * (T > 2100), "transient": 3.0 * np.exp(-T / 150),
+    "down": -0.6 * (T > 400), "both": 0.8 * (T > 900) - 0.9 * (T > 2100), "transient": 3.0 * np.exp(-T / 150),
 }  # fmt: skip
 
 
 def test_departures():
     found = {}
-    for name in ("both", "transient"):
+    for name in ("down", "both", "transient"):
         x = NOISE + CURVES[name]
-        if name == "both":
+        if name == "down":
             x[1000:1200] = np.nan
         one = fit(x)
         there = departures(one)
