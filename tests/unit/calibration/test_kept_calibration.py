@@ -221,7 +221,7 @@ def test_which_channels_are_used_and_judged():
     more = np.where(np.arange(100) < 51, np.nan, NOISE[:100])
     for name, x in {"noise": NOISE[:100], "half": half, "more": more, "one": np.ones(100), "gone": half * np.nan,
                     "half one": half * 0 + 1.0, "less one": more * 0 + 1.0}.items():  # fmt: skip
-        found[name] = _reason_to_skip(Channel("gyro_x", x, 1.0, "gyro", "rad/s"))
+        found[name] = _reason_to_skip(Channel("gyro_x", x, 1.0, "gyro", "rad/s"), ())
     short, fast = (
         Recording.from_arrays({"gyro_x": NOISE}, rate, GYRO, source="b") for rate in (1.0005, 1.002)
     )
