@@ -704,7 +704,11 @@ def test_a_real_recording_with_outliers():
 
 def test_screening_can_be_left_out():
     calibration = gmwm.calibrate(noisy_recording(), screening=())
-    assert calibration.notices == ()
+    # The shock is a pulse, then.
+    assert [notice.code for notice in calibration.notices] == ["longest-part"]
+    assert [n.code for n in calibration["gyro_x"].notices if n.severity == "bad"][-2:] == [
+        "step"
+    ] * 2
     assert not calibration.is_examined
     assert calibration["gyro_x"].wv.gaps is None
     assert "sinusoid_amplitude" not in calibration["accel_x"].params
