@@ -92,28 +92,13 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     known = np.empty((0, means.first.size))
     if len(noise) < len(fitted.model.terms):
         known = means.differences(means.step * np.arange(float(means.blocks.size))[None, :])
-    basic, found = known, list[tuple[float, _Test]]()
-    for _ in range(tuning.MOST_DEPARTURES):
-        beside = [noise.beside(known) for noise in noises]
-        tests = [_Test.of(family, means, beside) for family in kinds]
-        evidence = _evidence(tests)
-        best = max(tests, key=lambda test: test.log_evidence)
-        if evidence < tuning.POSSIBLE:
-            break
-        known = _basis(np.vstack([known, means.differences(best.neighbours)]))
-        # A drift of the whole record has a test of its own (slope_p_value): here it competes only.
-        if best.family.kind != "drift":
-            found.append((evidence, best))
-            if evidence < tuning.EVIDENT:
-                break
-        else:
-            basic = _basis(np.vstack([basic, means.differences(best.neighbours)]))
+    found, straight = _found(kinds, means, noises, known)
     places = [(*each, *place) for each in found for place in each[1].places(kinds[0])]
     departed = []
     # Each was found with those after it in the data.
     for i, (evidence, whole, family, _) in enumerate(places):
         others = [means.differences(near) for k, (*_, near) in enumerate(places) if k != i]
-        known = _basis(np.vstack([basic, *others])) if others else basic
+        known = _basis([straight, *others])
         test = _Test.of(family, means, [noise.beside(known) for noise in noises])
         curve = test.curve
         if whole.family.is_pulse and not family.is_pulse:
@@ -126,6 +111,33 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
             for time, size in zip(test.times, test.sizes, strict=True)
         ]
     return tuple(departed)
+
+
+def _found(
+    kinds: Sequence[Family], means: _Means, noises: list[_Noise], known: FloatArray
+) -> tuple[list[tuple[float, _Test]], FloatArray]:
+    """Departures with their evidence, each beside those before it, and the known straight drift.
+
+    known: (k, D), of the model.
+    """
+    found, straight = list[tuple[float, _Test]](), known
+    for _ in range(tuning.MOST_DEPARTURES):
+        beside = [noise.beside(known) for noise in noises]
+        tests = [_Test.of(family, means, beside) for family in kinds]
+        evidence = _evidence(tests)
+        best = max(tests, key=lambda test: test.log_evidence)
+        if evidence < tuning.POSSIBLE:
+            break
+        near = means.differences(best.neighbours)
+        known = _basis([known, near])
+        # A drift of the whole record has a test of its own (slope_p_value): here it competes only.
+        if best.family.kind == "drift":
+            straight = _basis([straight, near])
+            continue
+        found.append((evidence, best))
+        if evidence < tuning.EVIDENT:
+            break
+    return found, straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,12 +396,13 @@ def _evidence(tests: Sequence[_Test]) -> float:
     return float(np.exp(min(found, tuning.LARGEST_LOG_EVIDENCE)))
 
 
-def _basis(rows: FloatArray) -> FloatArray:
-    """Orthonormal rows that span the same."""
-    _, sizes, basis = np.linalg.svd(
-        rows / np.linalg.norm(rows, axis=1)[:, None], full_matrices=False
-    )
-    return np.asarray(basis[sizes > tuning.SPANNED * sizes[0]])
+def _basis(curves: Sequence[FloatArray]) -> FloatArray:
+    """Orthonormal rows that span the same as differences of curves, each (k, D)."""
+    rows = np.vstack(curves)
+    norms = np.linalg.norm(rows, axis=1)[:, None]
+    # A step before the first block that exists has no differences.
+    _, sizes, basis = np.linalg.svd((rows / np.where(norms > 0.0, norms, 1.0)), full_matrices=False)
+    return np.asarray(basis[sizes > tuning.SPANNED * np.max(sizes, initial=0.0)])
 
 
 def _share(curve: FloatArray, step: float, fitted: Fit) -> float:

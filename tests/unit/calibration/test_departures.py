@@ -139,6 +139,15 @@ def test_gaps_do_not_hide_a_step():
     assert found.time[1] - 60.0 <= 4300.0 <= found.time[2] + 60.0
 
 
+def test_a_step_beside_a_record_that_begins_with_a_gap():
+    # Steps before its first block have no differences: their singular values did not converge.
+    x = noise(8) + 4.0 * SAMPLE * (TIME > 680.0)
+    x[:640] = np.nan
+    (found,) = departures(fitted(x))
+    assert found.kind == "step"
+    assert found.time[1] <= 680.0 <= found.time[2]
+
+
 def test_too_short_a_record_has_none():
     x = noise(9)[:12]
     assert departures(fitted(x, WhiteNoise())) == ()

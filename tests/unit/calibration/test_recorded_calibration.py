@@ -90,7 +90,7 @@ def test_parts_of_departures():
     covariance = means.covariance(lambda f, _: np.ones_like(f))
     found["means"] = [means.blocks.size, means.samples, means.step, means.length, means.first.size,
                       float(np.trace(covariance)), float(covariance[3, 4]), float(covariance.sum())]  # fmt: skip
-    found["basis"] = _basis(np.array([[1.0, 0, 0], [2.0, 0, 0], [1.0, 1, 0]])).shape
+    found["basis"] = _basis([np.array([[1.0, 0, 0], [2.0, 0, 0], [1.0, 1, 0]])]).shape
     one = fit(NOISE)
     found["share"] = [_share(np.cos(np.arange(100) / k), 8.0, one) for k in (2.0, 20.0)]
     for kind in ("step", "transient", "drift-at-start", "slow-period"):
