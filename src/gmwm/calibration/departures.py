@@ -259,9 +259,12 @@ class _Test:
         few = csr_array(curves)  # of a step, two differences
         if few.nnz < tuning.FEW * curves.size:
             curves = few
-        alone = [each.log_weight - 0.5 * float(data @ each.inverse @ data) for each in noises]
-        posterior = np.array(alone) - logsumexp(alone)
+        whole = np.array([float(data @ each.inverse @ data) for each in noises])
+        alone = np.array([each.log_weight for each in noises]) - 0.5 * whole
+        posterior = alone - logsumexp(alone)
         squares = np.array([_squares(family, curves, each, data) for each in noises])
+        # Rounding errors of a noise that is hardly one go beyond what there is to be taken away.
+        squares = np.clip(squares, 0.0, np.maximum(whole, 0.0)[:, None])
         most = posterior + _gain(np.max(squares, axis=1), family.rank)
         some = np.flatnonzero(most > np.max(most) - tuning.NO_EVIDENCE)
         beside = posterior[some, None] + _gain(squares[some], family.rank)
