@@ -37,6 +37,11 @@ FOUND = [
     ("odd", 11, 7),  # noise without slow parts, which leaves no drift
     ("odd", 12, 52),  # a variance below the smallest number
     ("odd", 12, 92),  # an upper bound below zero
+    ("odd", 5, 172),  # integrals of which one is exactly known
+    ("odd", 5, 183),  # a density below the smallest number
+    ("odd", 6, 214),  # the same, of which an amplitude has no information
+    ("odd", 5, 305),  # a level of negative variance, across gaps
+    ("odd", 5, 485),  # nearly no noise beside what is looked for
     ("hdf5", 13, 218),  # a unit of 3.9 GB
 ]
 

@@ -49,10 +49,13 @@ def _taken_notices(
     removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance
 ) -> list[Notice]:
     """What a model lacks without what was taken off, and whether that was noise of the sensor."""
-    lost = np.sqrt(before.variance[: after.variance.size] / after.variance)
+    levels = min(before.tau.size, after.tau.size)  # what is taken off leaves gaps
+    rest = after.variance[:levels]
+    ratio = np.divide(before.variance[:levels], rest, out=np.zeros(levels), where=rest > 0.0)
+    lost = np.sqrt(np.maximum(ratio, 0.0))
     most = int(np.argmax(lost))
     notices = []
-    if lost[most] ** -2 < 1.0 - tuning.HARMFUL_SHARE:
+    if lost[most] ** 2 * (1.0 - tuning.HARMFUL_SHARE) > 1.0:
         values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
         text = (
             f"with what was taken off, the record has {brief(values['ratio'])} times the deviation "

@@ -99,7 +99,10 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     for i, (evidence, whole, family, _) in enumerate(places):
         others = [means.differences(near) for k, (*_, near) in enumerate(places) if k != i]
         known = _basis([straight, *others])
-        test = _Test.of(family, means, [noise.beside(known) for noise in noises])
+        beside = _beside(noises, known)
+        if not beside:
+            continue
+        test = _Test.of(family, means, beside)
         curve = test.curve
         if whole.family.is_pulse and not family.is_pulse:
             curve, evidence = whole.curve, min(evidence, _evidence([test]))
@@ -122,7 +125,9 @@ def _found(
     """
     found, straight = list[tuple[float, _Test]](), known
     for _ in range(tuning.MOST_DEPARTURES):
-        beside = [noise.beside(known) for noise in noises]
+        beside = _beside(noises, known)
+        if not beside:
+            break
         tests = [_Test.of(family, means, beside) for family in kinds]
         evidence = _evidence(tests)
         best = max(tests, key=lambda test: test.log_evidence)
@@ -213,6 +218,12 @@ class _Noise:
         )
 
 
+def _beside(noises: list[_Noise], known: FloatArray) -> list[_Noise]:
+    """Noises for what is orthogonal to known curves, but for those that leave nothing there."""
+    found = [noise.beside(known) for noise in noises]
+    return [each for each in found if np.isfinite(each.log_weight + np.sum(each.inverse))]
+
+
 def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
     """The fitted noise with its part above the floor scaled, and a random walk beside it."""
     # K^2 that equals the floor at that averaging time.
@@ -264,9 +275,9 @@ class _Test:
         posterior = alone - logsumexp(alone)
         squares = np.array([_squares(family, curves, each, data) for each in noises])
         # Rounding errors of a noise that is hardly one go beyond what there is to be taken away.
-        squares = np.clip(squares, 0.0, np.maximum(whole, 0.0)[:, None])
+        squares = np.clip(np.nan_to_num(squares), 0.0, np.maximum(whole, 0.0)[:, None])
         most = posterior + _gain(np.max(squares, axis=1), family.rank)
-        some = np.flatnonzero(most > np.max(most) - tuning.NO_EVIDENCE)
+        some = np.flatnonzero(most >= np.max(most) - tuning.NO_EVIDENCE)
         beside = posterior[some, None] + _gain(squares[some], family.rank)
         evidence = np.asarray(logsumexp(beside, axis=0))
         best = int(np.argmax(evidence))

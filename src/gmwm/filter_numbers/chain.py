@@ -37,8 +37,14 @@ class ChainErrors:
     actual: FloatArray
 
     def nees(self) -> FloatArray:
-        """Expected normalised error squared per degree of freedom, (T,)."""
-        ratio = np.linalg.solve(self.predicted, self.actual)
+        """Expected normalised error squared per degree of freedom, (T,).
+
+        Of what the filter does not predict to be exactly known.
+        """
+        size = np.sqrt(np.diagonal(self.predicted, axis1=1, axis2=2))
+        scale = np.where(size > 0.0, size, 1.0)
+        outer = scale[:, :, None] * scale[:, None, :]
+        ratio = np.linalg.pinv(self.predicted / outer, hermitian=True) @ (self.actual / outer)
         return np.asarray(np.trace(ratio, axis1=1, axis2=2) / self.predicted.shape[1])
 
     def worst(self) -> FloatArray:

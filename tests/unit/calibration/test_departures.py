@@ -10,7 +10,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Departure, departures
-from gmwm.calibration.departure_notices import departure_notice
+from gmwm.calibration.departure_notices import _taken_notices, departure_notice
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
 from gmwm.cli.hints import with_option
@@ -361,6 +361,16 @@ def test_what_was_taken_off_is_what_the_model_lacks():
     assert ratio == pytest.approx(np.max(np.sqrt(raw.variance / model)), rel=0.3)
     assert tau > 1000.0 and ratio > 5.0
     assert fit.valid
+
+
+def test_what_is_taken_off_may_leave_a_longer_curve():
+    # A gap that a step is in is longer than what is missing about another one.
+    long = gmwm.wavelet_variance(noise(10), dt=DT)
+    short = replace(long, tau=long.tau[:-2], variance=long.variance[:-2])
+    for before, after in ((long, short), (short, long)):
+        doubled = replace(before, variance=4.0 * before.variance)
+        (notice,) = _taken_notices([], doubled, after)
+        assert notice.values["ratio"] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(

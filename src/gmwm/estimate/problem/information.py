@@ -73,7 +73,12 @@ def log_slopes(
 ) -> FloatArray:
     """Slopes d log S / d z at ``f`` (Hz), shape (len(f), d)."""
     own, rows = slopes(coordinates, processes, f, dt)
-    return (rows / np.sum(own, axis=0)).T
+    return _relative(rows, np.sum(own, axis=0)).T
+
+
+def _relative(slopes: FloatArray, density: FloatArray) -> FloatArray:
+    """Slopes of the logarithm; none of a density below the smallest number."""
+    return np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
 
 
 def spectral_information(
@@ -101,7 +106,7 @@ def information_with(
 
     def information(amplitude: float) -> FloatArray:
         times = amplitude / now
-        scaled = np.where(mine, times * rows, rows) / (others + times * own[term])
+        scaled = _relative(np.where(mine, times * rows, rows), others + times * own[term])
         return np.asarray((weight * scaled) @ scaled.T)
 
     return information

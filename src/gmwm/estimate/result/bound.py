@@ -93,10 +93,14 @@ def upper_amplitude(
 
 
 def _whole(process: Process, wv: WaveletVariance) -> float:
-    """95 % upper bound of an amplitude to which every level is due, whichever has the least."""
+    """95 % upper bound of an amplitude to which every level is due, whichever has the least.
+
+    Of levels whose variance is positive: across gaps it need not be.
+    """
     alone = Scales.of(wv).curve(process.with_amplitude(1.0))
     tail = (1.0 - tuning.UPPER_LEVEL) / wv.tau.size
     upper = (
         wv.dof * wv.variance / np.maximum(2.0 * gammaincinv(0.5 * wv.dof, tail), _LEAST_QUANTILE)
     )
-    return float(np.min(upper[alone > 0.0] / alone[alone > 0.0], initial=np.inf))
+    known = (alone > 0.0) & (wv.variance > 0.0)
+    return float(np.min(upper[known] / alone[known], initial=np.inf))

@@ -97,7 +97,8 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
     def logarithms(values: FloatArray) -> FloatArray:
         terms = model.with_params(dict(zip(keys, map(float, values), strict=True))).terms
         moved = replace(target, terms=tuple([terms[i] for i in counted]))
-        return np.log(_densities(moved, f, is_white))
+        # A density of steps of 1e-200 is below all numbers.
+        return np.log(np.maximum(_densities(moved, f, is_white), np.finfo(float).tiny))
 
     columns = []
     for column in root.T:
