@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -219,6 +220,19 @@ def test_calibrate(calibrated):
 
 def test_nothing_but_results_where_there_is_no_terminal(calibrated):
     assert calibrated[1] == ""
+
+
+def test_every_step_is_printed(capsys):
+    """Of notices with one code only the last one was, and none beside a worse one."""
+    x = WhiteNoise(1e-4).simulate(3600, 1.0, seed=1)
+    fit = gmwm.fit(WhiteNoise(), x, 1.0)
+    severities = ("bad", "bad", "warning")
+    notices = [Notice("step", each, "", f"step {k}") for k, each in enumerate(severities)]
+    fits = {"gyro_x": replace(fit, notices=(*fit.notices, *notices))}
+    show(Calibration(fits=fits, skipped={}, source="p.csv", rate=1.0, n=3600))
+    printed = capsys.readouterr().out
+    assert [f"gyro_x is not valid: step {k}" in printed for k in range(2)] == [True, True]
+    assert "gyro_x: step 2" in printed
 
 
 def test_a_second_run_replaces_the_files(run, good_file, calibrated, tmp_path, no_pages):

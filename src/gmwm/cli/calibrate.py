@@ -235,13 +235,14 @@ def show(result: Calibration) -> None:
     # `click.echo` takes a terminal of ASCII for one of UTF-8.
     print("\n".join(wrapped(f"{result.source}: {size}", indent=2)))
     print_whole(new_console(), _table(result))
-    reasons = {
-        (name, notice.code): f"{name} is not valid: {with_option(notice)}"
+    reasons = [
+        (name, notice)
         for name, fit in result.fits.items()
         for notice in fit.notices
         if notice.severity == "bad"
-    }
-    shown = [each for each in result.notices if (each.where, each.code) not in reasons]
+    ]
+    said = {(name, notice.code) for name, notice in reasons}
+    shown = [each for each in result.notices if (each.where, each.code) not in said]
     found = [each for each in worst_first(gathered(shown)) if _is_shown(each)]
     counted = {each.where for each in found if each.code == "event"}  # with their samples
     found = [e for e in found if e.code != "events-left-out" or e.where not in counted]
@@ -252,8 +253,9 @@ def show(result: Calibration) -> None:
         if isinstance(fit, JointFit):
             remarks.append(f"{name}: {fit.agreement}")
         of_fit = [each for each in fit.notices if each.code not in _OF_RECORDING]
-        remarks += [f"{name}: {with_option(n)}" for n in of_fit if (name, n.code) not in reasons]
-    for remark in (*reasons.values(), *remarks):
+        remarks += [f"{name}: {with_option(n)}" for n in of_fit if n.severity != "bad"]
+    invalid = [f"{name} is not valid: {with_option(notice)}" for name, notice in reasons]
+    for remark in (*invalid, *remarks):
         print("\n".join(wrapped(remark, first="- ", indent=2)))
 
 
