@@ -76,17 +76,19 @@ def _taken_notices(
 
 
 def _found_notices(found: Sequence[Departure], unit: str, *, removing: bool) -> list[Notice]:
-    """Of what was not taken off: where there is so much of it, the slow terms stand for it."""
+    """Of what was not taken off: for a level that jumps between two, the slow terms stand."""
     evident = [each for each in found if each.is_evident]
-    if removing or len(evident) <= tuning.MOST_REMOVED:
-        return [departure_notice(each, unit, stays=removing) for each in found]
+    many = len(evident) > tuning.MOST_REMOVED and _is_between_two_levels(evident)
+    notices = [departure_notice(each, unit, stays=removing) for each in found]
+    if removing or not many:
+        return notices
     text = (
-        f"{len(evident)} departures: a level that changes so often is noise of the sensor, for "
-        "which the slow terms of the model stand"
+        f"{len(evident)} departures: a level that steps between two levels is noise of the "
+        "sensor, for which the slow terms of the model stand"
     )
-    values = {"removed": 0, "two_levels": _is_between_two_levels(evident)}
-    many = Notice("departures-many", "warning", "", text, values, "find what switches so")
-    return [many, *(_alone(departure_notice(each, unit)) for each in evident)]
+    values = {"removed": 0, "two_levels": True}
+    jumps = Notice("departures-many", "warning", "", text, values, "find what switches so")
+    return [jumps, *map(_alone, notices)]
 
 
 def _alone(notice: Notice) -> Notice:

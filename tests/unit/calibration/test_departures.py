@@ -363,6 +363,18 @@ def test_what_was_taken_off_is_what_the_model_lacks():
     assert fit.valid
 
 
+def test_pulses_of_several_sizes_are_no_noise_of_the_sensor():
+    # As many as a level that jumps between two has: a slow term would predict several times more.
+    x = noise(21, WHITE)
+    for start, size in ((900.0, 0.1), (3000.0, -0.25), (5200.0, 0.18)):
+        x += size * SAMPLE * ((start < TIME) & (start + 150.0 > TIME))
+    fit = gmwm.calibrate(recording(x), WhiteNoise() + GaussMarkov(), screening=())["gyro_x"]
+    steps = [one for one in fit.notices if one.code == "step" and one.values["evident"]]
+    assert len(steps) > 4
+    assert not fit.reasons["stationary"]
+    assert "departures-many" not in {one.code for one in fit.notices}
+
+
 def test_what_is_taken_off_may_leave_a_longer_curve():
     # A gap that a step is in is longer than what is missing about another one.
     long = gmwm.wavelet_variance(noise(10), dt=DT)
