@@ -9,7 +9,7 @@ import numpy as np
 from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
-from gmwm._core.typing import QUARTILE, BoolArray, FloatArray, inner, median
+from gmwm._core.typing import QUARTILE, BoolArray, FloatArray, IntArray, inner, median
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations, Signal
 
@@ -17,11 +17,19 @@ from gmwm.diagnosis.innovations import Innovations, Signal
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
     """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
-    rows = values[: size * parts].reshape(parts, size)
+    return _present_means(*_sums(values[: size * parts], size), least * size)
+
+
+def _sums(values: FloatArray, size: int) -> tuple[FloatArray, IntArray]:
+    """Sums of the samples that are present in parts of a size, and their numbers."""
+    rows = values[: values.size // size * size].reshape(-1, size)
     known = ~np.isnan(rows)
-    count = np.count_nonzero(known, axis=1)
-    total = np.sum(np.where(known, rows, 0.0), axis=1)
-    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
+    return np.sum(rows, axis=1, where=known), np.count_nonzero(known, axis=1)
+
+
+def _present_means(total: FloatArray, count: IntArray, fewest: float) -> FloatArray:
+    """Of parts by their sums; NaN where no more than so many samples are present."""
+    return np.where(count > fewest, total / np.maximum(count, 1), np.nan)
 
 
 def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
@@ -92,13 +100,26 @@ def reset_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """
     found, groups = (1.0, 0.0, 0), 0
     size = values.size // tuning.PARTS
-    while size * signal.dt >= tuning.SHORTEST_RESET / tuning.PARTS_OF_RESET[0]:
-        for first in (0, size // 2):
-            count = min((values.size - first) // size, tuning.MOST_PARTS)
-            means = part_means(values[first : first + count * size], count)
+    times_shortest = size * signal.dt * tuning.PARTS_OF_RESET[0] / tuning.SHORTEST_RESET
+    if times_shortest < 1.0:
+        return None
+    halvings = int(np.log2(times_shortest))
+    unit = size >> halvings + 1  # half of the shortest part
+    if unit == 0:
+        return None
+    sums = _sums(values, unit)
+    for power in range(halvings + 1):
+        merged = 2 << power
+        for first in (0, merged // 2):
+            count = min((sums[0].size - first) // merged, tuning.MOST_PARTS)
+            total, known = (
+                np.sum(each[first : first + count * merged].reshape(count, merged), axis=1)
+                for each in sums
+            )
+            means = _present_means(total, known, 0.5 * merged * unit)
             chance, period, times = _most_regular(means[2:] - means[:-2])
-            found, groups = min(found, (chance, period * size * signal.dt, times)), groups + 1
-        size //= 2
+            found = min(found, (chance, period * merged * unit * signal.dt, times))
+            groups += 1
     chance, period, times = found
     if chance * max(groups, 1) > tuning.CHANCE_OF_RESETS:
         return None
