@@ -79,7 +79,9 @@ def _found_notices(found: Sequence[Departure], unit: str, *, removing: bool) -> 
     """Of what was not taken off: for a level that jumps between two, the slow terms stand."""
     evident = [each for each in found if each.is_evident]
     many = len(evident) > tuning.MOST_REMOVED and _is_between_two_levels(evident)
-    notices = [departure_notice(each, unit, stays=removing) for each in found]
+    notices = [
+        departure_notice(each, unit, stays=removing, back=_way_back(each, found)) for each in found
+    ]
     if removing or not many:
         return notices
     text = (
@@ -89,6 +91,12 @@ def _found_notices(found: Sequence[Departure], unit: str, *, removing: bool) -> 
     values = {"removed": 0, "two_levels": True}
     jumps = Notice("departures-many", "warning", "", text, values, "find what switches so")
     return [jumps, *map(_alone, notices)]
+
+
+def _way_back(step: Departure, found: Sequence[Departure]) -> Departure | None:
+    """The other step of a pulse, whose share is that of both."""
+    alike = (o for o in found if o is not step and (o.kind, o.share) == (step.kind, step.share))
+    return next(alike, None) if step.share else None
 
 
 def _alone(notice: Notice) -> Notice:
@@ -118,11 +126,14 @@ def _removed_notice(found: Departure, unit: str) -> Notice:
     return replace(notice, values={**notice.values, "removed": True}, action="taken off")
 
 
-def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Notice:
+def departure_notice(
+    found: Departure, unit: str, *, stays: bool = False, back: Departure | None = None
+) -> Notice:
     """What it is, and whether a fit beside it is valid.
 
     unit: Of the channel, SI.
     stays: Whether taking it off was tried, so that it is no advice.
+    back: The other step of a pulse.
     """
     size, low, high = (readable(each, unit, sign=True) for each in found.size)
     size = f"{size} ({low} .. {high})"
@@ -152,8 +163,9 @@ def departure_notice(found: Departure, unit: str, *, stays: bool = False) -> Not
     if found.is_evident:
         severity = "bad" if harmful else "warning"
         part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
+        who = f"it and the step at {back.time[0]:.4g} s account" if back else "it accounts"
         text = (
-            f"{what}; it accounts for {part} of the model's wavelet variance, so that slow "
+            f"{what}; {who} for {part} of the model's wavelet variance, so that slow "
             "terms of the model are too large"
         )
         action = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"

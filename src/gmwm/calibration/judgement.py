@@ -74,7 +74,7 @@ def with_one_remedy(
         return replace(
             notice,
             values=values,
-            action="calibrate the longest part without them, or subtract them",
+            action="leave it out with the others, or subtract them",
         )
 
     alike = {

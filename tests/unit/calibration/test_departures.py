@@ -10,7 +10,11 @@ from scipy.stats import binom
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Departure, departures
-from gmwm.calibration.departure_notices import _taken_notices, departure_notice
+from gmwm.calibration.departure_notices import (
+    _found_notices,
+    _taken_notices,
+    departure_notice,
+)
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
 from gmwm.cli.hints import with_option
@@ -294,9 +298,7 @@ def test_several_steps_have_one_remedy_for_the_whole_recording():
         (b[0] - a[1], a[1], b[0]) for a, b in pairwise([(0, 0.0), *edges, (found.duration, 0)])
     )
     assert (advice.values["start"], advice.values["stop"]) == pytest.approx(kept[1:])
-    assert {n.action for n in steps} == {
-        "calibrate the longest part without them, or subtract them"
-    }
+    assert {n.action for n in steps} == {"leave it out with the others, or subtract them"}
     action = with_option(advice).action
     assert action.endswith("or --remove-departures, which subtracts them")
     assert f"--start {kept[1]:.6g}" in action or f"--stop {kept[2]:.6g}" in action
@@ -334,6 +336,9 @@ def test_a_pulse_whose_steps_are_not_evident_alone(start, stop):
     assert up.is_evident and down.is_evident
     assert up.time[1] - 30.0 <= start <= up.time[2]
     assert down.time[1] <= stop <= down.time[2] + 30.0
+    told = _found_notices(found, "rad/s", removing=False)
+    assert all("it and the step at" in notice.text for notice in told)
+    assert not any("it and the step" in n.text for n in _found_notices([up], "u", removing=False))
     if stop - start > 60.0:  # longer than blocks
         assert up.size[1] < size < up.size[2]
         assert down.size[1] < -size < down.size[2]

@@ -57,7 +57,7 @@ def test_the_longest_part_without_any(notices, part):
     assert "remove_departures" in advice.action
     assert f"{part[1] - part[0]:,.0f} s of 100 s" in advice.text
     for notice in found["gyro_x"].fit.notices:
-        assert notice.values["together"] and "longest part" in notice.action
+        assert notice.values["together"] and "with the others" in notice.action
     assert found["accel_y"].fit.notices == ()
 
 
