@@ -54,6 +54,8 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 Samples = Annotated[int, Field(ge=1, le=checks.MOST_SAMPLES)]
+Freedom = Annotated[int, Field(ge=-checks.MOST_SAMPLES, le=checks.MOST_SAMPLES)]
+"""Degrees of freedom of a fit; negative where it has more parameters than moments."""
 Rate = Annotated[float, Field(ge=1.0 / checks.LONGEST_INTERVAL, le=1.0 / checks.SHORTEST_INTERVAL)]
 Interval = Annotated[float, Field(ge=checks.SHORTEST_INTERVAL, le=checks.LONGEST_INTERVAL)]
 Keys = Annotated[Sequence[Text], Field(max_length=1000)]

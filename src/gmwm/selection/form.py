@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from gmwm._core.forms import Form, Model, NotNegative
+from gmwm._core.forms import Form, Freedom, Model, NotNegative
 
 
 class CandidateForm(Form):
@@ -17,8 +17,8 @@ class CandidateForm(Form):
     criterion: float
     objective: NotNegative
     chi_square: NotNegative
-    n_parameters: Annotated[int, Field(ge=1)]
-    dof: int
+    n_parameters: Annotated[int, Field(ge=1, le=1_000_000)]
+    dof: Freedom
 
 
 class SelectionForm(Form):

@@ -41,7 +41,7 @@ EFFICIENCY = 0.6
 _QUARTILE = 0.6744897501960817  # median of |Z|
 _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256
-_SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.53; 1 - 1e-7 is below 1e4
+_SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.395; 1 - 1e-7 is below 1e4
 _TOLERANCE = 1e-7  # of the last Newton step in log nu^2; the error left is its square
 _FEW = 2**14  # coefficients; below, counting costs more than it saves
 _ZERO = 1e-6  # times the root mean square: a median below counts as zero
@@ -69,13 +69,13 @@ def consistency(c: float) -> float:
     return float(weight @ biweight_square(r, c))
 
 
-def _signed_efficiency(c: float) -> float:
-    """Efficiency, negative where the equation has its slope the wrong way round."""
+def _root_of_efficiency(c: float) -> float:
+    """Square root of the efficiency, negative where the equation has its slope the wrong way."""
     r, weight = half_normal(c)
     chi = biweight_square(r, c)
     slope = weight @ ((r**2 - 1.0) * chi)
     spread = weight @ chi**2 - (weight @ chi) ** 2
-    return float(slope * abs(slope) / (2.0 * spread))
+    return float(slope / np.sqrt(2.0 * spread))
 
 
 @lru_cache(maxsize=64)
@@ -88,10 +88,11 @@ def tuning_constant(efficiency: float = EFFICIENCY) -> float:
     """
     if not 0.0 < efficiency < 1.0:
         raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
-    if efficiency >= _signed_efficiency(_LARGEST_C):
+    root = np.sqrt(efficiency)
+    if root >= _root_of_efficiency(_LARGEST_C):
         return _LARGEST_C
     return float(
-        brentq(lambda c: _signed_efficiency(c) - efficiency, _SMALLEST_C, _LARGEST_C, xtol=1e-13)
+        brentq(lambda c: _root_of_efficiency(c) - root, _SMALLEST_C, _LARGEST_C, xtol=1e-13)
     )
 
 

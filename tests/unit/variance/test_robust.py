@@ -82,6 +82,7 @@ def test_tuning_constant_rises_with_the_efficiency():
     values = [tuning_constant(e) for e in np.linspace(0.001, 0.999, 60)]
     assert np.all(np.diff(values) > 0.0)
     assert tuning_constant(1.0 - 1e-12) >= values[-1]
+    assert 2.39 < tuning_constant(1e-300) < tuning_constant(1e-20) < values[0]
 
 
 @pytest.mark.parametrize("efficiency", [0.0, 1.0, -0.5, 2.0, np.nan])

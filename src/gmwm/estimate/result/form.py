@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from gmwm._core.forms import (
     Form,
+    Freedom,
     Keys,
     Model,
     Notices,
@@ -40,7 +41,7 @@ class FitForm(Form):
     objective: float | None
     chi_square: float | None
     chi_square_allowed: float | None
-    dof: int
+    dof: Freedom
     discrepancy: NotNegative
     method: Text
     weights: Text
