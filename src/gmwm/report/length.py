@@ -25,9 +25,8 @@ def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
         return float("nan")
     with np.errstate(all="ignore"):
         value, lower, upper = fit.deviation_interval(np.array([tau]), 0.6827, rivals)
-    if not value[0] > 0.0:
-        return float("nan")
-    return float(max(upper[0] / value[0], value[0] / lower[0]) - 1.0)
+        farthest = max(upper[0] / value[0], value[0] / lower[0]) - 1.0
+    return float(farthest) if value[0] > 0.0 else float("nan")
 
 
 def _known(calibration: Calibration, horizon: float) -> Mapping[str, float]:
