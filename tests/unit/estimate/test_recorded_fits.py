@@ -110,20 +110,26 @@ def test_robust_and_other_wavelets_and_simulated_moments():
     assert_as_recorded("estimate/fit_other", {k: all_of(v) for k, v in found.items()}, rtol=1e-4)
 
 
-@pytest.mark.parametrize("method", [MLE(), Whittle(), EM(tolerance=1e-7)], ids=lambda m: m.name)
+@pytest.mark.parametrize("method", [MLE(), Whittle()], ids=lambda m: m.name)
 def test_likelihoods(method):
-    cases = {}  # a needless term's size is where EM stops
-    if method.name != "whittle":
+    cases = {}
+    if method.name == "mle":
         cases["gaps"] = (N + FAST + K, None, {"missing": 0.05})
-    if method.name != "em":
-        cases["needless"] = (N + FAST, N + FAST + K, {})
-        cases["ramp"] = (N + RateRamp(0.2), None, {})
-        cases["quantized"] = (QuantizationNoise(1e-4) + N + FAST, None, {})
+    cases["needless"] = (N + FAST, N + FAST + K, {})
+    cases["ramp"] = (N + RateRamp(0.2), None, {})
+    cases["quantized"] = (QuantizationNoise(1e-4) + N + FAST, None, {})
     found = {
         name: all_of(fitted(truth, model, method, n=200, **options))
         for name, (truth, model, options) in cases.items()
     }
     assert_as_recorded(f"estimate/fit_by_{method.name}", found, rtol=2e-3)
+
+
+def test_likelihood_by_em():
+    """Of a maximum that is reached: how many steps that takes is not the same on every machine."""
+    found = all_of(fitted(N + GaussMarkov(0.05, 0.2), None, EM(), n=400, missing=0.05))
+    del found["trace"], found["text"]
+    assert_as_recorded("estimate/fit_by_em", found, rtol=2e-3)
 
 
 def test_lines_of_the_allan_plot():
