@@ -21,6 +21,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import allantools
 import numpy as np
@@ -186,14 +187,14 @@ def simulated(n):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=1_000_000)
-    parser.add_argument("--folder", type=Path, default=Path("benchmark-out"))
     parser.add_argument("--only-print", action="store_true", help="Leave the page as it is.")
     given = parser.parse_args()
-    given.folder.mkdir(exist_ok=True)
     warnings.simplefilter("ignore")  # statsmodels' own about convergence
     x = TRUTH.simulate(given.samples, DT, seed=1)
     short = TRUTH.simulate(SHORT, 1.0, seed=2)
-    lines = [*of_main_job(simulated(given.samples), given.folder), *of_variance(x)]
+    with TemporaryDirectory() as folder:
+        lines = of_main_job(simulated(given.samples), Path(folder))
+    lines += of_variance(x)
     lines += [*of_fits(x, short), *of_navigation()]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "allantools",

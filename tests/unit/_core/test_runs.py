@@ -184,8 +184,12 @@ def work(run):
         time.sleep(300.0)
     return {"run": run}
 
+def note(done, *_):
+    Path(sys.argv[1], f"done-{done}").touch()
+
 if __name__ == "__main__":
-    do_runs(work, 20, {"name": "sleep"}, folder=Path(sys.argv[1], "runs"), jobs=2)
+    folder = Path(sys.argv[1], "runs")
+    do_runs(work, 20, {"name": "sleep"}, folder=folder, jobs=2, progress=note)
 """
 
 
@@ -212,7 +216,7 @@ def test_an_end_leaves_no_worker_and_finished_runs(tmp_path, end):
         [sys.executable, program, tmp_path], stderr=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
-    until(lambda: len(list(tmp_path.glob("pid-*"))) == 2)
+    until(lambda: len(list(tmp_path.glob("pid-*"))) == 2 and (tmp_path / "done-4").exists())
     workers = [int(path.name[4:]) for path in tmp_path.glob("pid-*")]
     process.send_signal(end)
     assert process.wait(60) != 0
