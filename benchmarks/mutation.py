@@ -87,10 +87,13 @@ class _WithoutGuards(ast.NodeTransformer):
 
 
 def _is_change(mutant: Mutant, tree: Path) -> bool:
-    """Whether it is one: 1e60 + 1 is 1e60."""
+    """Whether it is one: 1e60 + 1 is 1e60, and ``{*a, *b}`` with a power in it is no Python."""
     source = (tree / mutant.path).read_text()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
-    before, after = (ast.dump(_WithoutGuards().visit(ast.parse(s))) for s in (source, changed))
+    try:
+        before, after = (ast.dump(_WithoutGuards().visit(ast.parse(s))) for s in (source, changed))
+    except SyntaxError:
+        return False
     return before != after
 
 
