@@ -43,6 +43,7 @@ FOUND = [
     ("odd", 5, 305),  # a level of negative variance, across gaps
     ("odd", 5, 485),  # nearly no noise beside what is looked for
     ("hdf5", 13, 218),  # a unit of 3.9 GB
+    ("mat", 77, 255),  # numbers of a type that there is none of: scipy ended the process
     ("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits

@@ -27,6 +27,7 @@ from gmwm.readers.formats.arrays import (
     is_sensor,
 )
 from gmwm.readers.formats.extras import library
+from gmwm.readers.formats.mat_tags import check_types
 from gmwm.readers.names import bare, meaning
 
 _MAT_73 = b"MATLAB 7.3"
@@ -116,6 +117,7 @@ def open_mat(path: Path) -> ArrayTable:
     from scipy.io import loadmat, whosmat
 
     with damage_named(path.name):
+        check_types(path)
         variables = whosmat(path)
         read = lru_cache(maxsize=1)(
             lambda name: loadmat(path, variable_names=[name], simplify_cells=True)[name]
