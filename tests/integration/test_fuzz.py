@@ -43,6 +43,7 @@ FOUND = [
     ("odd", 5, 305),  # a level of negative variance, across gaps
     ("odd", 5, 485),  # nearly no noise beside what is looked for
     ("hdf5", 13, 218),  # a unit of 3.9 GB
+    ("hdf5", 77, 537),  # free space in a heap that ends before it: the library read on for ever
     ("mat", 77, 255),  # numbers of a type that there is none of: scipy ended the process
     ("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing

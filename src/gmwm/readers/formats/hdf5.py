@@ -87,7 +87,9 @@ def _check_heaps(stream: BinaryIO) -> None:
                 size = int.from_bytes(data[place + 8 : place + 16], "little")
                 if index == 0 and size == 0:
                     raise ValueError("free space of no size in a heap")
-                place = end if index == 0 else place + 16 + -(-size // 8) * 8
+                place += 16 + -(-size // 8) * 8 if index else size
+                if place > end:
+                    raise ValueError("more in a heap than it has room for")
             start = data.find(_HEAP, start + 1)
         for unit in _UNIT.finditer(data) if first >= 0 else ():
             if int.from_bytes(unit[1], "little") > len(data):
