@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 
 _CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
 _DEFINED = re.compile(rb"^[A-Z][A-Z0-9_, ]*(?=[:=])", re.MULTILINE)
@@ -36,7 +38,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _stamped(loop: Any) -> Any:
-    """Let what is kept on disk count as long as no compiled file changes.
+    """Let what is kept on disk count as long as no compiled file changes, and be made once.
 
     Numba looks at the file of the function only. A loop holds the code and the constants of what it
     calls, so after an upgrade that changed another file it would go on with the old ones.
@@ -44,7 +46,35 @@ def _stamped(loop: Any) -> Any:
     kept = getattr(getattr(loop, "_cache", None), "_cache_file", None)
     if kept is not None:
         kept._source_stamp = digest_of(Path(__file__).parents[1])
+        compile_now, index = loop.compile, Path(kept._index_path)
+
+        def compile_once(signature: Any) -> Any:
+            with _alone(index):
+                return compile_now(signature)
+
+        loop.compile = compile_once
     return loop
+
+
+@contextmanager
+def _alone(index: Path) -> Iterator[None]:
+    """Wait for a process that compiles the same loop for the first time, and load what it made.
+
+    index: Of what is kept of the loop. Where there is one, nobody waits.
+    """
+    if index.exists():
+        yield
+        return
+    from filelock import FileLock
+
+    lock = index.with_suffix(".lock")
+    # Threads take numba's own lock first, in this order, so that no two wait for each other.
+    with global_compiler_lock, ExitStack() as held:
+        with suppress(OSError):  # numba says where nothing can be kept
+            index.parent.mkdir(parents=True, exist_ok=True)
+            held.callback(lock.unlink, missing_ok=True)
+            held.enter_context(FileLock(lock))
+        yield
 
 
 @lru_cache(maxsize=1)

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.runs import PROCESSES, beside, one_blas_thread, shared, spare
+from gmwm._core.runs import (
+    PROCESSES,
+    beside,
+    one_blas_thread,
+    shared,
+    spare,
+    while_beginning,
+)
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
@@ -34,6 +41,7 @@ from gmwm.calibration.screening import (
 from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.diagnosis import thinned
 from gmwm.errors import InputError
+from gmwm.estimate import compile_steps
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.variance import MIN_SAMPLES
@@ -105,7 +113,7 @@ def calibrate(
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
     others = spare(jobs, max(len(each.inertial) for each in given))
-    with beside(others if size > tuning.WORTH_PROCESSES else 0, __name__):
+    with beside(others if size > tuning.WORTH_PROCESSES else 0, "gmwm.estimate:compile_search"):
         return _calibrated(given, model, screening, still, remove_departures, progress)
 
 
@@ -139,6 +147,7 @@ def _calibrated(
         _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
         for name, parts in alive.items()
     ]
+    while_beginning(compile_steps)
     found = _models_found(channels, progress)
     issues = [
         replace(notice, source=each.recording.source) if len(given) > 1 else notice

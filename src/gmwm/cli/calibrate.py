@@ -134,7 +134,7 @@ def calibrate(
         from gmwm._core.runs import beside, spare
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.calibration")
+        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage

@@ -16,5 +16,10 @@ from gmwm.estimate.entrance import (
 )
 from gmwm.estimate.likelihood import EM as EM, MLE as MLE, Whittle as Whittle
 from gmwm.estimate.lines import AllanLines as AllanLines
-from gmwm.estimate.moments import GMWM as GMWM, SimulatedMoments as SimulatedMoments
+from gmwm.estimate.moments import (
+    GMWM as GMWM,
+    SimulatedMoments as SimulatedMoments,
+    compile_search as compile_search,
+    compile_steps as compile_steps,
+)
 from gmwm.estimate.result import Estimate as Estimate, Fit as Fit, JointFit as JointFit

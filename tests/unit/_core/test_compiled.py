@@ -96,3 +96,31 @@ def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants_that_o
         assert (digest(tmp_path) != first) == (name != "b/other.py"), name
         (tmp_path / name).write_text(text)
     assert digest(tmp_path) == first
+
+
+_BOTH = """
+import sys, time
+from pathlib import Path
+from once_loop import inner
+here = Path(sys.argv[1])
+(here / f"ready-{sys.argv[2]}").touch()
+while len(list(here.glob("ready-*"))) < 2:
+    time.sleep(0.01)
+inner()
+print(sum(inner.stats.cache_misses.values()), sum(inner.stats.cache_hits.values()))
+"""
+
+
+def test_of_two_processes_one_compiles_and_the_other_loads_it(tmp_path):
+    (tmp_path / "once_loop.py").write_text(_CALLEE.format("1.5"))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    began = [
+        subprocess.Popen(
+            [sys.executable, "-c", _BOTH, tmp_path, str(i)], env=environment, text=True,
+            stdout=subprocess.PIPE,
+        )
+        for i in range(2)
+    ]  # fmt: skip
+    counts = sorted(each.communicate(timeout=120)[0].split() for each in began)
+    assert counts == [["0", "1"], ["1", "0"]]
+    assert not list(tmp_path.rglob("*.lock"))

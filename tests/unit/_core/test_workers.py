@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from gmwm import InputError
-from gmwm._core.runs import beside, results, shared, spare
+from gmwm._core.runs import beside, results, shared, spare, while_beginning, workers
 
 
 class Square:
@@ -58,14 +58,35 @@ def test_this_process_shares_the_work_and_does_what_another_could_not(tmp_path):
             drawn.append(number)
             yield number
 
-    with beside(1, "math"), beside(1, "math"):
+    with beside(1, "time:time"), beside(1, "time:time"):
+        until_ready()
         found = shared(work, items())
         assert next(found)[0] == 2 and drawn[:2] == [1, 2]  # the first one was sent
         assert dict(found) == {n: n**2 for n in (1, *range(3, 9))}
-    with beside(1, "math"):
+    with beside(1, "time:time"):
+        until_ready()
         unsent = dict(shared(Unsendable(), (3, 4)))
     assert unsent == {3: os.getpid(), 4: os.getpid()}
     assert dict(shared(work, iter((3, 2)))) == {3: 9, 2: 4}
+
+
+def until_ready():
+    for each in workers._beside.get()[1]:
+        each.result(60.0)
+
+
+def test_nothing_waits_for_a_process_that_is_not_ready(tmp_path):
+    helped = []
+    while_beginning(lambda: helped.append("alone"))
+    with beside(1, "time:time"):
+        until_ready()
+        while_beginning(lambda: helped.append("ready"))
+    with beside(1, "signal:pause"):
+        while_beginning(lambda: helped.append("beginning"))
+        assert helped == ["beginning"]
+        found = dict(shared(Square(tmp_path), range(1, 9)))
+    assert found == {n: n**2 for n in range(1, 9)}
+    assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}
 
 
 class Unsendable:
@@ -82,7 +103,8 @@ def test_processes_end_with_an_interrupt(tmp_path):
     def pids():
         return {path.name.partition("-")[2] for path in tmp_path.iterdir()} - {str(os.getpid())}
 
-    with pytest.raises(KeyboardInterrupt), beside(1, "math"):
+    with pytest.raises(KeyboardInterrupt), beside(1, "time:time"):
+        until_ready()
         dict(shared(Square(tmp_path), range(50)))
         other = int(min(pids()))
         os.kill(other, 0)

@@ -9,4 +9,5 @@ from gmwm._core.runs.workers import (
     results as results,
     shared as shared,
     spare as spare,
+    while_beginning as while_beginning,
 )

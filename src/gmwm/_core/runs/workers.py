@@ -13,9 +13,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, partial
-from importlib import import_module
 from multiprocessing import current_process
 from pickle import PicklingError
+from pkgutil import resolve_name
 from queue import SimpleQueue
 from threading import Lock, Thread
 from time import sleep
@@ -79,17 +79,17 @@ def spare(jobs: int, items: int) -> int:
     return max(min(cores if jobs == -1 else checks.whole("jobs", jobs, 1), cores, items) - 1, 0)
 
 
-_beside: ContextVar[tuple[Any, int]] = ContextVar("beside", default=(None, 0))
-"""The pool, and how many processes it has."""
+_beside: ContextVar[tuple[Any, Sequence[Future[Any]]]] = ContextVar("beside", default=(None, ()))
+"""The pool, and what each of its processes begins with."""
 
 
 @contextmanager
-def beside(others: int, module: str) -> Iterator[None]:
+def beside(others: int, first: str) -> Iterator[None]:
     """Processes for `shared` that end with the block, unless there are some already.
 
-    They import what they need while this process does something else.
+    first: "module:function", what they import and call while this process does something else.
     """
-    if not others or _beside.get()[1]:
+    if not others or _beside.get()[0] is not None:
         yield
         return
     from joblib.externals.loky import ProcessPoolExecutor
@@ -97,17 +97,22 @@ def beside(others: int, module: str) -> Iterator[None]:
     try:
         # None: they do not end while they wait for work, only with this block or this process.
         pool = ProcessPoolExecutor(max_workers=others, timeout=None)
-        for _ in range(others):
-            pool.submit(_in_worker, import_module, module, os.getpid())
+        begun = [pool.submit(_in_worker, _called, first, os.getpid()) for _ in range(others)]
     except (ImportError, OSError):  # a machine without semaphores, or one that lets none be started
         yield
         return
-    token = _beside.set((pool, others))
+    token = _beside.set((pool, begun))
     try:
         yield
     finally:
         _beside.reset(token)
         pool.shutdown(kill_workers=True)
+
+
+def while_beginning(work: Callable[[], object]) -> None:
+    """Do what helps the processes `beside` this one, if one of them is not ready."""
+    if not all(each.done() for each in _beside.get()[1]):
+        work()
 
 
 def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
@@ -117,7 +122,7 @@ def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
     sent to a process, or was sent to one that ended, is done here.
     """
     left, lock, sent, received = iter(items), Lock(), 0, 0
-    pool, others = _beside.get()
+    pool, begun = _beside.get()
     ended: SimpleQueue[tuple[T, Future[tuple[T, R]] | None]] = SimpleQueue()
 
     def drawn(to_send: bool) -> T | None:
@@ -141,8 +146,8 @@ def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
         ended.put((item, future))
         send()
 
-    for _ in range(others):
-        send()
+    for each in begun:  # nothing waits for a process that is not ready
+        each.add_done_callback(lambda _: send())
     while True:
         if ended.empty():
             if (own := drawn(False)) is not None:
@@ -214,6 +219,10 @@ def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]
             n_jobs=jobs, pre_dispatch=f"{_WAITING} * n_jobs", return_as="generator_unordered"
         )
     yield from pool(delayed(_in_worker)(work, item, os.getpid()) for item in items)
+
+
+def _called(name: str) -> None:
+    resolve_name(name)()
 
 
 def _in_worker(work: Work[T, R], item: T, parent: int) -> tuple[T, R]:

@@ -3,7 +3,12 @@
 from gmwm.estimate.moments.design import Design as Design
 from gmwm.estimate.moments.discrepancy import suffices as suffices
 from gmwm.estimate.moments.gmwm import GMWM as GMWM, SimulatedMoments as SimulatedMoments
-from gmwm.estimate.moments.profile import Point as Point, Profile as Profile
+from gmwm.estimate.moments.profile import (
+    Point as Point,
+    Profile as Profile,
+    compile_search as compile_search,
+    compile_steps as compile_steps,
+)
 from gmwm.estimate.moments.start import (
     Reference as Reference,
     dictionary as dictionary,

@@ -17,8 +17,9 @@ from scipy.optimize import leastsq
 from gmwm._core.typing import FloatArray
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.profile_kernels import profiled, projected
-from gmwm.estimate.moments.refinement_kernels import refined
-from gmwm.process import Shape
+from gmwm.estimate.moments.refinement_kernels import damped_step, refined
+from gmwm.estimate.problem import Scales
+from gmwm.process import GaussMarkov, Shape, WhiteNoise
 
 _MAX_EVALUATIONS = 200
 _TOLERANCES = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-9}
@@ -153,3 +154,21 @@ class Profile:
             residual, z0, Dfun=jacobian, maxfev=_MAX_EVALUATIONS, full_output=True, **_TOLERANCES
         )[0]
         return self.at(design.unpack(np.clip(found, low, high), template))
+
+
+def compile_search() -> None:
+    """Have the loops of a search ready: where none is kept on disk, compiling them takes seconds.
+
+    Another process does it while this one reads and examines a recording.
+    """
+    model, tau = WhiteNoise() + GaussMarkov(), np.array([1.0, 2.0, 4.0, 8.0])
+    design = Design(model, Scales(tau, 1.0, 32))
+    profile = Profile(design, np.ones(4), np.eye(4))
+    profile.refine(profile.at([(), (1.0,)]))
+
+
+def compile_steps() -> None:
+    """Those of its loops that `compile_search` comes to last, for a process that waits for it."""
+    vector, matrix = np.ones(2), np.eye(2)
+    projected(matrix, matrix, vector, matrix, vector)
+    damped_step(matrix, vector, vector, 1.0, 0.0, True)

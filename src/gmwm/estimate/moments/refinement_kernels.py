@@ -195,7 +195,7 @@ def _inside(z: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 @compiled()
-def _damped(
+def damped_step(
     r: FloatArray, b: FloatArray, scale: FloatArray, radius: float, damping: float, is_full: bool
 ) -> tuple[FloatArray, float]:
     """The step of least squares within a radius, and the damping that keeps it there (Moré)."""
@@ -326,7 +326,7 @@ def refined(
                 at += 1
         r, b = _triangular(moving, residual)
         while True:
-            step, damping = _damped(r, b, own, radius, damping, is_full)
+            step, damping = damped_step(r, b, own, radius, damping, is_full)
             moved = z.copy()
             for k in range(active.size):
                 moved[active[k]] += step[k]

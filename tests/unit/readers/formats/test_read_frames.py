@@ -226,7 +226,8 @@ def test_missing_half_floats_of_any_pattern_are_missing():
 )
 def test_a_damaged_heap_of_hdf5_is_refused_before_its_library_reads_it(place, size, tmp_path):
     """It goes on without end where free space has no size, or where it ends before the heap does
-    and zeros follow."""
+    and zeros follow.
+    """
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
         file["gyro_x"] = np.random.default_rng(3).normal(size=300)
