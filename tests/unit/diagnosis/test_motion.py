@@ -161,6 +161,7 @@ def test_what_touches_a_move():
     [
         (2, "from 10 to 12 s, 20 to 23 s"),
         (3, "from 10 to 12 s, 20 to 23 s, 30 to 34 s"),
+        (4, "from 20 to 23 s, 30 to 34 s, 40 to 45 s, and 1 shorter one"),
         (5, "from 30 to 34 s, 40 to 45 s, 50 to 56 s, and 2 shorter ones"),
     ],
 )
