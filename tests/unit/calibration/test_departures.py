@@ -119,6 +119,14 @@ def test_several_are_found_beside_each_other():
     assert sorted(one.time[0] for one in found) == pytest.approx([1500.0, 4300.0], abs=60.0)
 
 
+def test_shares_of_steps_as_far_from_either_end_are_as_the_squares_of_their_sizes():
+    level = np.searchsorted([2880.0, 4320.0], TIME, side="right")
+    first, second = departures(fitted(noise(5, WHITE) + SAMPLE * level))
+    assert first.time[0] + second.time[0] == pytest.approx(N * DT, abs=20.0)
+    ratio = (first.size[0] / second.size[0]) ** 2
+    assert first.share / second.share == pytest.approx(ratio, rel=0.02)
+
+
 def test_a_step_beside_a_ramp_of_the_model():
     x = noise(6) + 2e-6 * TIME
     model = WhiteNoise() + RandomWalk() + RateRamp()
@@ -409,6 +417,18 @@ def test_three_steps_between_two_levels_are_noise_of_the_sensor(sizes, seed, bet
     many = [one.values["two_levels"] for one in fit.notices if one.code == "departures-many"]
     assert many == [True] * between
     assert fit.valid is not between
+
+
+def test_steps_follow_each_other_by_their_likeliest_times():
+    def step(time, latest, size):
+        return Departure("step", (time, time, latest), (size, size - 0.05, size + 0.05), 1e3, 0.5)
+
+    ends = (900.0, 250.0, 350.0)  # the first may be as late as the others
+    steps = [step(100.0 * (k + 1), end, (-1.0) ** k) for k, end in enumerate(ends)]
+    notices = _found_notices(
+        [*steps, *[step(1e3 + k, 2e3, 1.0) for k in range(2)]], "u", removing=False
+    )
+    assert notices[0].code == "departures-many"
 
 
 def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():

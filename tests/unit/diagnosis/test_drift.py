@@ -1,13 +1,18 @@
 """Numbers of slow changes, against the same from the definition."""
 
+from statistics import variance
+
 import numpy as np
 import pytest
+from scipy.stats import chi2, kurtosis, norm
 
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, Resonance, WhiteNoise
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.drift import (
     _change_notice,
+    _most_regular,
+    _unsteadiness,
     drift_notice,
     part_means,
     reset_notice,
@@ -138,6 +143,40 @@ def test_noise_below_half_a_step_is_not_compared(step, there):
     errors = errors_of([1.0] * 5 + [2.0] * 5)
     found = variance_notice(Signal("gyro_x", "rad/s", 0.01, step), errors, errors.known)
     assert (found is not None) is there
+
+
+@pytest.mark.parametrize(("share", "found"), [(1.01, True), (0.99, False)])
+def test_unsteady_noise_is_as_unlikely_as_the_variance_of_means_of_its_parts(
+    share, found, monkeypatch
+):
+    size = np.abs(np.random.default_rng(5).normal(size=512))
+    size *= np.repeat([0.6, 1.0, 1.4, 0.7, 1.0, 0.6, 1.3, 1.0], 64)
+    bounded = np.minimum(size, 2.0)
+    means, neighbours = (bounded.reshape(-1, each).mean(axis=1) for each in (64, 16))
+    ratio = 64 * variance(means) / (8 * np.mean(np.diff(neighbours) ** 2))
+    freedom = 2.0 / (2.0 / 7.0 + kurtosis(bounded) / 512)
+    monkeypatch.setattr(tuning, "FALSE_ALARM", share * chi2.sf(freedom * ratio, freedom))
+    known = np.ones(512, dtype=bool)
+    unsteady = _unsteadiness(0.01, Innovations(size, known, np.ones(512), 0.0), known, False)
+    assert (unsteady is not None) is found
+
+
+def test_steps_at_equal_times_are_measured_by_the_mean_of_the_others():
+    """Ten large steps, ten places apart; of five far from them, two are larger than the others."""
+    quartile = norm.isf(0.25)
+
+    def over_expected(larger):
+        steps = np.ones((10, 10))
+        steps[:, 0] = 10.0  # counts as nine variances
+        steps[:, [4, 6]] = np.sqrt(larger) / quartile
+        chance, period, times = _most_regular(steps.ravel())
+        assert period == pytest.approx(10.0, abs=0.1) and times == 10
+        rest = max((3.0 * quartile**2 + 2.0 * larger) / 5.0, 1.0)
+        return chance / chi2.sf(10 * 9.0 / rest, 10)
+
+    places = over_expected(0.5)  # at which there could be steps
+    assert over_expected(3.0) == pytest.approx(places, rel=1e-6)
+    assert over_expected(4.4) == pytest.approx(places, rel=1e-6)
 
 
 def reset(values, every, mean, rate=50.0):

@@ -36,6 +36,12 @@ def test_common_divisor_of_levels_that_leave_some_out():
     assert step_size(x) == pytest.approx(0.25, rel=1e-9)
 
 
+def test_the_smallest_difference_may_be_six_steps():
+    levels = np.cumsum([0, 6, 6, 7, 11, 6, 7, 11, 6, 6, 11, 7, 6]) * 0.25
+    x = np.random.default_rng(2).choice(levels, size=2000)
+    assert step_size(x) == pytest.approx(0.25, rel=1e-9)
+
+
 def test_two_levels_are_one_step_apart():
     x = np.where(np.random.default_rng(3).random(500) < 0.1, 0.3, 0.1)
     assert step_size(x) == pytest.approx(0.2)

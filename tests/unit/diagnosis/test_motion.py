@@ -17,6 +17,7 @@ from gmwm.diagnosis.motion.motion import (
     find_motion,
     is_moved_with,
 )
+from gmwm.diagnosis.motion.notices import motion_notices
 
 G, DT = 9.80665, 0.05
 SIZE = max(round(tuning.MOTION_BLOCK / DT), tuning.FEWEST_OF_MOTION)
@@ -153,3 +154,18 @@ def test_what_touches_a_move():
     )  # fmt: skip
     assert motion.outside(events, 0.1) == ((10, 20), (480, 499), (551, 570))
     assert Motion((tilt, turn), ()).outside(events, 0.1) == events
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (2, "from 10 to 12 s, 20 to 23 s"),
+        (3, "from 10 to 12 s, 20 to 23 s, 30 to 34 s"),
+        (4, "from 20 to 23 s, 30 to 34 s, 40 to 45 s, and 1 shorter one"),
+        (5, "from 30 to 34 s, 40 to 45 s, 50 to 56 s, and 2 shorter ones"),
+    ],
+)
+def test_the_three_longest_moves_are_named_and_the_others_counted(count, words):
+    moves = [Move(10.0 * k, 11.0 * k + 1.0, k + 1.0, 0.3, 0.0) for k in range(1, count + 1)]
+    (notice,) = motion_notices(Motion(tuple(moves), ()))
+    assert notice.text.endswith(words)

@@ -265,6 +265,12 @@ def test_bad_regions_are_refused(corner, regions, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("region", [(8, 1), (-4, -1), (1,), "18", (1, float("nan"))])
+def test_a_bad_region_is_refused_before_there_are_data(region):
+    with pytest.raises(InputError, match=r"regions\['K'\]"):
+        gmwm.AllanLines(regions={"N": (1, 8), "K": region})
+
+
 @pytest.mark.parametrize("option", ["omega", "weights"])
 def test_weights_of_a_method_that_has_none_are_refused(corner, option):
     for method in ("allan", gmwm.AllanLines(), "em", gmwm.MLE()):

@@ -1,13 +1,18 @@
 """Axes put together, and the comments on them, from numbers made by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gmwm import InputError
+import gmwm
+from gmwm import GaussMarkov, InputError, RandomWalk, WhiteNoise
 from gmwm.export.comments import above, below, comment, plain, wrapped
 from gmwm.export.imu import Axis, Imu, Triad
+from gmwm.filter_numbers import SensorNumbers
+from gmwm.process import as_model
+from imu_numbers import RATE, numbers
 
 NAN = float("nan")
 
@@ -139,3 +144,19 @@ def test_text_of_others_stays_on_its_line():
     assert comment(["a--b"], "<!--") == ["<!--", "  a- -b", "-->"]
     lines = wrapped("word " * 40)
     assert all(len(line) <= 72 for line in lines) and lines[1].startswith("  word")
+
+
+@pytest.mark.parametrize(
+    ("target", "form", "model", "key"),
+    [
+        ("kalibr", "N+K", WhiteNoise(1e-4), "K"),
+        ("kalibr", "N+K", RandomWalk(1e-6), "N"),
+        ("gazebo", "N+GM", WhiteNoise(1e-4), "sigma"),
+        ("gazebo", "N+GM", GaussMarkov(1e-5, 60.0), "N"),
+    ],
+)
+def test_numbers_by_which_a_filter_divides_are_there(target, form, model, key):
+    given = numbers(form)
+    lacking = replace(given["gyro_y"], model=as_model(model))
+    with pytest.raises(InputError, match=f": {key} of gyro_y is zero, by which filters divide"):
+        gmwm.export(SensorNumbers({**given, "gyro_y": lacking}, rate=RATE), target)

@@ -112,6 +112,16 @@ def test_the_file_and_the_arrays_hold_the_same(tmp_path):
                 assert np.array_equal(arrays[f"{name}/{kind}/{key}"], np.array(value)), key
 
 
+def test_the_walk_of_a_calibration_begins_at_zero():
+    model = WhiteNoise(1e-3) + RandomWalk(1e-3)
+    x = model.simulate(3000, 0.1, 1)
+    rec = gmwm.Recording.from_arrays({"gyro_x": x}, 10.0, {"gyro": "rad/s"})
+    calibration = gmwm.calibrate(rec, model.opened(), screening=())
+    found = json.loads(gmwm.export(calibration, "state-space"))["channels"]["gyro_x"]
+    assert len(found["states"]) == 1
+    assert found["discrete"]["P0"] == found["continuous"]["P0"] == [[0.0]]
+
+
 def test_numbers_without_a_rate_have_no_samples():
     with pytest.raises(InputError, match="hold no sampling rate"):
         gmwm.export(numbers("N+K", rate=float("nan")), "state-space")

@@ -1,5 +1,6 @@
 """Sums, parameters, identifiability and what is said when they are wrong."""
 
+import inspect
 import pickle
 
 import numpy as np
@@ -16,7 +17,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.process import as_model, model_from_list
+from gmwm.process import CATALOGUE, as_model, model_from_list
 
 
 def test_repr_is_readable_and_evaluates_back():
@@ -122,3 +123,10 @@ def test_a_process_times_a_number_is_that_many_terms():
     for times in (0, -1, True, 1.0):
         with pytest.raises(gmwm.InputError, match="1 or more, whole"):
             times * gmwm.GaussMarkov()
+
+
+@pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.__name__)
+def test_a_value_more_than_a_process_has_parameters_is_refused(kind):
+    full = [1.0] * len(inspect.signature(kind).parameters)
+    with pytest.raises(gmwm.InputError, match="its parameters are"):
+        kind(*full, 1.0)

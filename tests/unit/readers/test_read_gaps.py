@@ -156,12 +156,15 @@ def test_rows_go_to_their_places(recorded, start, name, unit):
     )
 
 
-def test_one_jump(recorded):
-    keep = without((121, 371), n=700)
+@pytest.mark.parametrize(
+    ("count", "length", "words"), [(1, "0.01", "1 sample"), (250, "2.5", "250 samples")]
+)
+def test_one_jump(recorded, count, length, words):
+    keep = without((121, 121 + count), n=700)
     path, _ = recorded(keep, np.arange(700) / 100 + 5.0)
     notes = texts(read(path, units=GYRO))
-    assert "the clock jumps by 2.5 s, 1.2 s after the start: 250 samples missing" in notes
-    assert "gyro_x: 250 of 700 samples missing, in one gap" in notes
+    assert f"the clock jumps by {length} s, 1.2 s after the start: {words} missing" in notes
+    assert f"gyro_x: {count} of 700 samples missing, in one gap" in notes
 
 
 @settings(max_examples=150, deadline=None, database=None)

@@ -47,6 +47,11 @@ def test_size_and_time(recording):
     assert recording.notices == (UNUSED,)
 
 
+def test_a_recording_of_one_rate_is_its_only_part(recording):
+    (part,) = recording.by_rate()
+    assert part is recording
+
+
 def test_a_recording_is_a_mapping(recording):
     assert isinstance(recording, Mapping)
     assert list(recording) == list(recording.keys()) == ["gyro_x", "accel_z", "gyro_y"]

@@ -8,6 +8,7 @@ from gmwm.readers import tuning
 from gmwm.readers.clock.uneven import (
     _bursts,
     _costs,
+    _likeliest,
     _rough_interval,
     _rows_that_follow,
     _smooth,
@@ -135,3 +136,10 @@ def test_so_many_columns_are_listed(count, more):
 def test_a_unit_of_temperature_in_one_or_two_words(name, unit):
     assert meaning(name).role == "temperature"
     assert unit is None or meaning(name).unit == unit
+
+
+@pytest.mark.parametrize("shorter", [1.0, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4])
+def test_the_likeliest_interval_is_that_of_which_all_rows_are_multiples(shorter):
+    same = np.zeros(600, dtype=bool)
+    x = np.arange(600.0) / shorter
+    assert _likeliest(x, same, _costs(x, same)) == shorter

@@ -41,11 +41,12 @@ def test_a_slope_that_a_walk_explains_as_well_is_reported_with_both_numbers():
     assert notice.values["walk"] == fit.params["K"] > 0.0
 
 
-def test_ramp_or_walk_names_the_slow_term():
+@pytest.mark.parametrize("tau", [0.5, 500.0])
+def test_ramp_or_walk_names_the_slow_term(tau):
     x = WhiteNoise(1e-3).simulate(2000, 0.1, 1)
     fit = gmwm.fit(WhiteNoise(), x, dt=0.1)
-    slow = replace(fit, model=WhiteNoise(1e-3) + GaussMarkov(1e-4, 500.0))
-    assert "Gauss-Markov term of tau = 500 s" in ramp_or_walk(slow, Slope(1e-7, 1e-16)).text
+    slow = replace(fit, model=WhiteNoise(1e-3) + GaussMarkov(1e-4, tau))
+    assert f"Gauss-Markov term of tau = {tau:g} s" in ramp_or_walk(slow, Slope(1e-7, 1e-16)).text
     assert "too slow" in ramp_or_walk(fit, Slope(1e-7, 1e-16)).text
 
 

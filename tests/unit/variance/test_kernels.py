@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from gmwm.variance import levels as module, tuning
 from gmwm.variance.kernels import (
     CHUNK,
     cumulative,
@@ -94,6 +95,18 @@ def test_moments_of_parts_add_up():
         fine_moments(values, start, stop, values.size, levels, parts)
     np.testing.assert_allclose(parts, whole, rtol=1e-12)
     assert whole[:, 0].tolist() == [values.size - 2 * 2**j + 1 for j in range(levels)]
+
+
+@pytest.mark.parametrize("processors", [2, 3])
+def test_moments_do_not_depend_on_the_number_of_threads(processors, monkeypatch):
+    values = series(9 * 4096 + 17, gaps=False) - 3.0
+    integral, averaging = cumulative(values, 0.0), 2.0 ** np.arange(14)
+    runs = np.array([(0, values.size - 5000), (values.size - 4999, values.size)])
+    alone = haar_moments(values, integral, runs, averaging)
+    monkeypatch.setattr(tuning, "SAMPLES_PER_THREAD", 1000)
+    monkeypatch.setattr(module, "_processors", lambda: processors)
+    shared = haar_moments(values, integral, runs, averaging)
+    np.testing.assert_allclose(shared, alone, rtol=1e-9, atol=1e-14)
 
 
 def test_a_cumulative_sum_is_right_to_the_last_digit():

@@ -58,5 +58,6 @@ def _times(stretches: Sequence[tuple[float, float]]) -> str:
     """Some stretches, the longest ones of many."""
     longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
     parts = [f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest)]
-    more = f", and {len(stretches) - _LISTED} shorter ones" if len(stretches) > _LISTED else ""
+    rest = len(stretches) - _LISTED
+    more = f", and {rest} shorter one{'s' if rest > 1 else ''}" if rest > 0 else ""
     return f"from {', '.join(parts)}{more}"

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
+from scipy.stats import chi2, kstest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
@@ -157,3 +157,12 @@ def test_where_one_recording_has_all_the_weight_the_spread_is_unknown(small, oth
     else:
         assert 0.5 < spread < 5.0
         assert p_value < 0.1
+
+
+@pytest.mark.parametrize("copies", [1, 2, 5])
+def test_the_curves_of_copies_have_as_many_times_the_chi_square_and_the_levels(copies):
+    (wv,) = recordings([3000], 10)
+    alone = gmwm.fit(TRUTH.opened(), wv)
+    joint = fit_joint(TRUTH.opened(), [wv] * copies, gmwm.fit)
+    dof = copies * wv.tau.size - len(alone.keys)
+    assert joint.curves_p == pytest.approx(chi2.sf(copies * alone.chi_square, dof), rel=1e-6)

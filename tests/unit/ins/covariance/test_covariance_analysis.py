@@ -139,6 +139,13 @@ def test_a_filter_without_sensor_states():
     np.testing.assert_allclose(sd, np.tile(expected, (sd.shape[0], 1)), rtol=1e-9)
 
 
+def test_rates_are_those_of_the_increment_that_ends_at_the_epoch_and_at_first_of_the_first():
+    course = Course.of(RICH, IMU)
+    assert course.epoch[0] == 0
+    np.testing.assert_array_equal(course.end_rate[0], IMU.rotation[0] / DT)
+    np.testing.assert_array_equal(course.end_rate[1:], IMU.rotation[course.epoch[1:] - 1] / DT)
+
+
 def test_a_course_is_cut_once_for_many_models():
     course = Course.of(PLAIN, IMU)
     for believed in (FULL, STATELESS, SLOW_ONLY, FULL):

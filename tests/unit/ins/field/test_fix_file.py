@@ -132,6 +132,14 @@ def test_standard_deviations(tmp_path: Path, header: str, count: int) -> None:
     np.testing.assert_allclose(fixes.sd, np.tile([2.0, 2.0, 5.0], (5, 1)))
 
 
+def test_standard_deviations_of_velocities(tmp_path: Path) -> None:
+    rows = [[*row, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3 + 0.1 * i] for i, row in enumerate(ROWS)]
+    header = f"{HEAD},vn,ve,vd,sd_vn,sd_ve,sd_vd"
+    position, velocity = read_fixes(write(tmp_path, rows, header)).fixes
+    np.testing.assert_allclose(position.sd, np.tile([1.0, 1.0, 1.5], (5, 1)))
+    np.testing.assert_allclose(velocity.sd, [row[-3:] for row in rows])
+
+
 def test_empty_rows_and_the_gulf_of_guinea_are_no_fixes(tmp_path: Path) -> None:
     rows: list[list[object]] = [list(row) for row in ROWS]
     rows[1][1] = ""

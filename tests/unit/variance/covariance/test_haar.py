@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
+from scipy.signal import correlate
 
 import gmwm
 from gmwm.variance import tuning
 from gmwm.variance.covariance import haar as module
-from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance, mean_covariance
+from gmwm.variance.covariance.haar import (
+    dyadic_levels,
+    haar_covariance,
+    integrals,
+    mean_covariance,
+)
 
 PROCESSES = [
     gmwm.WhiteNoise(1.0),
@@ -96,3 +102,14 @@ def test_sampling_interval_is_only_a_unit():
     np.testing.assert_allclose(
         haar_covariance(fast.psd, 1000, 0.01), haar_covariance(slow.psd, 1000, 1.0), rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("first", [1, 256, 4096, 65_536])
+def test_integrals_are_sums_over_lags_where_lobes_are_no_longer_resolved(first):
+    """Of differences of white noise, to whose variance every lobe of the gains adds as much."""
+    averaging = np.array([first, 2 * first])
+    found = integrals(gmwm.QuantizationNoise(1.0).psd, 1.0, averaging.astype(float))
+    own, other = (np.convolve(np.repeat([-0.5 / m, 0.5 / m], m), [1.0, -1.0]) for m in averaging)
+    for j, k, one, two in ((0, 0, own, own), (0, 1, own, other), (1, 1, other, other)):
+        expected = 2.0 * np.sum(correlate(one, two, method="fft") ** 2)
+        assert found[j, k] == pytest.approx(expected, rel=1e-6, abs=0.0)

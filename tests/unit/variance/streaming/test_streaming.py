@@ -120,6 +120,15 @@ def test_a_merged_part_goes_on():
     assert_same(both.result(), streamed(x).result(), rtol=1e-9)
 
 
+@pytest.mark.parametrize("start", [1, 2, 4098, 30_003])
+def test_blocks_of_merged_parts_are_those_of_the_whole_wherever_it_begins(start):
+    x, cut = noise(8000, 4), 4000  # of either part all samples are kept, of the whole means of two
+    first, second = (streamed(part, start=start + k) for part, k in ((x[:cut], 0), (x[cut:], cut)))
+    found, whole = first.merge(second).result(), streamed(x, start=start).result()
+    assert found.block == whole.block
+    np.testing.assert_allclose(found.blocks, whole.blocks, rtol=1e-9)
+
+
 def test_single_samples_and_empty_blocks():
     x = noise(300, 2)
     stream = gmwm.StreamingVariance(0.1)
