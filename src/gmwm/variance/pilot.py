@@ -22,35 +22,50 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """
     grid = quadrature(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
-    node = np.log(grid.frequency)
+    node = _Places(np.log(grid.frequency), knots)
     level = np.log(2.0 * variance * averaging)
     for _ in range(tuning.PILOT_ITERATIONS):
-        density = np.exp(_interpolate(node, knots, level[::-1]))
+        density = np.exp(node.interpolated(level[::-1]))
         implied = 2.0 * (grid.gain @ (grid.weight * density))
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
         level = _limit_slopes(level)
 
     def psd(f: FloatArray, sampling: float) -> FloatArray:
-        return sampling * np.exp(_interpolate(np.log(f * sampling), knots, level[::-1]))
+        return sampling * np.exp(_Places(np.log(f * sampling), knots).interpolated(level[::-1]))
 
     return psd
 
 
-def _interpolate(x: FloatArray, knots: FloatArray, level: FloatArray) -> FloatArray:
-    """Piecewise linear; below the lowest knot with the mean slope of the lowest three."""
-    inside = np.interp(x, knots, level)
-    reach = min(3, knots.size - 1)
-    if reach == 0:
-        return np.asarray(inside)
-    slope = (level[reach] - level[0]) / (knots[reach] - knots[0])
-    slope = np.clip(slope, -2.0, 0.0)
-    return np.asarray(inside + slope * np.minimum(x - knots[0], 0.0))
+class _Places:
+    """Where values lie between knots: piecewise linear interpolation, again and again.
+
+    x: (n,).
+    knots: (K,), rising.
+    """
+
+    def __init__(self, x: FloatArray, knots: FloatArray) -> None:
+        self._knots = knots
+        self._below = np.minimum(x - knots[0], 0.0)
+        self._piece = np.clip(
+            np.searchsorted(knots, x, side="right") - 1, 0, max(knots.size - 2, 0)
+        )
+        self._beyond = np.clip(x, knots[0], knots[-1]) - knots[self._piece]
+
+    def interpolated(self, level: FloatArray) -> FloatArray:
+        """Between levels at the knots; below the lowest with the mean slope of the lowest three."""
+        reach = min(3, level.size - 1)
+        if reach == 0:
+            return np.full(self._below.shape, level[0])
+        slopes = np.diff(level) / np.diff(self._knots)
+        inside = slopes[self._piece] * self._beyond + level[self._piece]
+        slope = (level[reach] - level[0]) / (self._knots[reach] - self._knots[0])
+        return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
 
 
 def _limit_slopes(level: FloatArray) -> FloatArray:
     """Keep the density within f^-2.5 .. f^2.5 from one level (an octave) to the next."""
-    largest = tuning.PILOT_STEEPEST * np.log(2.0)
-    limited = level.copy()
+    largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
+    limited = level.tolist()
     for j in range(1, level.size):
-        limited[j] = np.clip(limited[j], limited[j - 1] - largest, limited[j - 1] + largest)
-    return limited
+        limited[j] = min(max(limited[j], limited[j - 1] - largest), limited[j - 1] + largest)
+    return np.array(limited)

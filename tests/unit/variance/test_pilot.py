@@ -6,7 +6,7 @@ import pytest
 from gmwm import RandomWalk, WhiteNoise, wavelet_variance
 from gmwm.process.spectral import haar_variance
 from gmwm.variance import PooledVariance, tuning
-from gmwm.variance.pilot import _interpolate, _limit_slopes, pilot_psd
+from gmwm.variance.pilot import _limit_slopes, _Places, pilot_psd
 
 DT, M = 0.01, 2.0 ** np.arange(14)
 
@@ -27,12 +27,16 @@ def test_below_its_knots_it_goes_on_with_the_slope_of_the_lowest_three():
     level = np.array([5.0, 4.0, 2.0, 2.0, 7.0])
     x = np.array([-3.0, 0.5, 3.5, 9.0])
     np.testing.assert_allclose(
-        _interpolate(x, knots, level), [5.0 + 3.0 * 3.0 / 4.0, 4.5, 2.0, 7.0]
+        _Places(x, knots).interpolated(level), [5.0 + 3.0 * 3.0 / 4.0, 4.5, 2.0, 7.0]
     )
-    np.testing.assert_allclose(_interpolate(x[:1], knots, -level), [-5.0])  # it does not rise
-    np.testing.assert_allclose(_interpolate(x[:1], knots, 100.0 * level), [506.0])  # nor faster
-    np.testing.assert_allclose(_interpolate(x, knots[:1], level[:1]), 5.0)
-    np.testing.assert_allclose(_interpolate(x[:1], knots[:2], level[:2]), [8.0])
+    np.testing.assert_allclose(
+        _Places(x[:1], knots).interpolated(-level), [-5.0]
+    )  # it does not rise
+    np.testing.assert_allclose(
+        _Places(x[:1], knots).interpolated(100.0 * level), [506.0]
+    )  # nor faster
+    np.testing.assert_allclose(_Places(x, knots[:1]).interpolated(level[:1]), 5.0)
+    np.testing.assert_allclose(_Places(x[:1], knots[:2]).interpolated(level[:2]), [8.0])
 
 
 def test_from_octave_to_octave_a_power_of_two_and_a_half_is_the_most():
