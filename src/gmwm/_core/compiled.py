@@ -70,10 +70,10 @@ def _alone(index: Path) -> Iterator[None]:
     lock = index.with_suffix(".lock")
     # Threads take numba's own lock first, in this order, so that no two wait for each other.
     with global_compiler_lock, ExitStack() as held:
-        with suppress(OSError):  # numba says where nothing can be kept
+        with suppress(OSError, RuntimeError):  # no folder, or none that knows locks
             index.parent.mkdir(parents=True, exist_ok=True)
             held.callback(lock.unlink, missing_ok=True)
-            held.enter_context(FileLock(lock))
+            held.enter_context(FileLock(lock, is_singleton=True))
         yield
 
 
