@@ -6,8 +6,9 @@ from importlib.util import find_spec
 collect_ignore = [
     file
     for file, modules in {
-        "test_kept_formats.py": ("rosbags", "h5py", "polars"),
-        "messages/test_kept_messages.py": ("rosbags", "h5py", "pyulog"),
+        "test_recorded_formats.py": ("rosbags", "h5py", "polars"),
+        "messages/test_recorded_messages.py": ("rosbags", "h5py", "pyulog"),
+        "messages/test_damaged_logs.py": ("pyulog",),
         "messages/test_read_rosbag.py": ("rosbags",),
         "test_read_frames.py": ("rosbags", "h5py", "polars"),
         "messages/test_read_flight_logs.py": ("rosbags", "pyulog", "pymavlink"),
