@@ -22,6 +22,7 @@ from time import sleep
 from typing import Any, TypeVar
 
 from gmwm._core import checks
+from gmwm._core.runs.allocation import memory_kept
 from gmwm._core.runs.threads import one_blas_thread
 from gmwm.errors import InputError
 
@@ -247,6 +248,11 @@ def _with_item(work: Work[T, R], item: T) -> tuple[T, R]:
     return item, work(item)
 
 
+def _for_cluster(work: Work[T, R], item: T) -> tuple[T, R]:
+    with memory_kept():
+        return _with_item(work, item)
+
+
 def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T, R]) -> Done[T, R]:
     with _client(address) as client:
         from distributed import KilledWorker, as_completed
@@ -262,7 +268,7 @@ def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T
                 raise InputError(
                     f"the Dask scheduler at {address!r} has no workers: start some"
                 ) from None
-            futures = {client.submit(_with_item, shared, item, pure=False): item for item in left}
+            futures = {client.submit(_for_cluster, shared, item, pure=False): item for item in left}
             for future in as_completed(futures):
                 item = futures[future]
                 try:
