@@ -92,6 +92,13 @@ DISCREPANCY_NOTABLE = 0.02
 EXCHANGES = 2
 """Rounds in which each term is taken out and placed anew."""
 
+MANY_SHAPES = 3
+"""Shapes of a term from which it may have several minima worth a start ..."""
+
+STARTS = 8
+"""... and places on its grid from which such a term is refined, unless one fits within chance. From
+one, 59 of 80 fits of an ARMA(2, 1) to its own series ended at another minimum."""
+
 IMPROVEMENT = 1e-3
 """Of the objective, below which an exchange is not worth a refinement."""
 

@@ -5,6 +5,8 @@ import pickle
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
 
 import gmwm
 from gmwm import (
@@ -115,6 +117,15 @@ def test_partial_autocorrelations_are_a_bijection():
     process = ARMA(3, 2)
     z = np.array([0.3, -1.2, 0.7, 2.0, -0.4])
     np.testing.assert_allclose(process.shape_to_free(process.shape_from_free(z)), z, rtol=1e-9)
+
+
+@given(hnp.arrays(float, 5, elements=st.floats(-40.0, 40.0)))
+def test_every_point_of_the_real_line_is_a_stationary_process(z):
+    """Rounding takes roots that nearly coincide onto the unit circle."""
+    for process in (ARMA(3, 2), ARMA(5, 0), ARMA(0, 5)):
+        shape = process.shape_from_free(z)
+        process.at_unit(shape)
+        assert np.all(np.isfinite(process.shape_to_free(shape)))
 
 
 def test_a_process_times_a_number_is_that_many_terms():

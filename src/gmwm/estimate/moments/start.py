@@ -45,9 +45,10 @@ DICTIONARY = (WhiteNoise, QuantizationNoise, RandomWalk, GaussMarkov)
 def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
     """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
 
-    Each term with free shapes is first placed where on its grid it lowers the objective most,
-    all shapes are then refined together; at the end each term in turn is taken out and placed
-    anew. A model that extends another one is never worse, if started from that one's shapes.
+    Each term with free shapes is first placed where on its grid it lowers the objective most, all
+    shapes are then refined together, of a term with many shapes from several such places; at the
+    end each term in turn is taken out and placed anew. A model that extends another one is never
+    worse, if started from that one's shapes.
 
     known: Shapes to start with, ``None`` for the terms still to be placed.
     """
@@ -56,8 +57,13 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     missing = [i for i in design.shaped if shapes[i] is None]
     point = _present(profile, shapes)
     for i in missing:
-        shapes = list(point.shapes)
-        point = _refine_present(profile, _place(profile, shapes, i))
+        many = design.terms[i].n_shapes >= tuning.MANY_SHAPES
+        starts = _places(profile, point.shapes, i, tuning.STARTS if many else 1)
+        point = _refine_present(profile, starts[0])
+        for start in starts[1:]:
+            if point.objective < profile.target.size:
+                break  # within chance
+            point = min(point, _refine_present(profile, start), key=lambda p: p.objective)
     if len(design.shaped) < 2:
         return point
     for _ in range(tuning.EXCHANGES):
@@ -65,7 +71,7 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
         for i in design.shaped:
             shapes = list(point.shapes)
             shapes[i] = None
-            moved = _place(profile, shapes, i)
+            (moved,) = _places(profile, shapes, i, 1)
             if moved.objective < point.objective * (1.0 + tuning.IMPROVEMENT):
                 moved = _refine_present(profile, moved)
                 point = min(point, moved, key=lambda p: p.objective)
@@ -97,8 +103,8 @@ def _present(profile: Profile, shapes: Sequence[Shape | None]) -> Point:
     return Point(cast("Sequence[Shape]", shapes), x, float(residual @ residual))
 
 
-def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
-    """Put term ``i`` at the grid shape that lowers the objective most."""
+def _places(profile: Profile, shapes: Sequence[Shape | None], i: int, count: int) -> list[Point]:
+    """Put term ``i`` at so many grid shapes, those that lower the objective most."""
     design = profile.design
     matrix, y = _columns(profile, shapes)
     candidates = profile.root @ design.grid_curves(i)
@@ -107,9 +113,11 @@ def _place(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
     else:
         residuals = [solve_nonnegative(matrix, y - column)[1] for column in candidates.T]
         objective = np.array([residual @ residual for residual in residuals])
-    filled = list(shapes)
-    filled[i] = design.grid(i)[int(np.argmin(objective))]
-    return _present(profile, filled)
+    filled, found = list(shapes), []
+    for best in np.argsort(objective, kind="stable")[:count]:
+        filled[i] = design.grid(i)[int(best)]
+        found.append(_present(profile, list(filled)))
+    return found
 
 
 def _refine_present(profile: Profile, point: Point) -> Point:

@@ -97,6 +97,8 @@ def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
         key = next(p.key for p in model.parameters if p.term == i and p.parameter.role == "shape")
         bandwidth = _half_power(term, wv.dt)
         low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
+        if not low > 0.0:
+            continue  # a term of amplitude zero is no filter of the sensor's
         units = field_units("u/sqrt(Hz)", wv.quantity)
         unit, factor = (
             (units[0].unit, units[0].per_si) if units else (f"{wv.unit or 'u'}/sqrt(Hz)", 1.0)

@@ -22,6 +22,7 @@ from gmwm.process.state_space import StateSpace
 Coefficients = int | float | Sequence[float | None] | None
 
 _MAX_LAGS = 1 << 18
+_INWARDS = (0.0, 1e-9, 1e-7, 1e-5, 1e-3, 0.01, 0.03, 0.1)
 _NEGLIGIBLE = 1e-17
 
 
@@ -211,8 +212,8 @@ class ARIMA(Process):
     def shape_from_free(self, free: FloatArray) -> Shape:
         p = self.orders[0]
         reflection = np.clip(np.tanh(free), -1.0 + 1e-12, 1.0 - 1e-12)
-        ar, ma = _ar_from_partial(reflection[:p]), -_ar_from_partial(reflection[p:])
-        return tuple(float(c) for c in (*ar, *ma))
+        ar, ma = (_inside(_ar_from_partial(part)) for part in (reflection[:p], reflection[p:]))
+        return tuple(float(c) for c in (*ar, *-ma))
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         size = sum(self.orders)
@@ -300,6 +301,16 @@ def _stable(coefficients: Sequence[float]) -> bool:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return bool(np.all(np.abs(_partial_from_ar(coefficients)) < 1.0))
+
+
+def _inside(coefficients: FloatArray) -> FloatArray:
+    """The same, or next to it where rounding took several roots onto the unit circle."""
+    powers = np.arange(1, coefficients.size + 1)
+    for inwards in _INWARDS:
+        moved = coefficients * (1.0 - inwards) ** powers
+        if _stable(moved.tolist()):
+            break
+    return moved
 
 
 def _decay_lags(ar: tuple[float, ...], ma: tuple[float, ...]) -> int:
