@@ -297,8 +297,10 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
         return InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
     if meaning(table.names[time]).seconds is not None:
         return None
-    step = float(np.median(np.diff(table.load([time])[time])))
-    return without_unit(table.source, column_of(table, time), step)
+    steps = np.diff(table.load([time])[time])
+    if not steps.size:
+        return None  # too few samples is what is wrong then
+    return without_unit(table.source, column_of(table, time), float(np.median(steps)))
 
 
 def _load(

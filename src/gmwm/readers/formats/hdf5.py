@@ -7,6 +7,7 @@ of what it holds, ``imu.gyro`` or ``imu/gyro``, where these alone are not clear;
 
 from __future__ import annotations
 
+import math
 import mmap
 import re
 from collections import Counter
@@ -27,12 +28,12 @@ from gmwm.readers.formats.arrays import (
     is_sensor,
 )
 from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.mat_tags import check_types
 from gmwm.readers.names import bare, meaning
 
 _MAT_73 = b"MATLAB 7.3"
 _GROUPS = re.compile(r"[./]")
 _SIGNATURE, _HEAP = b"\x89HDF\r\n\x1a\n", b"GCOL\x01\0\0\0"
+_TOGETHER = 256 << 20  # bytes of arrays that are read together
 _UNITS = ("units", "unit", "Units", "Unit")
 # The message of an attribute: its name, text of any length as its type, one value: its length.
 _UNIT = re.compile(
@@ -119,11 +120,14 @@ def open_mat(path: Path) -> ArrayTable:
     from scipy.io import loadmat, whosmat
 
     with damage_named(path.name):
-        check_types(path)
         variables = whosmat(path)
-        read = lru_cache(maxsize=1)(
-            lambda name: loadmat(path, variable_names=[name], simplify_cells=True)[name]
-        )
+        # Looking for each of many variables takes the square of the time.
+        is_small = sum(8 * math.prod(shape) for _, shape, _ in variables) < _TOGETHER
+        load = lru_cache(maxsize=1)(partial(loadmat, path, simplify_cells=True))
+
+        def read(name: str) -> Any:
+            return (load() if is_small else load(variable_names=(name,)))[name]
+
         found: dict[str, Array] = {}
         for name, shape, kind in variables:
             if kind == "struct":

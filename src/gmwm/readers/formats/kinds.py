@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from gmwm.readers.formats.frame import is_frame, open_feather, open_frame, open_
 from gmwm.readers.formats.hdf5 import open_hdf5, open_mat
 from gmwm.readers.formats.messages import Wanted, open_ardupilot, open_bag, open_ulog
 from gmwm.readers.formats.numpy_file import open_numpy
+from gmwm.readers.formats.trial import tried
 from gmwm.readers.table import Table
 
 CLOCKS = ("header", "log")
@@ -52,9 +54,12 @@ KINDS = (
     Kind("numpy", (".npy", ".npz"), (), _alone(open_numpy)),
     # By content before by name: a MAT file of version 7.3 is one of HDF5 behind 512 bytes.
     Kind(
-        "hdf5", (".h5", ".hdf5", ".hdf"), (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), _alone(open_hdf5)
+        "hdf5",
+        (".h5", ".hdf5", ".hdf"),
+        (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
+        _alone(partial(tried, open_hdf5)),
     ),
-    Kind("mat", (".mat",), (b"MATLAB 5.0",), _alone(open_mat)),
+    Kind("mat", (".mat",), (b"MATLAB 5.0",), _alone(partial(tried, open_mat))),
     Kind("parquet", (".parquet",), (b"PAR1",), _alone(open_parquet)),
     Kind("feather", (".feather", ".arrow"), (b"ARROW1", b"FEA1"), _alone(open_feather)),
     Kind("rosbag", (".bag",), (b"#ROSBAG",), open_bag, True, True),

@@ -1,0 +1,117 @@
+"""Files whose libraries end the process, read on without end or take all memory are refused."""
+
+import os
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+import gmwm
+from gmwm import InputError
+from gmwm.readers.formats import trial
+from gmwm.readers.formats.arrays import ArrayTable, array_of
+from gmwm.readers.formats.hdf5 import open_mat
+from gmwm.readers.formats.trial import one_reader, tried
+
+X = np.full(40, 7.5)
+OF_MATLAB = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
+
+
+def opened(path):
+    return ArrayTable.of_entries(path.name, {"gyro_x": array_of(X), "text": array_of(X)})
+
+
+def ends(path):
+    os.abort()
+
+
+def goes_on(path):
+    while True:
+        pass
+
+
+def takes_memory(path):
+    with pytest.raises(MemoryError):
+        np.ones(1 << 28)
+    raise InputError(f"{path.name} needs much", "memory", "use less", {"bytes": 3.0})
+
+
+def second_fails(path):
+    def fail():
+        raise ValueError
+
+    table = opened(path)
+    table.arrays[1].__dict__["read"] = fail
+    return table
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"a")
+    return path
+
+
+def test_what_can_be_read_is(file):
+    table = tried(opened, file)
+    assert table.names == ("gyro_x", "text")
+    np.testing.assert_array_equal(table.load([0])[0], X)
+
+
+def test_a_process_that_ends_is_a_damaged_file(file):
+    with one_reader():
+        for _ in range(2):
+            with pytest.raises(InputError, match=r"a\.mat is damaged, so that the library"):
+                tried(ends, file)
+            assert tried(opened, file).names == ("gyro_x", "text")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs limits")
+def test_a_process_that_reads_on_is_a_damaged_file(file, monkeypatch):
+    begin = "from gmwm.readers.formats import trial; trial._SECONDS = 1; trial.serve()"
+    monkeypatch.setattr(trial, "_PROGRAM", begin)
+    token = trial._kept.set(None)
+    try:
+        with pytest.raises(InputError, match=r"a\.mat is damaged"):
+            tried(goes_on, file)
+    finally:
+        trial._kept.reset(token)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs limits")
+def test_memory_that_no_such_file_needs_is_not_given(file):
+    with pytest.raises(InputError, match=r"a\.mat needs much: use less") as caught:
+        tried(takes_memory, file)
+    assert (caught.value.code, caught.value.mend) == ("memory", "use less")
+    assert caught.value.values == {"bytes": 3.0}
+
+
+def test_an_array_that_cannot_be_read_is_refused_when_it_is_asked_for(file):
+    table = tried(second_fails, file)
+    np.testing.assert_array_equal(table.load([0])[0], X)
+    with pytest.raises(InputError, match=r"a\.mat is damaged or cut off"):
+        table.load([1])
+
+
+@pytest.mark.parametrize("kind", [8, 11, 255])
+def test_numbers_of_no_type_end_scipy_and_are_refused(tmp_path, kind):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"gyro_x": X})
+    data = path.read_bytes()
+    place = data.rindex(struct.pack("<II", 9, X.nbytes))
+    path.write_bytes(data[:place] + struct.pack("<I", kind) + data[place + 4 :])
+    with pytest.raises(InputError, match=r"a\.mat is damaged"):
+        gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
+
+
+@pytest.mark.skipif(not OF_MATLAB.exists(), reason="scipy is installed without its test data")
+def test_what_matlab_writes_ends_nothing():
+    """Most hold nothing of a recording, which is what they are refused for."""
+    with one_reader():
+        for path in sorted(OF_MATLAB.glob("test*_7.4_GLNX86.mat")):
+            with pytest.raises(InputError) as caught:
+                tried(open_mat, path)
+                raise InputError("used")
+            assert "the library" not in str(caught.value), path.name
