@@ -46,6 +46,8 @@ FOUND = [
     ("hdf5", 77, 537),  # free space in a heap that ends before it: the library read on for ever
     ("mat", 77, 255),  # numbers of a type that there is none of: scipy ended the process
     ("npz", 2512, 1311),  # a column of time without a step
+    ("ardupilot", 2513, 1600),  # steps of 1e3 and 1e44 in one clock
+    ("document", 2513, 7855),  # a discrepancy whose square overflows
     ("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits

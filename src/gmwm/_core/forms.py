@@ -52,6 +52,8 @@ def _sentence(error: ValidationError) -> str:
 Text = Annotated[str, Field(max_length=10_000), AfterValidator(printable)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+Discrepancy = Annotated[float, Field(ge=0.0, le=1000.0)]
+"""Relative; what is off by more has nothing of the model."""
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 Samples = Annotated[int, Field(ge=1, le=checks.MOST_SAMPLES)]
 Freedom = Annotated[int, Field(ge=-checks.MOST_SAMPLES, le=checks.MOST_SAMPLES)]

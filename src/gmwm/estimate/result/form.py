@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from gmwm._core.forms import (
+    Discrepancy,
     Form,
     Freedom,
     Keys,
@@ -42,7 +43,7 @@ class FitForm(Form):
     chi_square: float | None
     chi_square_allowed: float | None
     dof: Freedom
-    discrepancy: NotNegative
+    discrepancy: Discrepancy
     method: Text
     weights: Text
     notices: Notices

@@ -119,8 +119,10 @@ def _steps(clock: Clock) -> _Steps:
             change = replace(change, row=change.row * every)
         if increasing and (change is not None or _short(steps) is None):
             jumps = find_jumps(clock.stamps)
-            # What is longer than the recording is no gap.
-            if change is not None or not np.any(jumps.missing > clock.extent):
+            # What is longer than the recording is no gap, nor are steps of 40 orders in one clock.
+            if jumps.interval > 0.0 and (
+                change is not None or not np.any(jumps.missing > clock.extent)
+            ):
                 jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
                 return _Steps(jumps, jitter, change, None)
         del steps  # following needs more memory
