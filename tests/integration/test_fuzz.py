@@ -48,6 +48,7 @@ FOUND = [
     ("npz", 2512, 1311),  # a column of time without a step
     ("ardupilot", 2513, 1600),  # steps of 1e3 and 1e44 in one clock
     ("document", 2513, 7855),  # a discrepancy whose square overflows
+    ("odd", 2514, 85),  # a channel that no block of a log that moves has samples of
     ("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits

@@ -5,16 +5,20 @@ from __future__ import annotations
 import hashlib
 import logging
 import re
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
+from threading import current_thread, main_thread
+from types import FrameType
 from typing import Any
 
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
 _CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
+_LONGEST_WAIT = 60.0  # s, for a process that compiles the same loop
 _DEFINED = re.compile(rb"^[A-Z][A-Z0-9_, ]*(?=[:=])", re.MULTILINE)
 
 
@@ -70,11 +74,40 @@ def _alone(index: Path) -> Iterator[None]:
     lock = index.with_suffix(".lock")
     # Threads take numba's own lock first, in this order, so that no two wait for each other.
     with global_compiler_lock, ExitStack() as held:
-        with suppress(OSError, RuntimeError):  # no folder, or none that knows locks
+        # No folder, none that knows locks, or a process that holds one and does not go on.
+        with suppress(OSError, RuntimeError):
             index.parent.mkdir(parents=True, exist_ok=True)
-            held.callback(lock.unlink, missing_ok=True)
-            held.enter_context(FileLock(lock, is_singleton=True))
+            held.enter_context(FileLock(lock, timeout=_LONGEST_WAIT, is_singleton=True))
+        with _interruptible():
+            yield
+    with suppress(OSError):
+        lock.unlink()
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let an interrupt end the block as one, where LLVM swallows it and numba fails for it."""
+    before = signal.getsignal(signal.SIGINT)
+    if current_thread() is not main_thread() or not callable(before):
         yield
+        return
+    seen = False
+
+    def noted(number: int, frame: FrameType | None) -> None:
+        nonlocal seen
+        seen = True
+        before(number, frame)
+
+    signal.signal(signal.SIGINT, noted)
+    try:
+        yield
+    except RuntimeError:
+        if not seen:
+            raise
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if seen:
+        raise KeyboardInterrupt
 
 
 @lru_cache(maxsize=1)

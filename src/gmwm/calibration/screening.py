@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm.calibration import tuning
@@ -12,6 +15,7 @@ from gmwm.diagnosis import Health, Repetition, health, rest_of
 from gmwm.errors import InputError
 from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Recording
+from gmwm.variance import wavelet_variance
 
 SCREENING = ("events", "lines", "resonances", "outliers")
 """Samples of shocks, spikes and lost packets are masked; lines and resonances are terms that a
@@ -119,14 +123,39 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
         robust = frozenset(name for name in robust if _is_much(found.events(name), recording.n))
         masked = found.masked(recording, but=robust)
     left_out = frozenset(names) - robust if "events" in chosen else frozenset()
+    taken = _taken(recording, masked, found) if "events" in chosen else {}
     fresh = [notice for notice in found.notices if notice not in recording.notices]
     return Screened(
         masked,
         {name: terms_of(found, name, chosen) for name in names},
         robust,
         {name: each for name in names if (each := found.repetition(name)) is not None},
-        (*masked.notices, *with_treatment(fresh, found, left_out, robust)),
+        (*masked.notices, *with_treatment(fresh, found, left_out, robust, taken)),
     )
+
+
+def _taken(
+    recording: Recording, masked: Recording, found: Health
+) -> dict[str, tuple[float, float]]:
+    """Channel of many events -> averaging time (s) and factor by which most of the deviation goes.
+
+    One shock is an accident; many of them may be how the sensor is noisy.
+    """
+    taken = {}
+    for channel in recording.inertial:
+        if len(found.events(channel.name)) < tuning.MANY_EVENTS:
+            continue
+        try:
+            whole, left = (wavelet_variance(each[channel.name]) for each in (recording, masked))
+        except InputError:  # too little is left, which the channel's own model says
+            continue
+        longest = channel.n * channel.dt / tuning.FEWEST_WINDOWS
+        levels = np.flatnonzero((left.tau >= tuning.REFERENCE_TIME) & (left.tau <= longest))
+        ratios = np.sqrt(whole.variance[levels] / left.variance[levels])
+        if ratios.size and np.max(ratios) > tuning.TAKEN:
+            at = int(np.argmax(ratios))
+            taken[channel.name] = float(left.tau[levels[at]]), float(ratios[at])
+    return taken
 
 
 def with_treatment(
@@ -134,11 +163,13 @@ def with_treatment(
     found: Health,
     left_out: Collection[str],
     robust: Collection[str] = (),
+    taken: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> list[Notice]:
     """Notices with what is done about each here, which is not what is advised elsewhere.
 
     left_out: Channels of which shocks, spikes, outliers and held samples are left out.
     robust: Channels that have robust wavelet variances.
+    taken: Channels of which that takes much of the deviation; averaging time (s) and factor.
     """
     treated = []
     for notice in notices:
@@ -150,8 +181,8 @@ def with_treatment(
         treated.append(
             replace(
                 notice,
-                action="left out" if is_mended else _done(notice, robust, left_out),
-                values=_values(notice, left_out),
+                action="left out" if is_mended else _done(notice, robust, left_out, taken),
+                values=_values(notice, left_out, taken),
                 severity="warning" if is_mended else notice.severity,
             )
         )
@@ -163,16 +194,32 @@ def _is_much(events: Sequence[tuple[int, int]], n: int) -> bool:
     return sum(stop - start for start, stop in events) > tuning.MOST_LEFT_OUT * n
 
 
-def _values(notice: Notice, left_out: Collection[str]) -> Mapping[str, Any]:
+def _values(
+    notice: Notice, left_out: Collection[str], taken: Mapping[str, tuple[float, float]]
+) -> Mapping[str, Any]:
     if notice.code not in ("event", "outliers"):
         return notice.values
-    return {**notice.values, "left_out": notice.where in left_out}
+    found: dict[str, Any] = {**notice.values, "left_out": notice.where in left_out}
+    if notice.code == "event" and notice.where in taken:
+        found["taken_at"], found["taken"] = taken[notice.where]
+    return found
 
 
-def _done(notice: Notice, robust: Collection[str], left_out: Collection[str]) -> str:
+def _done(
+    notice: Notice,
+    robust: Collection[str],
+    left_out: Collection[str],
+    taken: Mapping[str, tuple[float, float]],
+) -> str:
     if notice.code in ("event", "outliers"):
         samples = f", {notice.values['samples']:,.0f} samples" if notice.code == "event" else ""
         if notice.where in left_out:
+            if notice.code == "event" and notice.where in taken:
+                tau, factor = taken[notice.where]
+                samples += (
+                    f"; with them the deviation at {tau:.3g} s is {factor:.2g} times as large: if "
+                    "they are the sensor's own noise, leave them in"
+                )
             return f"left out{samples}"
         if notice.where in robust:
             return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"

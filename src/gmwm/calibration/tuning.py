@@ -10,6 +10,13 @@ MOST_LEFT_OUT = 0.1
 """Fraction of the samples of a channel that outliers may take: up to it gaps move no level by more
 than a fifth of a standard error (docs/moments.md)."""
 
+MANY_EVENTS = 20
+"""Shocks and spikes of a channel from which they may be how it is noisy, and no accidents ..."""
+
+TAKEN, FEWEST_WINDOWS = 1.1, 30
+"""... if without them the deviation is smaller by more than a tenth at an averaging time of which
+the record has so many, which know it to about as much."""
+
 MOST_TERMS = 2
 """Lines and resonances offered to the model of a channel; each doubles the candidate models."""
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 import importlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+
+import pytest
 
 import gmwm
 from gmwm._core import compiled
@@ -124,3 +128,42 @@ def test_of_two_processes_one_compiles_and_the_other_loads_it(tmp_path):
     counts = sorted(each.communicate(timeout=120)[0].split() for each in began)
     assert counts == [["0", "1"], ["1", "0"]]
     assert not list(tmp_path.rglob("*.lock"))
+
+
+def test_a_process_that_does_not_go_on_is_not_waited_for(tmp_path, monkeypatch):
+    index = tmp_path / "folder" / "loop.nbi"
+    index.parent.mkdir()
+    monkeypatch.setattr(compiled, "_LONGEST_WAIT", 0.05)
+    script = (
+        "import sys, time\nfrom filelock import FileLock\n"
+        "with FileLock(sys.argv[1]):\n    print(flush=True)\n    time.sleep(60.0)\n"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", script, index.with_suffix(".lock")], stdout=subprocess.PIPE
+    )
+    try:
+        other.stdout.readline()
+        with compiled._alone(index):
+            pass
+    finally:
+        other.kill()
+        other.communicate()
+
+
+def test_an_interrupt_that_is_swallowed_while_compiling_is_one():
+    def swallowed():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+        except KeyboardInterrupt:
+            pass
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), compiled._interruptible():
+        swallowed()
+        raise RuntimeError("no compiled object yet")
+    with pytest.raises(KeyboardInterrupt), compiled._interruptible():
+        swallowed()
+    with pytest.raises(RuntimeError, match="ours"), compiled._interruptible():
+        raise RuntimeError("ours")
+    assert signal.getsignal(signal.SIGINT) is before

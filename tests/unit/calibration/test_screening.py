@@ -8,7 +8,13 @@ import pytest
 from gmwm import Channel, Recording, Resonance, Sinusoid, WhiteNoise
 from gmwm._core.notices import Notice
 from gmwm.calibration import tuning
-from gmwm.calibration.screening import _is_much, stretches_at_rest, terms_of, with_outcomes
+from gmwm.calibration.screening import (
+    _is_much,
+    screened,
+    stretches_at_rest,
+    terms_of,
+    with_outcomes,
+)
 from gmwm.process import as_model
 
 LINES = [(10.0 + k, 1.0 - 0.1 * k) for k in range(tuning.MOST_TERMS + 2)]
@@ -70,3 +76,25 @@ def test_of_two_rates_each_has_its_stretches_at_rest():
     assert parts[-1] == (24_000, "gyro_y", 200.0)
     assert [part[1:] for part in parts[:-1]] == [("gyro_x", 100.0)] * 2
     assert all(4000 < part[0] < 5000 for part in parts[:-1])
+
+
+@pytest.mark.parametrize(("pulses", "is_told"), [(180, True), (10, False), (0, False)])
+def test_many_shocks_may_be_the_noise_of_the_sensor(pulses, is_told):
+    """Of p pulses of s samples and height a, means of m vary by p (a s / m)^2 m / n more."""
+    n, rate, size, height = 180_000, 100.0, 10, 1e-2
+    rng = np.random.default_rng(7)
+    x = WhiteNoise(1e-4).simulate(n, 1.0 / rate, seed=0)
+    for start in rng.permutation(n // 200)[:pulses] * 200:
+        x[start : start + size] += height * rng.choice([-1.0, 1.0])
+    given = Recording.from_arrays({"gyro_x": x}, rate, {"gyro": "rad/s"})
+    event = [each for each in screened(given).notices if each.code == "event"]
+    assert len(event) == (pulses > 0)
+    if not is_told:
+        assert all("taken" not in each.values and "noise" not in each.action for each in event)
+        return
+    (event,) = event
+    m = event.values["taken_at"] * rate
+    white = 1e-8 * rate / m
+    added = pulses * (height * size / m) ** 2 * m / n
+    assert event.values["taken"] == pytest.approx(np.sqrt(1.0 + added / white), rel=0.25)
+    assert f"{event.values['taken']:.2g} times as large" in event.action

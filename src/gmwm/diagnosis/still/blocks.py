@@ -96,4 +96,7 @@ def blocks_of(recording: Recording) -> Blocks | None:
         means[enough, axis] = np.nanmean(blocks[enough], axis=1)
         squares = np.nansum((blocks - means[:, [axis]]) ** 2, axis=1)
         scatter[enough, axis] = squares[enough] / (known[enough] - 1)
-    return Blocks(channels, size, means, scatter)
+    seen = np.flatnonzero(np.any(scatter > 0.0, axis=0))
+    if not seen.size:
+        return None
+    return Blocks(tuple(channels[i] for i in seen), size, means[:, seen], scatter[:, seen])

@@ -299,9 +299,11 @@ class Fit(Document, Printed):
         scales = replace(Scales.of(self.wv), tau=tau)
         curve = scales.curve(self.model)
         errors = np.sqrt(np.diag(self.covariance))
-        gradient = np.empty((len(self.keys), tau.size))
+        gradient = np.zeros((len(self.keys), tau.size))
         for i, key in enumerate(self.keys):
             step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
+            if step == 0.0:
+                continue  # at a limit, where it is not estimated
             pair = [
                 scales.curve(self.model.with_params({key: self.params[key] + sign * step}))
                 for sign in (1.0, -1.0)

@@ -54,11 +54,18 @@ def open_hdf5(path: Path) -> ArrayTable:
         _check_heaps(stream)
 
         def add(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and item.dtype.kind in "iufV" and item.shape:
+            if not isinstance(item, h5py.Dataset):
+                return
+            if item.external:
+                raise InputError(
+                    f"{path.name}: {name} is in another file, {item.external[0][0]!r}, which is "
+                    "not opened: save its samples in this one"
+                )
+            if item.dtype.kind in "iufV" and item.shape:
                 like = np.broadcast_to(np.empty((), item.dtype), item.shape)
                 full = name if is_mat else _with_unit(name, item.attrs)
                 found[full] = Array(like, partial(read, name))
-            elif isinstance(item, h5py.Dataset) and item.shape == ():
+            elif item.dtype.kind in "iuf" and item.shape == ():
                 found[name] = array_of(np.asarray(item[()]))
 
         # What MATLAB refers to, cells and structure arrays, hides in #refs#.

@@ -28,8 +28,9 @@ from gmwm.readers.formats.arrays import AnyArray, Array, ArrayTable
 Opener = Callable[[Path], ArrayTable]
 
 _LARGEST = 64 << 20  # bytes of a file whose arrays are read too; of others only what is about them
-_SECONDS, _PER_SECOND = 10, 4 << 20  # of the processor, and bytes of the file for each one more
-_MEMORY, _UNPACKED = 512 << 20, 1100  # bytes; zlib makes at most 1,032 of one
+_SECONDS, _PER_SECOND = 15, 4 << 20  # of the processor, and bytes of the file for each one more
+_MEMORY, _UNPACKED = 512 << 20, 40  # bytes, and of each byte of the file, which may be compressed
+_MARK = "gmwm: "  # before an answer: what else is printed is not ours
 _PROGRAM = "from gmwm.readers.formats.trial import serve; serve()"
 
 _kept: ContextVar[list[_Reader] | None] = ContextVar("kept", default=None)
@@ -79,7 +80,8 @@ def _asked(opener: str, path: Path) -> dict[str, Any]:
     else:
         kept.append(reader)
     return answer or {
-        "text": f"{path.name} is damaged, so that the library that reads it fails: save it again"
+        "text": f"{path.name} is damaged, so that its library fails or reads on for too long: save "
+        "it again"
     }
 
 
@@ -87,8 +89,9 @@ class _Reader:
     """A process that reads files, each asked for by a line of JSON, and answers by another."""
 
     def __init__(self) -> None:
+        # -P: modules are not looked for in the folder of the data.
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, "-P", "-c", _PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL, text=True, encoding="utf-8",
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
@@ -100,8 +103,11 @@ class _Reader:
         with suppress(BrokenPipeError):
             question.write(json.dumps([opener, os.fspath(path.absolute()), memory.budget()]) + "\n")
             question.flush()
-        line = answer.readline()
-        return json.loads(line) if line.endswith("\n") else None
+        for line in answer:
+            if line.startswith(_MARK) and line.endswith("\n"):
+                found: dict[str, Any] = json.loads(line.removeprefix(_MARK))
+                return found
+        return None
 
     def close(self) -> None:
         """Let it end."""
@@ -116,7 +122,7 @@ def serve() -> None:
         path = Path(name)
         with memory.limited(budget / (1 << 30)):
             _limit(path.stat().st_size)
-            print(json.dumps(_answer(resolve_name(opener), path)), flush=True)
+            print(_MARK + json.dumps(_answer(resolve_name(opener), path)), flush=True)
 
 
 def _limit(size: int) -> None:

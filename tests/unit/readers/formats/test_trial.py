@@ -15,7 +15,7 @@ from gmwm.readers.formats.arrays import ArrayTable, array_of
 from gmwm.readers.formats.hdf5 import open_mat
 from gmwm.readers.formats.trial import one_reader, tried
 
-X = np.full(40, 7.5)
+X = np.random.default_rng(1).normal(size=100)
 OF_MATLAB = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
 
 
@@ -60,10 +60,26 @@ def test_what_can_be_read_is(file):
     np.testing.assert_array_equal(table.load([0])[0], X)
 
 
+def prints(path):
+    print("hello")
+    return opened(path)
+
+
+def test_what_else_is_printed_is_no_answer(file):
+    assert tried(prints, file).names == ("gyro_x", "text")
+
+
+def test_modules_beside_the_data_are_not_loaded(file, monkeypatch):
+    for name in ("json", "random", "signal"):
+        (file.parent / f"{name}.py").write_text("raise SystemExit")
+    monkeypatch.chdir(file.parent)
+    assert tried(opened, Path("a.mat")).names == ("gyro_x", "text")
+
+
 def test_a_process_that_ends_is_a_damaged_file(file):
     with one_reader():
         for _ in range(2):
-            with pytest.raises(InputError, match=r"a\.mat is damaged, so that the library"):
+            with pytest.raises(InputError, match=r"a\.mat is damaged, so that its library"):
                 tried(ends, file)
             assert tried(opened, file).names == ("gyro_x", "text")
 
@@ -106,6 +122,27 @@ def test_numbers_of_no_type_end_scipy_and_are_refused(tmp_path, kind):
         gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
 
 
+def test_good_files_of_many_structures_are_read(tmp_path):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {**{f"v{i}": {"a": 1.0} for i in range(1500)}, "gyro_x": X})
+    found = gmwm.read(path, rate=100.0, units={"gyro": "rad/s"}, channels=["gyro_x"])
+    np.testing.assert_array_equal(found["gyro_x"].values, X)
+
+
+def test_texts_and_arrays_in_other_files_are_not_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    (tmp_path / "secret.bin").write_bytes(X.tobytes())
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as content:
+        content["gyro_x"], content["name"] = X, "text"
+    assert gmwm.read(path, rate=100.0, units={"gyro": "rad/s"}).n == X.size
+    with h5py.File(path, "a") as content:
+        place = [(str(tmp_path / "secret.bin"), 0, X.nbytes)]
+        content.create_dataset("gyro_y", X.shape, "f8", external=place)
+    with pytest.raises(InputError, match="gyro_y is in another file"):
+        gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
+
+
 @pytest.mark.skipif(not OF_MATLAB.exists(), reason="scipy is installed without its test data")
 def test_what_matlab_writes_ends_nothing():
     """Most hold nothing of a recording, which is what they are refused for."""
@@ -114,4 +151,4 @@ def test_what_matlab_writes_ends_nothing():
             with pytest.raises(InputError) as caught:
                 tried(open_mat, path)
                 raise InputError("used")
-            assert "the library" not in str(caught.value), path.name
+            assert "its library" not in str(caught.value), path.name
