@@ -74,7 +74,11 @@ def one_reader() -> Iterator[None]:
 def _asked(opener: str, path: Path) -> dict[str, Any]:
     kept = _kept.get()
     reader = kept.pop() if kept else _Reader()
-    answer = reader.asked(opener, path)
+    try:
+        answer = reader.asked(opener, path)
+    except BaseException:  # an interrupt
+        reader.kill()
+        raise
     if answer is None or kept is None:
         reader.close()
     else:
@@ -108,6 +112,11 @@ class _Reader:
                 found: dict[str, Any] = json.loads(line.removeprefix(_MARK))
                 return found
         return None
+
+    def kill(self) -> None:
+        """End it, whatever it is at."""
+        self._process.kill()
+        self.close()
 
     def close(self) -> None:
         """Let it end."""
