@@ -149,9 +149,13 @@ def _rounded(value: Any) -> float | int | str:
 
 def _differences(found: Any, expected: Any, rtol: float, path: str) -> Iterator[str]:
     """Where the two are not the same, in words."""
-    if isinstance(expected, dict) and isinstance(found, dict) and [*found] == [*expected]:
-        for key, each in expected.items():
-            yield from _differences(found[key], each, rtol, f"{path}/{key}")
+    if isinstance(expected, dict) and isinstance(found, dict):
+        shared = [key for key in expected if key in found]
+        if [*found] != [*expected]:
+            gone, new = ([key for key in each if key not in shared] for each in (expected, found))
+            yield f"{path}: {new} are new, {gone} are gone, or their order is another"
+        for key in shared:
+            yield from _differences(found[key], expected[key], rtol, f"{path}/{key}")
     elif (
         isinstance(expected, list)
         and isinstance(found, list)

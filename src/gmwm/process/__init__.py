@@ -32,6 +32,7 @@ from gmwm.process.spectral import (
     haar_gain as haar_gain,
     in_hertz as in_hertz,
     legendre as legendre,
+    node_weights as node_weights,
     quadrature as quadrature,
     resolved_share as resolved_share,
 )

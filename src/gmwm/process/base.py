@@ -143,7 +143,7 @@ class Process:
     @property
     def is_open(self) -> bool:
         """Whether any parameter is left open."""
-        return any(value is None for value in self.values.values())
+        return any(parameter.name not in self.__dict__ for parameter in self.parameters)
 
     @property
     def linear_parameter(self) -> Parameter | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,6 @@ class Model:
     """
 
     terms: tuple[Process, ...]
-    _parameters: tuple[ModelParameter, ...]
 
     def __init__(self, terms: tuple[Process, ...]) -> None:
         terms = _in_order(tuple(terms))
@@ -62,17 +62,16 @@ class Model:
             raise InputError("a model needs at least one process")
         _check_distinct(terms)
         object.__setattr__(self, "terms", terms)
-        object.__setattr__(self, "_parameters", _number(terms))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError("a Model does not change: make a new one")
 
     # -- parameters -------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[ModelParameter, ...]:
         """All parameters, term by term."""
-        return self._parameters
+        return _number(self.terms)
 
     @property
     def params(self) -> dict[str, float | None]:
@@ -172,8 +171,8 @@ class Model:
         return total
 
     def _require_given(self) -> None:
-        missing = [key for key, value in self.params.items() if value is None]
-        if missing:
+        if self.is_open:
+            missing = [key for key, value in self.params.items() if value is None]
             raise InputError(
                 f"the model {self!r} has free parameters ({', '.join(missing)}): "
                 "give them a value, or estimate them with gmwm.fit"

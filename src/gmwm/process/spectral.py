@@ -232,23 +232,23 @@ WIDER = 4
 class Panels:
     """The nodes of a quadrature in panels, on which a smooth spectrum is a polynomial.
 
-    log_tangent: (P, 12), chebyshev points of each panel: log tan(pi f), f in cycles per sample.
+    points: (P, 12), Chebyshev points of each panel, in the coordinate of the nodes.
     starts: (P,), first node of each panel.
     share: (K, 12), lagrange's polynomials of the points of its panel at each node.
     """
 
-    log_tangent: FloatArray
+    points: FloatArray
     starts: npt.NDArray[np.intp]
     share: FloatArray
 
     @classmethod
-    def of(cls, log_tangent: FloatArray, width: float = _PANEL) -> Panels:
-        """Those of nodes (K,), panel by panel."""
-        panel = np.floor(log_tangent / width)
+    def of(cls, nodes: FloatArray, width: float = _PANEL) -> Panels:
+        """Those of nodes (K,), panel by panel: log tan(pi f) of each, f in cycles per sample."""
+        panel = np.floor(nodes / width)
         starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
         angles = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
         points = np.cos(angles)
-        within = 2.0 * (log_tangent / width - panel) - 1.0
+        within = 2.0 * (nodes / width - panel) - 1.0
         # By the barycentric formula, whose limit at a point is one.
         distance = within[:, None] - points
         distance[distance == 0.0] = np.finfo(float).tiny
@@ -259,7 +259,7 @@ class Panels:
     def gathered(self, weight: FloatArray) -> FloatArray:
         """Weights of the points from weights of the nodes, (..., K) to (..., P, 12)."""
         ends = np.append(self.starts[1:], self.share.shape[0])
-        result = np.empty((*weight.shape[:-1], *self.log_tangent.shape))
+        result = np.empty((*weight.shape[:-1], *self.points.shape))
         for p, (start, end) in enumerate(zip(self.starts, ends, strict=True)):
             result[..., p, :] = weight[..., start:end] @ self.share[start:end]
         return result
@@ -291,7 +291,7 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
             for i in range(0, len(averaging), TOGETHER)
         ]
         gathered = np.concatenate(parts)
-    return panels.log_tangent.ravel(), gathered.reshape(len(averaging), -1)
+    return panels.points.ravel(), gathered.reshape(len(averaging), -1)
 
 
 TOGETHER = 16

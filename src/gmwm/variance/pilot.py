@@ -5,10 +5,12 @@ It serves the equivalent degrees of freedom of the estimates and the first weigh
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, quadrature
+from gmwm.process import PSD, Panels, node_weights
 from gmwm.variance import tuning
 
 
@@ -20,13 +22,13 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     dt: Sampling interval, s.
     Returns: ``psd(f, dt)``.
     """
-    grid = quadrature(tuple(averaging.tolist()))
+    x, weight = _points(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
-    node = _Places(np.log(grid.frequency), knots)
+    node = _Places(x, knots)
     level = np.log(2.0 * variance * averaging)
     for _ in range(tuning.PILOT_ITERATIONS):
         density = np.exp(node.interpolated(level[::-1]))
-        implied = 2.0 * (grid.gain @ (grid.weight * density))
+        implied = weight @ density
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
         level = _limit_slopes(level)
 
@@ -36,8 +38,25 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     return psd
 
 
+@lru_cache(maxsize=32)  # gaps hide other levels in each channel; 0.1 MB each
+def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Logarithms of frequencies (cycles per sample), and weights of a spectrum there, a level each.
+
+    A power law on an octave is a polynomial of its points to rounding.
+    """
+    frequency, weight = node_weights(averaging)
+    lowest = np.log(tuning.HAAR_PEAK / averaging[-1])
+    octaves = Panels.of(np.log(frequency) - lowest, np.log(2.0))
+    points = lowest + octaves.points.ravel()
+    weights = octaves.gathered(weight).reshape(len(averaging), -1)
+    points.flags.writeable = weights.flags.writeable = False
+    return points, weights
+
+
 class _Places:
     """Where values lie between knots: piecewise linear interpolation, again and again.
+
+    It is quick where many values in a row lie in one piece.
 
     x: (n,).
     knots: (K,), rising.
@@ -46,10 +65,10 @@ class _Places:
     def __init__(self, x: FloatArray, knots: FloatArray) -> None:
         self._knots = knots
         self._below = np.minimum(x - knots[0], 0.0)
-        self._piece = np.clip(
-            np.searchsorted(knots, x, side="right") - 1, 0, max(knots.size - 2, 0)
-        )
-        self._beyond = np.clip(x, knots[0], knots[-1]) - knots[self._piece]
+        piece = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, max(knots.size - 2, 0))
+        self._beyond = np.clip(x, knots[0], knots[-1]) - knots[piece]
+        start = np.flatnonzero(np.diff(piece, prepend=-1))
+        self._piece, self._repeats = piece[start], np.diff(start, append=piece.size)
 
     def interpolated(self, level: FloatArray) -> FloatArray:
         """Between levels at the knots; below the lowest with the mean slope of the lowest three."""
@@ -57,7 +76,8 @@ class _Places:
         if reach == 0:
             return np.full(self._below.shape, level[0])
         slopes = np.diff(level) / np.diff(self._knots)
-        inside = slopes[self._piece] * self._beyond + level[self._piece]
+        inside = np.repeat(slopes[self._piece], self._repeats) * self._beyond
+        inside += np.repeat(level[self._piece], self._repeats)
         slope = (level[reach] - level[0]) / (self._knots[reach] - self._knots[0])
         return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
 

@@ -69,8 +69,9 @@ class Profile:
         self.target, self.root, self._beside = (
             np.array(each, order="C") for each in (target, root, beside)
         )
-        linear = np.isin(np.arange(len(design.terms) + self._beside.shape[1]), design.linear)
-        linear[len(design.terms) :] = True
+        linear = np.ones(len(design.terms) + self._beside.shape[1], dtype=bool)
+        linear[: len(design.terms)] = False
+        linear[list(design.linear)] = True
         self._linear, self._given = np.flatnonzero(linear), np.flatnonzero(~linear)
 
     def _profiled(self, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -73,7 +73,8 @@ class _LagSums:
 
     first: The finest of the coarse levels.
     averaging: (L,) of int, averaging times, blocks.
-    amplitude: (L, F), gains over their phases.
+    slopes: (L, F), gains over their phases and the sine of the frequency; 0 at frequency zero.
+    at_zero: (L,), gains over their phases at frequency zero.
     weights: (H,), how often each lag from zero on stands for itself and its negative.
     counts: (L, L, H), pairs of coefficients at each lag, of those that there are, times
         ``weights``.
@@ -82,16 +83,15 @@ class _LagSums:
     first: int
     grid: LagGrid
     averaging: npt.NDArray[np.intp]
-    amplitude: FloatArray
+    slopes: FloatArray
+    at_zero: FloatArray
     weights: FloatArray
     counts: FloatArray
 
     def of(self, spectrum: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Sums over the lags for a spectrum of block means, as `lag_sums` has them, (L, L)."""
-        sine = np.sin(np.pi * self.grid.frequency[1:])
-        base = np.zeros_like(self.amplitude)
-        base[:, 1:] = self.amplitude[:, 1:] * (spectrum[1:] / sine)
-        zero = np.outer(self.amplitude[:, 0], self.amplitude[:, 0] * (spectrum[0] / self.grid.size))
+        base = self.slopes * spectrum
+        zero = np.outer(self.at_zero, self.at_zero * (spectrum[0] / self.grid.size))
         found: tuple[FloatArray, FloatArray, FloatArray] = lag_sums(
             self.grid.transform(base), self.averaging, zero, self.counts, self.weights
         )
@@ -115,7 +115,17 @@ def _lag_sums(n: int) -> _LagSums:
             counts[j, k] = counts[k, j] = pairs
     averaging = m[first:] / block
     amplitude = grid.haar_amplitude(averaging)
-    return _LagSums(first, grid, averaging.astype(np.intp), amplitude, weights, weights * counts)
+    slopes = amplitude / np.sin(np.pi * grid.frequency)
+    slopes[:, 0] = 0.0
+    return _LagSums(
+        first,
+        grid,
+        averaging.astype(np.intp),
+        slopes,
+        amplitude[:, 0].copy(),
+        weights,
+        weights * counts,
+    )
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
@@ -182,7 +192,7 @@ def _pairs(averaging: tuple[float, ...]) -> _Pairs:
     place = np.zeros((len(averaging), len(averaging)), dtype=int)
     place[first, second] = np.arange(first.size)
     weight[place[rows, columns]] += panels.gathered(grid.weight * excess)
-    frequency = np.arctan(np.exp(panels.log_tangent.ravel())) / np.pi
+    frequency = np.arctan(np.exp(panels.points.ravel())) / np.pi
     frequency.flags.writeable = False  # what spectra make of them is kept
     return _Pairs(panels.starts, frequency, weight, first, second)
 
