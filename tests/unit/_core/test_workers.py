@@ -3,6 +3,7 @@
 import os
 import pickle
 import signal
+import threading
 
 import pytest
 
@@ -111,6 +112,14 @@ def test_processes_end_with_an_interrupt(tmp_path):
         raise KeyboardInterrupt
     with pytest.raises(ProcessLookupError):
         os.kill(other, 0)
+
+
+def test_no_thread_that_gives_semaphores_back_is_left_for_the_end_of_this_process():
+    before = set(threading.enumerate())
+    for _ in range(12):
+        with beside(1, "os:getpid"):
+            assert dict(shared(abs, [-1, 2])) == {-1: 1, 2: 2}
+        assert set(threading.enumerate()) <= before
 
 
 def test_there_are_never_more_processes_than_cores_or_items(monkeypatch):

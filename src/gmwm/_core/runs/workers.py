@@ -17,7 +17,7 @@ from multiprocessing import current_process
 from pickle import PicklingError
 from pkgutil import resolve_name
 from queue import SimpleQueue
-from threading import Lock, Thread
+from threading import Lock, Thread, enumerate as threads
 from time import sleep
 from typing import Any, TypeVar
 
@@ -42,6 +42,7 @@ PROCESSES = 2
 """That share the work on one recording by default: each takes 200 MB."""
 
 _TOGETHER = 2  # times that an item may be among those at which a process ended; then it goes alone
+_LAST_SECONDS = 5.0  # that the end of a thread is waited for, which takes a thousandth of one
 _WAITING = 2  # items that a process is given: the one at work, and the next
 
 
@@ -95,6 +96,7 @@ def beside(others: int, first: str) -> Iterator[None]:
         return
     from joblib.externals.loky import ProcessPoolExecutor
 
+    before = threads()
     try:
         # None: they do not end while they wait for work, only with this block or this process.
         pool = ProcessPoolExecutor(max_workers=others, timeout=None)
@@ -108,6 +110,17 @@ def beside(others: int, first: str) -> Iterator[None]:
     finally:
         _beside.reset(token)
         pool.shutdown(kill_workers=True)
+        _joined([each for each in threads() if each not in before])
+
+
+def _joined(started: Iterable[Thread]) -> None:
+    """Wait for the threads that fed a pool, which the pool does not.
+
+    They give its semaphores back; where this process ended meanwhile, a warning of leaks was shown.
+    """
+    for each in started:
+        if each.name == "QueueFeederThread":
+            each.join(_LAST_SECONDS)
 
 
 def while_beginning(work: Callable[[], object]) -> None:
