@@ -147,6 +147,9 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     """Which models tie, and the parameters of which that leaves less known."""
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
+    better = selection.surpassed_by
+    if better is not None:
+        text += f" (best of all, of {better.n_parameters} parameters, {better.model.title()})"
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
         text += f". If none of them is ruled out: {', '.join(wider)}"

@@ -19,6 +19,7 @@ class CandidateForm(Form):
     chi_square: NotNegative
     n_parameters: Annotated[int, Field(ge=1, le=1_000_000)]
     dof: Freedom
+    compared_only: bool = False
 
 
 class SelectionForm(Form):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
@@ -25,6 +25,7 @@ from gmwm.estimate.problem import (
 )
 from gmwm.estimate.result import Fit
 from gmwm.process import (
+    BiasInstability,
     GaussMarkov,
     Model,
     Process,
@@ -98,6 +99,13 @@ class Choices:
             dof=candidate.dof - found.n_shapes,
         )
 
+    @property
+    def with_flicker(self) -> Choices | None:
+        """The same with flicker noise; None if that is a choice already."""
+        if any(isinstance(process, BiasInstability) for process in self.extra):
+            return None
+        return replace(self, extra=(*self.extra, BiasInstability()))
+
     def bases(self) -> Iterator[tuple[Process, ...]]:
         """All sums of the terms whose shape is given, the empty one first.
 
@@ -120,6 +128,8 @@ class Candidate:
         levels too: a level of few degrees of freedom that is high by chance asks for a term
         otherwise.
     dof: Moments less parameters.
+    compared_only: Whether it is not chosen, however good: flicker noise, which is not among the
+        choices unless it is asked for, describes the data as well as the best of them.
     """
 
     model: Model
@@ -128,6 +138,7 @@ class Candidate:
     chi_square: float
     n_parameters: int
     dof: int
+    compared_only: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types."""
@@ -152,14 +163,17 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
     """
     reference = dictionary_fit(wv, wv.variance, choices.given)
     allowed = reference.discrepancy
-    plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
+    ground = _Ground.of(wv.variance, reference, allowed)
+    plain = _candidates(wv, ground, choices)
     plain.sort(key=lambda item: item[0].criterion)
-    if isinstance(wv, PooledVariance):
-        return [candidate for candidate, _ in plain], None
+    flicker = _flicker(wv, ground, choices)
     try:
-        slope = _slope_under(plain[0], wv)
+        slope = None if isinstance(wv, PooledVariance) else _slope_under(plain[0], wv)
     except InputError:  # samples missing all over leave none to be seen
-        return [candidate for candidate, _ in plain], None
+        slope = None
+    if slope is None:
+        found, rival = ([candidate for candidate, _ in each] for each in (plain, flicker))
+        return _with_rival(found, rival), None
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
     ambiguous = None
@@ -169,12 +183,21 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
             if drift_free.discrepancy < allowed:
                 # Both kinds must be compared under the same allowance.
                 allowed = drift_free.discrepancy
-                plain = _candidates(wv, _Ground.of(wv.variance, reference, allowed), choices)
-            found = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
-            ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in found]
+                ground = _Ground.of(wv.variance, reference, allowed)
+                plain, flicker = _candidates(wv, ground, choices), _flicker(wv, ground, choices)
+            drifting = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
+            ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in drifting]
         elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
-    return sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key), ambiguous
+    ranking = sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+    return _with_rival(ranking, _without_ramp(flicker, wv, without)), ambiguous
+
+
+def _with_rival(ranking: list[Candidate], flicker: Sequence[Candidate]) -> list[Candidate]:
+    """The ranking with what is compared only, where that is as good as the best."""
+    limit = rank_key(ranking[0]) + tuning.TIE
+    rivals = [replace(each, compared_only=True) for each in flicker if rank_key(each) <= limit]
+    return sorted((*ranking, *rivals), key=rank_key)
 
 
 def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
@@ -284,9 +307,32 @@ class _Ground:
 def _candidates(
     wv: WaveletVariance, ground: _Ground, choices: Choices
 ) -> list[tuple[Candidate, Point]]:
-    """All sums whose terms come out positive, each started from the one with one term less."""
-    found = []
-    for base in choices.bases():
+    """All sums whose terms come out positive; white noise where there are none."""
+    found = list(_sums(wv, ground, choices, choices.bases()))
+    return found or [_fallback(wv, ground)]
+
+
+def _flicker(
+    wv: WaveletVariance, ground: _Ground, choices: Choices
+) -> list[tuple[Candidate, Point]]:
+    """The best sum with flicker noise, where that is no choice; none if none comes out positive.
+
+    A plateau of many decades is described by several Gauss-Markov processes as far as the data
+    reach; what they are beyond, or where few windows are seen, is another matter.
+    """
+    more = choices.with_flicker
+    if more is None:
+        return []
+    bases = (base for base in more.bases() if any(isinstance(p, BiasInstability) for p in base))
+    found = sorted(_sums(wv, ground, more, bases), key=lambda item: item[0].criterion)
+    return found[:1]
+
+
+def _sums(
+    wv: WaveletVariance, ground: _Ground, choices: Choices, bases: Iterable[tuple[Process, ...]]
+) -> Iterator[tuple[Candidate, Point]]:
+    """Those on each base, each started from the one with one term less."""
+    for base in bases:
         shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
         before = np.inf
         for g in range(choices.max_gauss_markov + 1):
@@ -306,9 +352,7 @@ def _candidates(
                 before = point.objective
                 continue
             before = point.objective
-            candidate = choices.opened(ground.candidate(design, point), wv.n)
-            found.append((candidate, point))
-    return found or [_fallback(wv, ground)]
+            yield choices.opened(ground.candidate(design, point), wv.n), point
 
 
 def _fallback(wv: WaveletVariance, ground: _Ground) -> tuple[Candidate, Point]:

@@ -70,9 +70,23 @@ class Selection(Document, Printed):
 
     @property
     def ties(self) -> tuple[Candidate, ...]:
-        """Candidates within 2 of the best criterion, which the data hardly distinguish."""
-        limit = rank_key(self.ranking[0]) + tuning.TIE
+        """Candidates within 2 of the best criterion, which the data hardly distinguish.
+
+        Those that are compared only may be better still.
+        """
+        limit = rank_key(self._best) + tuning.TIE
         return tuple(item for item in self.ranking if rank_key(item) <= limit)
+
+    @property
+    def surpassed_by(self) -> Candidate | None:
+        """What is compared only, where it is better than all choices by more than a tie."""
+        first = self.ranking[0]
+        return first if rank_key(first) + tuning.TIE < rank_key(self._best) else None
+
+    @property
+    def _best(self) -> Candidate:
+        """Of those that may be chosen."""
+        return next(item for item in self.ranking if not item.compared_only)
 
     @cached_property
     def rivals(self) -> tuple[Fit, ...]:
@@ -81,8 +95,13 @@ class Selection(Document, Printed):
         These are as good as the model without the term.
         """
         others = [item for item in self.ties if item is not self.chosen][: tuning.RIVALS]
-        fits = [_fitted(item.model, self.fit.wv) for item in others]
-        return tuple(fit for fit in fits if not _has_redundant_term(fit))
+        fits = [(item, _fitted(item.model, self.fit.wv)) for item in others]
+        return tuple(
+            fit
+            for item, fit in fits
+            if not _has_redundant_term(fit)
+            and not (item.compared_only and fit.goodness.is_excluded)
+        )
 
     def ranges(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """What is known of each parameter where several models tie: all of their intervals.
@@ -126,9 +145,10 @@ class Selection(Document, Printed):
             {"model": item.model.title()}
             | {name: getattr(item, name) for name in names}
             | {"chosen": item is self.chosen, "tie": item in ties}
+            | {"compared_only": item.compared_only}
             for item in self.ranking
         ]
-        return frame(rows, ("model", *names, "chosen", "tie"))
+        return frame(rows, ("model", *names, "chosen", "tie", "compared_only"))
 
     def content(self) -> dict[str, Any]:
         """What it cannot be rebuilt without, in JSON types."""
@@ -158,7 +178,7 @@ class Selection(Document, Printed):
         ties = self.ties
         lines = [f"{'':2}{'difference':>10} {'objective':>10} {'p-value':>8} {'param.':>6}  model"]
         for item in self.ranking[:_SHOWN]:
-            mark = ">" if item is self.chosen else " "
+            mark = ">" if item is self.chosen else "~" if item.compared_only else " "
             tie = "=" if len(ties) > 1 and item in ties else " "
             row = (
                 f"{mark}{tie}{item.criterion - best:>10.4g} {item.objective:>10.4g} "
@@ -169,6 +189,11 @@ class Selection(Document, Printed):
             lines.append(f"  and {len(self.ranking) - _SHOWN} more")
         if len(ties) > 1:
             lines.append("= these tie: the data hardly distinguish them, the simplest is preferred")
+        if any(item.compared_only for item in self.ranking):
+            lines += wrapped(
+                "flicker noise is compared only: extra=[BiasInstability()] makes it a choice",
+                first="~ ", indent=2,
+            )  # fmt: skip
         if self.chosen not in ties:
             lines += wrapped(
                 "it is simpler than the first, and as good under weights of its own",
@@ -230,6 +255,11 @@ def select(
     them small errors, so that a random walk may look worse than a Gauss-Markov process of long
     correlation time: a simpler candidate that is as good by its own fit, under the weights that it
     implies itself, is preferred.
+
+    The best candidate with flicker noise is in the ranking where it is as good as the best of the
+    others, and among the rivals, but is not chosen unless ``extra`` has a `BiasInstability`: models
+    of it have no few states for a filter. Where it wins by far, what the chosen model says beyond a
+    tenth of the record is doubtful.
     """
     if not isinstance(extra, Iterable):
         raise InputError(
@@ -246,7 +276,7 @@ def select(
         return _by_merging(wv, choices)
     ranked, slope = rank(wv, choices.seeing(wv))
     ranking = tuple(ranked)
-    chosen, fitted = _chosen(ranking, wv)
+    chosen, fitted = _chosen([item for item in ranking if not item.compared_only], wv)
     if chosen not in ranking:
         ranking = tuple(sorted((*ranking, chosen), key=rank_key))
     if slope is not None and not _has_ramp(chosen.model):

@@ -172,3 +172,56 @@ def test_calibrate_tells_what_ties():
     assert (told.where, told.severity) == ("gyro_x", "note")
     assert "models describe the data equally well: " in told.text
     assert "rad/s" not in told.text  # in the units of the field
+
+
+FLICKER = WhiteNoise(1e-4) + gmwm.BiasInstability(5e-5)
+
+
+@pytest.fixture(scope="module")
+def plateau():
+    return gmwm.wavelet_variance(FLICKER.simulate(360_000, 0.01, seed=26_002), 0.01)
+
+
+class TestFlicker:
+    """Noise of a plateau: compared, not chosen unless it is asked for."""
+
+    def test_it_is_a_rival_that_is_not_chosen(self, plateau):
+        chosen = gmwm.select(plateau)
+        first = chosen.ranking[0]
+        assert first.compared_only and first.model == FLICKER.opened()
+        assert chosen.surpassed_by == first
+        assert not any(item.compared_only for item in chosen.ranking[1:])
+        assert not chosen.chosen.compared_only
+        assert FLICKER.opened() in [fit.model.opened() for fit in chosen.rivals]
+        assert "~ flicker noise is compared only" in str(chosen)
+        again = gmwm.Selection.from_dict(chosen.to_dict())
+        assert again.ranking == chosen.ranking and again.surpassed_by == first
+
+    def test_it_is_chosen_where_it_is_asked_for(self, plateau):
+        chosen = gmwm.select(plateau, extra=[gmwm.BiasInstability()])
+        assert chosen.model.opened() == FLICKER.opened()
+        assert chosen.surpassed_by is None
+        assert not any(item.compared_only for item in chosen.ranking)
+
+    def test_it_is_told_what_is_best_of_all(self, plateau):
+        x = FLICKER.simulate(360_000, 0.01, seed=26_002)
+        rec = gmwm.Recording.from_arrays({"gyro_x": x}, 100.0, {"gyro": "rad/s"})
+        (told,) = [n for n in gmwm.calibrate(rec).notices if n.code == "ambiguity"]
+        assert "best of all, of 2 parameters, white noise + bias instability" in told.text
+
+    def test_it_is_no_rival_of_a_walk_that_is_resolved(self):
+        truth = WhiteNoise(1e-4) + RandomWalk(1e-5)
+        chosen = gmwm.select(truth.simulate(360_000, 0.01, seed=26_001), 0.01)
+        assert chosen.model.opened() == truth.opened()
+        assert not any(item.compared_only for item in chosen.ranking)
+
+    def test_the_interval_over_rivals_has_the_truth(self):
+        tau, missed = np.array([60.0, 600.0]), np.zeros(2)
+        true = np.sqrt(2.0 * FLICKER.haar_variance(tau, 0.01))
+        for seed in range(8):
+            chosen = gmwm.select(FLICKER.simulate(360_000, 0.01, seed=26_100 + seed), 0.01)
+            models = [fit.model for fit in chosen.rivals]
+            _, low, high = chosen.fit.deviation_interval(tau, rivals=models)
+            missed += (low > true) | (high < true)
+        # Of the chosen models alone, 13 and 24 of 40 miss it.
+        assert np.all(missed <= 1)
