@@ -149,7 +149,7 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
     better = selection.surpassed_by
     if better is not None:
-        text += f" (best of all, of {better.n_parameters} parameters, {better.model.title()})"
+        text += f" (best is that with bias instability, of {better.n_parameters} parameters)"
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
         text += f". If none of them is ruled out: {', '.join(wider)}"
