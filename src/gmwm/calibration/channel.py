@@ -148,7 +148,7 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     text = f"{len(models)} models describe the data equally well: {'; '.join(models)}"
     better = selection.surpassed_by
-    if better is not None:
+    if better is not None and better.model.title() in models:
         text += f" (best is that with bias instability, of {better.n_parameters} parameters)"
     wider = wider_ranges(selection.fit, selection.ranges())
     if wider:
