@@ -36,7 +36,7 @@ from gmwm.diagnosis.repeated import (
     repetition_notice,
     thinned,
 )
-from gmwm.diagnosis.resolution import rounding_notice, step_size
+from gmwm.diagnosis.resolution import rounding_notice, step_size, widest_step
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
     abrupt_end_notice,
@@ -207,7 +207,8 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     if unusable is not None:
         return _Examined([unusable], ChannelHealth(), None)
     present = known_of(values)
-    step = step_size(present)
+    smallest = step_size(present)
+    step = widest_step(present, smallest)
     errors = innovations(values, step)
     if errors is None:
         text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
@@ -220,7 +221,12 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     for start, stop in events:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
-    held, chance = held_share(values, step, errors.level)
+    # Where steps are wide in a part of the values, neighbours are equal by chance in that part.
+    held, chance = (
+        held_share(values, step, errors.level)
+        if step == smallest or 2.0 * step < errors.level
+        else (0.0, 0.0)
+    )
     signal = Signal(name, unit, dt, step, errors.level)
     stuck = stuck_notice(signal, values, errors)
     if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
@@ -240,7 +246,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
         light_tails_notice(name, errors) if ended is None else None,
-        rounding_notice(signal, noise),
+        rounding_notice(signal, noise, smallest),
         variance_notice(signal, errors, usable, is_heavy=tails is not None),
         drift_notice(signal, quiet),
         reset_notice(signal, quiet),

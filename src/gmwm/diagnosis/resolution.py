@@ -59,6 +59,34 @@ def _lattice(levels: FloatArray, gaps: FloatArray, step: float) -> tuple[float, 
     return refined, float(np.sqrt(np.mean(off**2)))
 
 
+def widest_step(values: FloatArray, step: float) -> float:
+    """Step of the largest values, where numbers of few digits have wider ones from a power on.
+
+    With three decimal digits, or in half precision, steps are those of the value: ten times (or
+    twice) as wide above a power of ten (of two) as below it. Levels out there come often while
+    their neighbours at the smaller step never do.
+
+    values: (n,), samples in their order, none missing.
+    step: Of `step_size`.
+    Returns: ``step`` itself if all are as wide, or if few samples are where they are not.
+    """
+    if step == 0.0:
+        return 0.0
+    # Stuck values count once, so that none of them is a level for its frequency alone.
+    begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
+    levels, counts = np.unique(begins, return_counts=True)
+    gaps = np.diff(levels)
+    gaps[gaps < 0.5 * step] = 0.0  # one level, written in two ways
+    nearest = np.minimum(np.append(gaps, np.inf), np.insert(gaps, 0, np.inf))
+    often = counts >= tuning.FEWEST_OF_LEVEL
+    alone = often & (nearest > 1.5 * step)
+    size = np.abs(levels)
+    alone &= size > np.max(size[often & ~alone], initial=0.0)
+    if np.sum(counts[alone]) < tuning.FEWEST_WIDE * begins.size:
+        return step
+    return float(np.median(nearest[alone]))
+
+
 def is_coarse(values: FloatArray, step: float) -> bool:
     """Whether the step is more than three times the noise, by how few samples leave two levels.
 
@@ -79,7 +107,9 @@ def is_coarse(values: FloatArray, step: float) -> bool:
     return bool(beyond < 2.0 * norm.sf(tuning.COARSE) * places.size)
 
 
-def rounding_notice(signal: Signal, samples: FloatArray | None = None) -> Notice | None:
+def rounding_notice(
+    signal: Signal, samples: FloatArray | None = None, smallest: float = 0.0
+) -> Notice | None:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
@@ -87,6 +117,7 @@ def rounding_notice(signal: Signal, samples: FloatArray | None = None) -> Notice
     sec. 5): of variance step^2/12, plain additive noise.
 
     samples: (n,), for `is_coarse`.
+    smallest: Step of the smallest values, u, if they have one of their own.
     """
     name, unit, step = signal.name, signal.unit, signal.step
     if step == 0.0:
@@ -94,6 +125,8 @@ def rounding_notice(signal: Signal, samples: FloatArray | None = None) -> Notice
     noise = float(np.sqrt(max(signal.scatter**2 - step**2 / 12.0, 0.0)))
     values = {"lsb": step, "noise": noise}
     text = f"samples come in steps of {readable(step, unit)}"
+    if 0.0 < smallest < step:
+        text += f" ({readable(smallest, unit)} where they are smaller)"
     if noise < step / tuning.COARSE or (samples is not None and is_coarse(samples, step)):
         return Notice(
             "rounding",

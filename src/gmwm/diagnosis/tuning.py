@@ -91,6 +91,10 @@ LEAST_HOLE, WIDE_HOLE, MOST_STEPS = 3, 0.5, 1e6
 standard deviations of the noise, above which the channel is not valid (a hole of two of them makes
 N 1.45 times as large, of a half 1.05 times); range in steps, beyond which there is no counting."""
 
+FEWEST_OF_LEVEL, FEWEST_WIDE = 20, 0.01
+"""Samples on a level whose neighbours do not stay empty by chance (2e-9); part of the samples on
+levels that are further apart than others, from which their step counts."""
+
 BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
