@@ -10,6 +10,7 @@ from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.departure_notices import with_departures
 from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.stages import stage
+from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.process import Model, Process
@@ -90,7 +91,13 @@ def channel_model(
         return Notice(error.code or "not-estimable", "bad", name, str(error))
     curves = list(zip(before, parts, strict=True))
     fit = with_departures(found.fit, sources, there, removed, curves, removing=removals > 0)
-    return replace(found, fit=fit)
+    with stage("departures"):
+        changes = [
+            replace(notice, source=source if len(sources) > 1 else "")
+            for part, known, source in zip(parts, evident, sources, strict=True)
+            if (notice := steadiness_notice(found.fit, part, known)) is not None
+        ]
+    return replace(found, fit=replace(fit, notices=(*fit.notices, *changes)))
 
 
 def _fitted(

@@ -18,10 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, toeplitz
+from scipy.linalg import cholesky
 from scipy.linalg.lapack import dpotri
 from scipy.sparse import csr_array
 from scipy.special import logsumexp
@@ -29,9 +28,10 @@ from scipy.special import logsumexp
 from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.calibration import tuning
+from gmwm.calibration.means import Means
 from gmwm.calibration.shapes import Family, families
 from gmwm.estimate import Fit
-from gmwm.estimate.problem import Scales, difference_covariance
+from gmwm.estimate.problem import Scales
 from gmwm.process import PSD, Model, RandomWalk
 from gmwm.variance import WaveletVariance
 
@@ -69,6 +69,17 @@ class Departure:
         """Whether noise has such an evidence in one of a hundred records at most."""
         return self.evidence >= tuning.EVIDENT
 
+    def curve(self, time: FloatArray) -> FloatArray:
+        """At unit size, at times from the start of the record, s."""
+        length = self.time[0]
+        if self.kind == "step":
+            return np.asarray(time > length, dtype=float)
+        if self.kind == "transient":
+            return np.exp(-time / length)
+        if self.kind == "drift-at-start":
+            return np.maximum(1.0 - time / length, 0.0)
+        return np.cos(2.0 * np.pi * time / length - self.phase)
+
 
 def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departure, ...]:
     """What a recording has that stationary noise does not have.
@@ -78,15 +89,13 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
         about as well (`Departure.is_evident`).
     """
     noise = tuple(term for term in fitted.model.terms if not term.is_drift)
-    means = _Means.of(wv or fitted.wv)
+    means = Means.of(wv or fitted.wv, tuning.MOST_MEANS)
     if not noise or means.first.size < tuning.FEWEST_DIFFERENCES:
         return ()
     psd = Scales.of(fitted.wv).spectrum(Model(noise))
-    frequency = np.geomspace(1.0 / means.length, 0.5 / means.step, tuning.FREQUENCIES)
-    density = psd(frequency, means.dt)
-    if not np.max(density) > 0.0:
+    floor = means.floor(psd)
+    if floor == 0.0:
         return ()  # periodic lines alone have no noise
-    floor = max(float(np.min(density)), tuning.NO_INFORMATION * float(np.max(density)))
     noises = _noises(psd, floor, means)
     kinds = families(means.blocks.size, means.step)
     known = np.empty((0, means.first.size))
@@ -117,7 +126,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
 
 
 def _found(
-    kinds: Sequence[Family], means: _Means, noises: list[_Noise], known: FloatArray
+    kinds: Sequence[Family], means: Means, noises: list[_Noise], known: FloatArray
 ) -> tuple[list[tuple[float, _Test]], FloatArray]:
     """Departures with their evidence, each beside those before it, and the known straight drift.
 
@@ -143,55 +152,6 @@ def _found(
         if evidence < tuning.EVIDENT:
             break
     return found, straight
-
-
-@dataclass(frozen=True, eq=False)
-class _Means:
-    """Means of blocks.
-
-    blocks: (B,), NaN where samples are missing, u.
-    samples: In a block.
-    dt: s.
-    """
-
-    blocks: FloatArray
-    samples: int
-    dt: float
-
-    @classmethod
-    def of(cls, wv: WaveletVariance) -> _Means:
-        merged = -(-wv.blocks.size // tuning.MOST_MEANS)
-        whole = wv.blocks.size // merged * merged
-        means = wv.blocks[:whole].reshape(-1, merged).mean(axis=1)
-        return cls(means, wv.block * merged, wv.dt)
-
-    @property
-    def step(self) -> float:
-        """Length of a block, s."""
-        return self.samples * self.dt
-
-    @property
-    def length(self) -> float:
-        """Of all blocks, s."""
-        return self.blocks.size * self.step
-
-    @cached_property
-    def first(self) -> IntArray:
-        """Blocks that exist, but for the last."""
-        return np.flatnonzero(~np.isnan(self.blocks))[:-1]
-
-    def differences(self, curves: FloatArray) -> FloatArray:
-        """Of each block that exists and the next that does, (..., B) to (..., D)."""
-        there = ~np.isnan(self.blocks)
-        return np.asarray(np.diff(curves[..., there], axis=-1))
-
-    def covariance(self, spectrum: PSD) -> FloatArray:
-        """Of these differences under a spectrum, (D, D), u^2."""
-        column = difference_covariance(spectrum, self.dt, self.samples, self.blocks.size)
-        last = int(np.flatnonzero(~np.isnan(self.blocks))[-1])
-        whole = toeplitz(column[:last])
-        # One across missing blocks is the sum of those of neighbours.
-        return np.asarray(np.add.reduceat(np.add.reduceat(whole, self.first), self.first, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +184,7 @@ def _beside(noises: list[_Noise], known: FloatArray) -> list[_Noise]:
     return [each for each in found if np.isfinite(each.log_weight + np.sum(each.inverse))]
 
 
-def _noises(psd: PSD, floor: float, means: _Means) -> list[_Noise]:
+def _noises(psd: PSD, floor: float, means: Means) -> list[_Noise]:
     """The fitted noise with its part above the floor scaled, and a random walk beside it."""
     # K^2 that equals the floor at that averaging time.
     walk = 3.0 * floor / (tuning.WALK_AT * means.length) ** 2
@@ -264,7 +224,7 @@ class _Test:
     variances: FloatArray
 
     @classmethod
-    def of(cls, family: Family, means: _Means, noises: list[_Noise]) -> _Test:
+    def of(cls, family: Family, means: Means, noises: list[_Noise]) -> _Test:
         data = means.differences(means.blocks)
         curves: FloatArray | csr_array = means.differences(family.curves)
         few = csr_array(curves)  # of a step, two differences

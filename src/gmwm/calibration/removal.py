@@ -85,7 +85,7 @@ def variance_without(
     curves, errors = [], []
     for each in found:
         for phase in (0.0, 0.5 * np.pi) if each.kind == "slow-period" else (0.0,):
-            curves.append(_curve(replace(each, phase=each.phase + phase), _times(channel)))
+            curves.append(replace(each, phase=each.phase + phase).curve(_times(channel)))
             errors.append((each.size[2] - each.size[1]) / (2.0 * WIDE))
     there = ~np.isnan(left.values)
     taken = np.zeros_like(wv.variance)
@@ -133,19 +133,7 @@ def _without(channel: Channel, found: Sequence[Departure]) -> Channel:
         return channel
     values, time = np.array(channel.values, dtype=float), _times(channel)
     for each in found:
-        values -= each.size[0] * _curve(each, time)
+        values -= each.size[0] * each.curve(time)
         if each.kind == "step":
             values[(time > each.time[1]) & (time < each.time[2])] = np.nan
     return replace(channel, values=values)
-
-
-def _curve(found: Departure, time: FloatArray) -> FloatArray:
-    """At unit size."""
-    length = found.time[0]
-    if found.kind == "step":
-        return np.asarray(time > length, dtype=float)
-    if found.kind == "transient":
-        return np.exp(-time / length)
-    if found.kind == "drift-at-start":
-        return np.maximum(1.0 - time / length, 0.0)
-    return np.cos(2.0 * np.pi * time / length - found.phase)

@@ -121,6 +121,27 @@ LARGEST_LOG_EVIDENCE = 700.0
 FREQUENCIES = 64
 """At which the floor of the spectrum is looked for, from one period of the record to two blocks."""
 
+# -- noise that changes its size ------------------------------------------------------------------
+
+DIVISIONS, MEANS_OF_PART, LEAST_OF_PART = (8, 4, 2), 128, 0.5
+"""Parts of a record that are compared; block means of each, of which dense matrices are made; share
+of them that must be there."""
+
+POWERS = (1.0, 4.0)
+"""Of the share of the slow noise in a variance, as weights: best for small changes of it, and where
+it is nearly all of the variance, for large ones."""
+
+FEWEST_FREEDOM = 3.0
+"""Degrees of freedom of a part, from which Bartlett's test has its level."""
+
+FALSE_ALARM = 1e-3
+"""Chance of a notice for a channel of stationary Gaussian noise."""
+
+UNSTEADY, HARMFUL_UNSTEADY = 0.1, 2.0
+"""Of the deviation of all above that of the quiet quarter of the parts, for a notice: as much as a
+valid fit may miss. Deviation of the loudest part over that of the quietest, from which a fit is not
+valid: in three of the channels of real recordings at rest it is 1.7 to 2 (docs/health.md)."""
+
 MOST_STRETCHES = 20
 """Stretches at rest of one log that are fitted jointly, the longest ones."""
 

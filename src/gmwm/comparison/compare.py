@@ -26,7 +26,7 @@ from gmwm.readers import Recording, is_frame
 
 _NOT_NOISE = (
     "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", *DEPARTURES,
+    "held", "filled", "value-repeated", "variance", "unsteady", *DEPARTURES,
 )  # fmt: skip
 """Codes of notices of a fit whose curve is not that of noise."""
 

@@ -53,6 +53,7 @@ _WHY = {
     "drift-at-start": "drift after switching on",
     "slow-period": "a slow period stands out",
     "departures-many": "the bias steps to and fro",
+    "unsteady": "slow noise changes its size",
 }
 """Code of a notice that makes a fit invalid -> why, in about five words."""
 

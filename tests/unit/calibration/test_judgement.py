@@ -11,7 +11,7 @@ from gmwm._core.notices import Notice
 from gmwm.calibration.channel import ChannelModel, mostly_missing
 from gmwm.calibration.departures import Departure
 from gmwm.calibration.judgement import judged, with_one_remedy
-from gmwm.calibration.removal import _curve, _independent, _without
+from gmwm.calibration.removal import _independent, _without
 
 NAMES = ("gyro_x", "accel_y")
 FITS = {
@@ -138,7 +138,7 @@ CURVES = {
 @pytest.mark.parametrize("kind", CURVES)
 def test_what_is_taken_off_is_the_curve_of_its_size(kind):
     found = Departure(kind, (40.0, 37.0, 42.0), (2.0, 1.5, 2.5), 1.0, 0.1, 0.7)
-    np.testing.assert_allclose(_curve(found, TIME), CURVES[kind], atol=1e-12)
+    np.testing.assert_allclose(found.curve(TIME), CURVES[kind], atol=1e-12)
     channel = Channel("gyro_x", 2.0 * CURVES[kind] + 5.0, 1.0, "gyro", "rad/s")
     left = _without(channel, [found]).values
     gone = [38, 39, 40, 41] if kind == "step" else []

@@ -16,10 +16,12 @@ from gmwm.calibration.departure_notices import (
     departure_notice,
     with_departures,
 )
-from gmwm.calibration.departures import _basis, _Means, _share
+from gmwm.calibration import tuning
+from gmwm.calibration.departures import _basis, _share
+from gmwm.calibration.means import Means
 from gmwm.calibration.entrance import _check_together, _left_out, _reason_to_skip, _usable
 from gmwm.calibration.judgement import judged, with_one_remedy
-from gmwm.calibration.removal import _curve, _independent, variance_without, without_departures
+from gmwm.calibration.removal import _independent, variance_without, without_departures
 from gmwm.calibration.screening import (
     _is_much,
     _outcome,
@@ -86,7 +88,7 @@ def test_parts_of_departures():
     found = {}
     found["ladder"] = [_ladder(1.0, 3.0), _ladder(2.0, 2.1)]
     wv = gmwm.wavelet_variance(np.where(T % 700 < 40, np.nan, NOISE), 0.5)
-    means = _Means.of(wv)
+    means = Means.of(wv, tuning.MOST_MEANS)
     covariance = means.covariance(lambda f, _: np.ones_like(f))
     found["means"] = [means.blocks.size, means.samples, means.step, means.length, means.first.size,
                       float(np.trace(covariance)), float(covariance[3, 4]), float(covariance.sum())]  # fmt: skip
@@ -95,7 +97,7 @@ def test_parts_of_departures():
     found["share"] = [_share(np.cos(np.arange(100) / k), 8.0, one) for k in (2.0, 20.0)]
     for kind in ("step", "transient", "drift-at-start", "slow-period"):
         some = Departure(kind, (100.0, 90.0, 120.0), (1.0, 0.5, 1.5), 200.0, 0.5, 0.7)
-        found[f"curve {kind}"] = _curve(some, T[80:130:10])
+        found[f"curve {kind}"] = some.curve(T[80:130:10])
         for evidence, share in ((200.0, 0.5), (99.0, 0.18), (1e9, 1.2)):
             one_of = replace(some, evidence=evidence, share=share)
             found[f"{kind} {evidence} {share}"] = [

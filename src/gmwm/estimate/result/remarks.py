@@ -52,6 +52,7 @@ REASONS = {
     "drift-at-start": "stationary",
     "slow-period": "stationary",
     "departures-many": "stationary",
+    "unsteady": "noise_steady",
 }
 """Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
 
