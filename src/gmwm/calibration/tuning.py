@@ -140,7 +140,7 @@ FALSE_ALARM = 1e-3
 UNSTEADY, HARMFUL_UNSTEADY = 0.1, 2.0
 """Of the deviation of all above that of the quiet quarter of the parts, for a notice: as much as a
 valid fit may miss. Deviation of the loudest part over that of the quietest, from which a fit is not
-valid: in three of the channels of real recordings at rest it is 1.7 to 2 (docs/health.md)."""
+valid: in nine channels of real recordings at rest it is 1.6 to 2.1 (docs/health.md)."""
 
 MOST_STRETCHES = 20
 """Stretches at rest of one log that are fitted jointly, the longest ones."""

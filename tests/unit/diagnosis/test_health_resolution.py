@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.resolution import rounding_notice, step_size
+from gmwm.diagnosis.resolution import rounding_notice, step_size, widest_step
 
 
 @settings(max_examples=60, deadline=None)
@@ -51,6 +51,62 @@ def test_single_precision_keeps_its_own_step():
     # Numbers near 9.8 stored with 24 bits come in steps of 2^-20.
     x = (9.80665 + 1e-4 * np.random.default_rng(4).normal(size=50_000)).astype(np.float32)
     assert step_size(x.astype(float)) == pytest.approx(2.0**-20, rel=1e-6)
+
+
+def of_digits(values, digits=3):
+    return np.array([float(f"{each:.{digits}g}") for each in values])
+
+
+@pytest.mark.parametrize(
+    ("mean", "digits", "widest"),
+    [(0.1, 3, 1e-3), (-0.1, 3, 1e-3), (0.101, 3, 1e-3), (0.1, 4, 1e-4), (0.0975, 3, 1e-4)],
+)
+def test_numbers_of_few_digits_have_wider_steps_above_a_power_of_ten(mean, digits, widest):
+    values = of_digits(mean + 1e-3 * np.random.default_rng(1).normal(size=40_000), digits)
+    step = step_size(values)
+    assert widest_step(values, step) == pytest.approx(widest, rel=1e-6)
+
+
+def test_numbers_of_few_digits_in_half_precision_have_wider_steps_above_a_power_of_two():
+    values = 0.125 + 1e-3 * np.random.default_rng(1).normal(size=40_000)
+    values = values.astype(np.float16).astype(float)
+    step = step_size(values)
+    assert step == pytest.approx(2.0**-14)
+    assert widest_step(values, step) == pytest.approx(2.0**-13)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 1.0, 3.0])
+def test_steps_of_one_size_have_no_wider_ones(step):
+    """Nor where one level comes again and again, with all or none of those beside it."""
+    values = np.rint(np.random.default_rng(2).normal(size=20_000) / step + 0.3) * step
+    assert widest_step(values, step) == step
+    values[::7] = 0.0
+    assert widest_step(values, step) == step
+    values[np.abs(values) < 0.5 * np.max(np.abs(values))] = 0.0
+    assert widest_step(values, step) == step
+    assert widest_step(values, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("mean", [0.1, -0.1, 0.1003])
+def test_neighbours_of_few_digits_are_equal_by_chance(mean):
+    """They were taken for lost packets and left out, which made the rest too quiet."""
+    noise = 1e-3 * np.random.default_rng(3).normal(size=60_000)
+    rec = gmwm.Recording.from_arrays(
+        {"gyro_x": of_digits(mean + noise)}, 100.0, {"gyro": "rad/s"}
+    )
+    found = gmwm.health(rec)
+    assert not found.of(code="held")
+    assert found.channels["gyro_x"].held == 0.0
+    (rounding,) = found.of(code="rounding")
+    assert "where they are smaller" in rounding.text
+    assert rounding.values["lsb"] == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_few_digits_of_noise_far_below_their_wide_step_are_not_valid():
+    noise = 3e-4 * np.random.default_rng(4).normal(size=60_000)
+    rec = gmwm.Recording.from_arrays({"gyro_x": of_digits(0.1 + noise)}, 100.0, {"gyro": "rad/s"})
+    (rounding,) = gmwm.health(rec).of(code="rounding")
+    assert rounding.severity == "bad"
 
 
 @pytest.mark.parametrize("n", [100, 4097, 200_000])
