@@ -28,7 +28,11 @@ STATIONARY = {
     "N + B": WHITE + gmwm.BiasInstability(0.5 * N),
 }
 TIMES = (1.5, 2.0, 3.0, 6.0)
-PARTS = {"second half": (1800.0, 3600.0), "last 30 %": (2520.0, 3600.0), "middle 10 %": (1620.0, 1980.0)}
+PARTS = {
+    "second half": (1800.0, 3600.0),
+    "last 30 %": (2520.0, 3600.0),
+    "middle 10 %": (1620.0, 1980.0),
+}
 
 
 def stationary(truth, seed):

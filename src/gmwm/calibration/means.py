@@ -55,7 +55,7 @@ class Means:
     @property
     def time(self) -> FloatArray:
         """Of the middles of the blocks, s, (B,)."""
-        return self.step * (np.arange(self.blocks.size) + 0.5)
+        return np.asarray(self.step * (np.arange(self.blocks.size) + 0.5), dtype=float)
 
     def without(self, curves: Sequence[FloatArray]) -> Means:
         """Less curves, each (B,), by least squares."""

@@ -132,6 +132,10 @@ is 1 + 1.25/512^2 of that of all windows, which differ by 0.2 % of a standard er
 STREAMING_ROWS = 32
 """Octaves beyond that: 2^32 averaging times of 512 samples are more than any recording has."""
 
+STREAMING_PLACES, STREAMING_OCTAVES, FEW_WINDOWS = 128, 23, 0.5
+"""Places of an octave at which windows of the coarsest level may begin, and octaves; averaging
+times, up to which these are used: beyond, 256 windows at multiples of 1/512 are as good."""
+
 STREAMING_EDGE = 16
 """Parts of an averaging time of which the first and the last must have a sample: what is missing
 lies within a half window then, but for a sixteenth."""

@@ -91,9 +91,7 @@ def test_steps_of_one_size_have_no_wider_ones(step):
 def test_neighbours_of_few_digits_are_equal_by_chance(mean):
     """They were taken for lost packets and left out, which made the rest too quiet."""
     noise = 1e-3 * np.random.default_rng(3).normal(size=60_000)
-    rec = gmwm.Recording.from_arrays(
-        {"gyro_x": of_digits(mean + noise)}, 100.0, {"gyro": "rad/s"}
-    )
+    rec = gmwm.Recording.from_arrays({"gyro_x": of_digits(mean + noise)}, 100.0, {"gyro": "rad/s"})
     found = gmwm.health(rec)
     assert not found.of(code="held")
     assert found.channels["gyro_x"].held == 0.0

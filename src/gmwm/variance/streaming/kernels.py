@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
+from gmwm.variance.streaming.mark_kernels import mark
 from gmwm.variance.streaming.window_kernels import (
     ANY_ORDER,
     FINE,
@@ -142,6 +143,7 @@ def work_off(
     blocks: FloatArray,
     totals: FloatArray,
     tallies: IntArray,
+    marks: FloatArray,
     scratch: FloatArray,
 ) -> None:
     """Work off the rows that have ``least`` new values or more, from the finest on.
@@ -156,6 +158,7 @@ def work_off(
             continue
         values = data[row, :filled]
         if row == 0:
+            mark(values[old:], state[row, ORIGIN] + old, totals[SUM] + totals[LOST_SUM], marks)
             add(totals, SUM, LOST_SUM, total(values[old:]))
         if state[row, GAPPY]:
             levels = (0 if row == 0 else FINE - 1, FINE)
@@ -316,6 +319,7 @@ def absorb(
     totals: FloatArray,
     tallies: IntArray,
     gaps: IntArray,
+    marks: FloatArray,
     scratch: FloatArray,
 ) -> None:
     """Take in samples (n,), NaN where one is missing, none infinite.
@@ -330,5 +334,5 @@ def absorb(
         part = samples[place : place + size]
         _take_in(part, data, present, state, totals, tallies, gaps)
         _noted(0, begin, begin + size, data, present, state, head, blocks, tallies)
-        work_off(CHUNK, data, present, state, sums, head, blocks, totals, tallies, scratch)
+        work_off(CHUNK, data, present, state, sums, head, blocks, totals, tallies, marks, scratch)
         place += size

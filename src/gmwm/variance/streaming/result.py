@@ -36,6 +36,8 @@ def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletV
             "determined of its noise"
         )
     windows, mean, square, scarcity = (each[:size] for each in (windows, mean, square, scarcity))
+    for level in range(max(size - 2, 0), size):
+        mean[level], square[level] = done.of_ends(level, float(mean[level]), float(square[level]))
     variance, gaps = square, None
     if series.missing:
         variance, change = unmasked(square, scarcity, done.gaps, series.missing / series.n)

@@ -28,6 +28,7 @@ from gmwm.variance.streaming.kernels import (
     START,
     N,
 )
+from gmwm.variance.streaming.mark_kernels import PLACES, SLOTS, offsets
 from gmwm.variance.streaming.window_kernels import (
     COUNT,
     FINE,
@@ -70,9 +71,12 @@ class Series:
     tallies: (8,) of int, samples, missing ones, of which at the end and at the beginning; blocks,
         their row, index of the next; index of the first sample.
     gaps: (63, 2) of int, number of gaps of up to 2^i samples, and samples that they have.
+    marks: (4, 1 + PLACES), of `mark_kernels`.
     """
 
-    _ARRAYS = ("data", "present", "state", "sums", "head", "blocks", "totals", "tallies", "gaps")
+    _ARRAYS = (
+        "data", "present", "state", "sums", "head", "blocks", "totals", "tallies", "gaps", "marks",
+    )  # fmt: skip
 
     def __init__(self, start: int = 0):
         self.data = np.zeros((_ROWS, ROOM))
@@ -87,6 +91,8 @@ class Series:
         self.tallies = np.zeros(8, dtype=np.int64)
         self.tallies[[START, NEXT_BLOCK]] = start
         self.gaps = np.zeros((63, 2), dtype=np.int64)
+        self.marks = np.full((SLOTS, 1 + PLACES), np.nan)
+        self.marks[:, 0] = 0.0, -1.0, -1.0, -1.0
         self._scratch = np.zeros((2, ROOM + 1))
 
     def absorb(self, samples: FloatArray) -> None:
@@ -96,7 +102,7 @@ class Series:
     def finished(self) -> Self:
         """A copy of which all samples are worked off."""
         made = type(self)()
-        for name in ("state", "sums", "totals", "tallies", "gaps"):
+        for name in ("state", "sums", "totals", "tallies", "gaps", "marks"):
             getattr(made, name)[...] = getattr(self, name)
         made.blocks[:, : self.tallies[BLOCKS]] = self.blocks[:, : self.tallies[BLOCKS]]
         for row, (filled, headed, gappy) in enumerate(self.state[:, [FILLED, HEADED, GAPPY]]):
@@ -106,7 +112,7 @@ class Series:
                 made.present[row, :filled] = self.present[row, :filled]
         kernels.work_off(
             1, made.data, made.present, made.state, made.sums, made.head, made.blocks, made.totals,
-            made.tallies, made._scratch,
+            made.tallies, made.marks, made._scratch,
         )  # fmt: skip
         return made
 
@@ -171,6 +177,46 @@ class Series:
             octave += 1
         return values, there, 1 << octave
 
+    def of_ends(self, level: int, mean: float, square: float) -> tuple[float, float]:
+        """Means of the coefficients of one of the two coarsest levels and of their squares.
+
+        Where there are few windows, nearly each of them counts; between those that are known, lines
+        are straight. Where there are many, those at multiples of 1/512 are known, of which the
+        first and the last stand for half as many as others, and the last for those after it.
+
+        mean, square: Over the windows at multiples.
+        Returns: the same where samples before the first are missing, or between.
+        """
+        m = 1 << level
+        count = self.n - 2 * m + 1
+        if self.start or self.missing or m <= tuning.STREAMING_STARTS:
+            return mean, square
+        begins = offsets()
+        begins = begins[begins < count]
+        sums = [self._sums_after(at)[: begins.size] for at in (0, m, 2 * m)]
+        windows = (sums[2] - 2.0 * sums[1] + sums[0]) * (0.5 / m)
+        if not np.all(np.isfinite(windows)):
+            return mean, square
+        if count <= tuning.FEW_WINDOWS * m:
+            steps = np.diff(begins, append=count)
+            weights = np.append(0.5 * (steps[:-1] + 1.0), float(steps[-1]))
+            weights[1:] += 0.5 * (steps[:-1] - 1.0)
+            return float(weights @ windows / count), float(weights @ windows**2 / count)
+        step = m // tuning.STREAMING_STARTS
+        multiples, rest = divmod(count - 1, step)
+        first, last = -0.5 * (step - 1), rest - 0.5 * (step - 1)
+
+        def whole(known: float, ends: FloatArray) -> float:
+            total = step * (multiples + 1) * known + first * ends[0] + last * ends[-1]
+            return float(total) / count
+
+        return whole(mean, windows), whole(square, windows**2)
+
+    def _sums_after(self, at: int) -> FloatArray:
+        """Sums before the places after a mark; NaN where they are not known."""
+        slot = np.flatnonzero(self.marks[:, 0] == at)
+        return self.marks[slot[0], 1:] if slot.size else np.full(PLACES, np.nan)
+
     # -- parts -------------------------------------------------------------------------------------
 
     def joined(self, other: Self) -> Self:
@@ -188,6 +234,7 @@ class Series:
             made._join(row, first, second, joint)
         made._join_blocks(first, second, joints)
         made._join_totals(first, second)
+        made._join_marks(first, second)
         return made
 
     def _refer_to(self, other: Self) -> None:
@@ -202,6 +249,7 @@ class Series:
         for array in (self.data[:rows], self.head[0, :rows], self.blocks[0]):
             array += shift
         self.totals[[LOWEST, HIGHEST]] += shift
+        self.marks[:, 1:] += shift * (self.marks[:, :1] + offsets() - self.start)
         self.totals[SUM] += shift * (self.n - self.missing)
 
     def _tail(self, row: int) -> tuple[FloatArray, FloatArray]:
@@ -271,6 +319,17 @@ class Series:
             made = kernels.coarsened(found[0], found[1], found.shape[1], begin)
             found, begin = np.ascontiguousarray(found[:, :made]), -(-begin // 2)
         return found
+
+    def _join_marks(self, first: Self, second: Self) -> None:
+        """Of equal marks, those that the second part does not know are known to the first."""
+        before = first.totals[SUM] + first.totals[LOST_SUM]
+        self.marks[...] = second.marks
+        self.marks[:, 1:] += before
+        for own, others in zip(self.marks, first.marks, strict=True):
+            if own[0] < others[0]:
+                own[...] = others
+            elif own[0] == others[0]:
+                own[...] = np.where(np.isnan(own), others, own)
 
     def _join_totals(self, first: Self, second: Self) -> None:
         self.totals[REFERENCE] = first.totals[REFERENCE]

@@ -22,7 +22,7 @@ from gmwm.variance.streaming.series import Series
 from gmwm.variance.wavelet import WaveletVariance
 
 _FORMAT = "gmwm.streaming_variance"
-_VERSION = 1
+_VERSION = 2
 _NONE = np.zeros(0)
 _QUANTITY = {unit: quantity for quantity, unit in SI_UNIT.items()}
 
@@ -31,7 +31,8 @@ class StreamingVariance:
     """Haar wavelet variance of samples that come in blocks, in memory that does not grow.
 
     Averaging times of up to 512 samples see all windows, longer ones those that begin at multiples
-    of 1/512 of them: a sampling variance larger by 5e-6. Some 5 MB a channel hold what is needed,
+    of 1/512 of them: a sampling variance larger by 5e-6. Where a record without missing samples has
+    room for few of the longest, nearly all of these count. Some 5 MB a channel hold what is needed,
     however long the record. The sums, to the last bit, do not depend on how the samples are divided
     into blocks; a large offset does no harm.
 

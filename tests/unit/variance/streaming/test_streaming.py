@@ -79,6 +79,24 @@ def test_any_blocks_are_the_series(n, seed, offset, cuts):
     assert_close_to_all_windows(found, gmwm.wavelet_variance(x, dt=0.1))
 
 
+@pytest.mark.parametrize(
+    "n", [2048, 2049, 4097, 8400, 16_404, 18_424, 24_576, 24_600, 33_000, 262_655, 327_000]
+)
+@pytest.mark.parametrize("walk", [0.0, 0.02])
+def test_the_few_windows_of_a_record_little_longer_than_them_all_count(n, walk):
+    """Of white noise, neighbouring windows differ most."""
+    for seed in range(5):
+        x = noise(n, seed, 10.0, walk)
+        whole = gmwm.wavelet_variance(x, dt=0.1)
+        found = streamed(x, [n // 3, n - 7])
+        assert_close_to_all_windows(found.result(), whole)
+        parts = merged(x, sorted([1 << (n.bit_length() - 2), n // 5, n - 3]))
+        joined = parts[0]
+        for part in parts[1:]:
+            joined = joined.merge(part)
+        assert_same(joined.result(), found.result(), rtol=1e-9)
+
+
 @settings(max_examples=15, deadline=None)
 @given(
     st.integers(8, 20_000),
