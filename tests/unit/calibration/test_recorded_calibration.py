@@ -8,7 +8,7 @@ import numpy as np
 import gmwm
 from gmwm import Channel, GaussMarkov, RandomWalk, Recording, Resonance, Sinusoid, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.calibration import Departure, departures
+from gmwm.calibration import Departure, departures, tuning
 from gmwm.calibration.channel import ChannelModel
 from gmwm.calibration.departure_notices import (
     _is_between_two_levels,
@@ -16,11 +16,10 @@ from gmwm.calibration.departure_notices import (
     departure_notice,
     with_departures,
 )
-from gmwm.calibration import tuning
 from gmwm.calibration.departures import _basis, _share
-from gmwm.calibration.means import Means
 from gmwm.calibration.entrance import _check_together, _left_out, _reason_to_skip, _usable
 from gmwm.calibration.judgement import judged, with_one_remedy
+from gmwm.calibration.means import Means
 from gmwm.calibration.removal import _independent, variance_without, without_departures
 from gmwm.calibration.screening import (
     _is_much,
