@@ -241,6 +241,10 @@ LONGEST_GAP_OF_BLOCK = 1 << 24
 """Rows that may be missing in a gap of a block, 46 h at 100 Hz and 134 MB a channel, if as many
 were read before it."""
 
+ROWS_KNOWN_AGAIN = 1 << 21
+"""Rows, the latest ones, that are known again where a block has them once more: 6 h at 100 Hz, in
+16 MB."""
+
 ROWS_BESIDE = 2 * MOST_OF_ONE_STAMP
 """Rows on either side of a block from which its clock is followed: the longest burst, of which the
 last row has the stamp, and rows after it that decide."""

@@ -14,7 +14,8 @@ from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.clock import agree, change_notice, check_rates
+from gmwm.readers.blocks.written import Written
+from gmwm.readers.clock import agree, change_notice, check_rates, repeated_notice
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
@@ -95,9 +96,11 @@ def read_blocks(
     first: Recording | None = None
     done = 0
     given = Given(rate, units or {}, channels, time)
-    for arrays, own in _segments(table, given, rows):
+    for arrays, own, copies in _segments(table, given, rows):
         part = part_of(_Segment(table, arrays, done - own.start), given, done)
         found = part.recording
+        if copies:
+            found = replace(found, notices=(*found.notices, repeated_notice(copies)))
         first = first or found
         if not agree(found.rate, first.rate):
             where = table.where(done)
@@ -106,23 +109,29 @@ def read_blocks(
             found = replace(found, notices=(changes, *found.notices))
         samples = part.samples(own)
         cut = [replace(c, values=c.values[samples], dt=first.dt) for c in found.channels]
-        done += own.stop - own.start
+        done += own.stop - own.start + copies
         yield replace(found, channels=tuple(cut))
 
 
 def _segments(
     table: _Divisible, given: Given, rows: int
-) -> Iterator[tuple[dict[int, FloatArray], slice]]:
-    """Columns of some rows after others, and which rows these are: those on either side of them are
-    there too, so that a clock is followed across the seams. A rest of less than half as many is
-    joined to the last.
+) -> Iterator[tuple[dict[int, FloatArray], slice, int]]:
+    """Columns of some rows after others, which rows these are, and how many among them were written
+    before and are not there. Those on either side of them are there too, so that a clock is
+    followed across the seams. A rest of less than half as many is joined to the last.
     """
     roles = roles_of(table, given)
     beside = 0 if roles.time is None else tuning.ROWS_BESIDE
     wanted = sorted({*roles.columns, *(column.index for column in roles.auxiliary)})
     before: dict[int, FloatArray] = {}
     held: dict[int, FloatArray] = {}
-    for arrays in chain(table.segments(wanted, rows), [{}]):
+    copies = 0
+    written = None if roles.time is None else Written(roles.time)
+    for some in chain(table.segments(wanted, rows), [{}]):
+        arrays, again = written.fresh(some) if written is not None and some else (some, 0)
+        copies += again
+        if again == _size(some) > 0:
+            continue
         if held and arrays and _is_rest(_size(arrays), _size(held), rows):
             arrays = _joined(held, arrays)
         elif held:
@@ -130,7 +139,8 @@ def _segments(
             start, stop = _size(before), _size(before) + _size(held)
             found = _joined(before, held, after)
             before = {i: values[max(stop - beside, 0) : stop] for i, values in found.items()}
-            yield found, slice(start, stop)
+            yield found, slice(start, stop), copies - again
+            copies = again
         held = arrays
     if not before:
         raise InputError(f"{table.source} holds no samples: record longer")

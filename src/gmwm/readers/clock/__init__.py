@@ -7,7 +7,7 @@ from gmwm.readers.clock.civil_time import (
 )
 from gmwm.readers.clock.clock_notices import change_notice as change_notice
 from gmwm.readers.clock.jumps import Jumps as Jumps
-from gmwm.readers.clock.stamps import Clock as Clock
+from gmwm.readers.clock.stamps import Clock as Clock, repeated_notice as repeated_notice
 from gmwm.readers.clock.timing import (
     Timing as Timing,
     agree as agree,

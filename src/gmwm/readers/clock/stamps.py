@@ -92,8 +92,9 @@ class Clock:
             return none
         order = np.argsort(self.stamps, kind="stable")
         again = np.diff(self.stamps[order], prepend=np.nan) == 0.0
-        alike = int(np.count_nonzero(again | np.append(again[1:], False)))
-        if not 0 < 2 * alike <= order.size:
+        beside = again & (np.diff(order, prepend=0) == 1)
+        alike = int(np.count_nonzero(beside | np.append(beside[1:], False)))
+        if 2 * alike > order.size or not np.any(again):
             return none  # bursts: coarse samples repeat by chance
         copies = again & self.same(order)
         many = np.count_nonzero(copies) > tuning.COPIES * np.count_nonzero(again)

@@ -108,6 +108,15 @@ def kept(*, again=(), gone=()):
     return 0.01 * rows, rows
 
 
+def overlapping(at, *back):
+    """Rows that are written again, up to so many before ``at``, after which they go on."""
+    parts = [np.arange(at)]
+    for each in back:
+        parts += [np.arange(at - each, at)]
+    rows = np.concatenate([*parts, np.arange(at, 20_000)])
+    return 0.01 * rows, rows
+
+
 def at_seams(before, after):
     return np.concatenate([np.arange(seam - before, seam + after) for seam in SEAMS])
 
@@ -123,6 +132,12 @@ CLOCKS = {
     "lost": kept(gone=at_seams(9, 14)),
     "lost after": kept(gone=at_seams(0, 23)),
     "twice": kept(again=at_seams(0, 1)),
+    "a block again": overlapping(8000, 6000),
+    "all again": overlapping(8000, 8000),
+    "again twice": overlapping(16_000, 7000, 7000),
+    "again after a seam": overlapping(8300, 6000),
+    "again before a seam": overlapping(7800, 6000),
+    "again over two seams": overlapping(16_000, 15_000),
     "a counter that runs over": (np.arange(20_000) * 2.0**16 / SEAMS[0] % 2**16, np.arange(20_000)),
 }
 
