@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from gmwm._core.notices import Notice
 from gmwm.calibration.calibration import Calibration
-from gmwm.calibration.departure_notices import with_departures
-from gmwm.calibration.departures import Departure, departures
 from gmwm.calibration.stages import stage
-from gmwm.calibration.steadiness import steadiness_notice
+from gmwm.calibration.stationarity.departure_notices import with_departures
+from gmwm.calibration.stationarity.departures import Departure, departures
+from gmwm.calibration.stationarity.steadiness import steadiness_notice
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.process import Model, Process

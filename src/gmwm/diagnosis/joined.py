@@ -15,7 +15,7 @@ from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
 from gmwm.diagnosis.samples import length_notice
 from gmwm.errors import InputError
-from gmwm.readers import read_blocks
+from gmwm.readers import CLOCK_CODES, read_blocks
 
 _LARGEST = {"event": "height", "gap": "missing", "line": "amplitude", "resonance": "sigma"}
 """The number by which one notice stands for those of its code in all stretches."""
@@ -30,7 +30,9 @@ _IN_SOME = {
 }
 """What is advised where some stretches only are so."""
 
-_SUMS = ("event", "gap", "saturation")
+_SUMS = frozenset({"event", "gap", "saturation", *CLOCK_CODES})
+
+_AT_REST = ("not-static", "tilt")
 
 
 @dataclass(frozen=True)
@@ -163,18 +165,26 @@ def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
 
     worst = min(group, key=rank)
     start = worst.start / rate
-    text = (
-        f"{worst.notice.text} (stretch from {start:.6g} s, from which times count; {at} of "
-        f"{stretches} stretches have such)"
-    )
-    values = {**worst.notice.values, "stretch_start": start, "stretches": float(at)}
+    values, where = dict(worst.notice.values), ""
+    if first.code not in CLOCK_CODES:
+        where = f"stretch from {start:.6g} s, from which times count; "
+        values["stretch_start"] = start
+    values["stretches"] = float(at)
     if first.code in _SUMS:
         known = [name for name in _ADDED if name in values]
         values |= {
             name: sum(float(each.notice.values.get(name, 0.0)) for each in group) for name in known
         }
+    text = f"{worst.notice.text} ({where}{at} of {stretches} stretches have such"
+    if first.code in CLOCK_CODES and values.get("count", 0.0) != worst.notice.values.get(
+        "count", 0.0
+    ):
+        text += f", {values['count']:,.0f} in all"
     action = _IN_SOME.get(first.code, worst.notice.action)
-    return replace(worst.notice, text=text, values=values, action=action)
+    if first.code in _AT_REST and "start" in values:
+        ends = [start + values.pop(end) for end in ("start", "stop")]
+        action = f"cut a part at rest from the file, such as {ends[0]:.6g} to {ends[1]:.6g} s"
+    return replace(worst.notice, text=f"{text})", values=values, action=action)
 
 
 def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:

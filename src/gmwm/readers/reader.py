@@ -159,8 +159,19 @@ def _read(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def part_of(table: Table, given: Given, before: int = 0) -> Part:
-    """The recording of a table, and when it begins; ``before`` are rows of parts before this."""
+def part_of(
+    table: Table,
+    given: Given,
+    before: int = 0,
+    told: slice | None = None,
+    elapsed: float = 0.0,
+) -> Part:
+    """The recording of a table, and when it begins.
+
+    before: Rows of parts before this.
+    told: Rows of which notices of the clock tell: those on either side belong to other parts.
+    elapsed: From the start of the record to the first row, s.
+    """
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     if not before:
@@ -191,7 +202,9 @@ def part_of(table: Table, given: Given, before: int = 0) -> Part:
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated, before)
+    used_rate, timing, clock_notices = _timing(
+        table, roles.time, arrays, stated, before, told, elapsed
+    )
     sharing = next((n.values["rows"] for n in clock_notices if n.code == "stamps-in-bursts"), 0)
     may_turn = roles.time is not None and 1 < sharing <= tuning.MOST_IN_TURNS
     is_even = may_turn and _are_groups(arrays[roles.time or 0], sharing)
@@ -357,6 +370,8 @@ def _timing(
     arrays: Mapping[int, FloatArray],
     stated: float | None,
     before: int,
+    told: slice | None,
+    elapsed: float,
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
@@ -371,7 +386,10 @@ def _timing(
         where=table.where,
         same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
         extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
+        elapsed=elapsed,
     )
+    if told is not None:
+        clock = replace(clock, told=(told.start, told.stop))
     timing = timing_of(clock, stated)
     if stated is None:
         return timing.rate, timing, timing.notices

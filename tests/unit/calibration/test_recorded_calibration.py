@@ -10,17 +10,8 @@ from gmwm import Channel, GaussMarkov, RandomWalk, Recording, Resonance, Sinusoi
 from gmwm._core.notices import Notice
 from gmwm.calibration import Departure, departures, tuning
 from gmwm.calibration.channel import ChannelModel
-from gmwm.calibration.departure_notices import (
-    _is_between_two_levels,
-    _removed_notice,
-    departure_notice,
-    with_departures,
-)
-from gmwm.calibration.departures import _basis, _share
 from gmwm.calibration.entrance import _check_together, _left_out, _reason_to_skip, _usable
 from gmwm.calibration.judgement import judged, with_one_remedy
-from gmwm.calibration.means import Means
-from gmwm.calibration.removal import _independent, variance_without, without_departures
 from gmwm.calibration.screening import (
     _is_much,
     _outcome,
@@ -29,7 +20,16 @@ from gmwm.calibration.screening import (
     terms_of,
     with_treatment,
 )
-from gmwm.calibration.shapes import _ladder
+from gmwm.calibration.stationarity.departure_notices import (
+    _is_between_two_levels,
+    _removed_notice,
+    departure_notice,
+    with_departures,
+)
+from gmwm.calibration.stationarity.departures import _basis, _share
+from gmwm.calibration.stationarity.means import Means
+from gmwm.calibration.stationarity.removal import _independent, variance_without, without_departures
+from gmwm.calibration.stationarity.shapes import _ladder
 from gmwm.calibration.summary import (
     Floor,
     floor,

@@ -183,6 +183,11 @@ def _means(recording: Recording, sensor: str, size: int) -> FloatArray:
 def _smooth(means: FloatArray) -> FloatArray:
     """Running median, which keeps steps and drops what is shorter than half of it."""
     half = tuning.MEDIAN_BLOCKS // 2
+    means = means.copy()
+    for end, beside in ((0, means[1 : 2 * half + 2]), (-1, means[-2 * half - 2 : -1])):
+        # It stands for those beyond the end: a shock in it would be no short one.
+        low, high = np.fmin.reduce(beside), np.fmax.reduce(beside)
+        means[end] = np.clip(means[end], 2.0 * low - high, 2.0 * high - low)
     padded = np.pad(means, ((half, half), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, tuning.MEDIAN_BLOCKS, axis=0)
     smooth: FloatArray = np.median(windows, axis=-1)

@@ -117,7 +117,7 @@ def steady_turn(recording: Recording, size: int) -> float:
     if force is None:
         return 0.0
     means = block_means(force, size)
-    if np.all(np.isnan(means)):
+    if np.all(np.any(np.isnan(means), axis=1)):
         return 0.0
     wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
     if not np.nanmax(wander) > tuning.LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):

@@ -15,7 +15,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.blocks.written import Written
-from gmwm.readers.clock import agree, change_notice, check_rates, repeated_notice
+from gmwm.readers.clock import CLOCK_CODES, agree, change_notice, check_rates, repeated_notice
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
@@ -94,10 +94,10 @@ def read_blocks(
         )
     table = cast(_Divisible, tables[0])
     first: Recording | None = None
-    done = 0
+    done, elapsed, since = 0, 0.0, 0.0
     given = Given(rate, units or {}, channels, time)
     for arrays, own, copies in _segments(table, given, rows):
-        part = part_of(_Segment(table, arrays, done - own.start), given, done)
+        part = part_of(_Segment(table, arrays, done - own.start), given, done, own, since)
         found = part.recording
         if copies:
             found = replace(found, notices=(*found.notices, repeated_notice(copies)))
@@ -110,6 +110,9 @@ def read_blocks(
         samples = part.samples(own)
         cut = [replace(c, values=c.values[samples], dt=first.dt) for c in found.channels]
         done += own.stop - own.start + copies
+        elapsed += cut[0].n * first.dt
+        seen = part.samples(slice(max(own.stop - tuning.ROWS_BESIDE, 0), own.stop))
+        since = elapsed - (seen.stop - seen.start) * first.dt
         yield replace(found, channels=tuple(cut))
 
 
@@ -164,13 +167,29 @@ def notices_of_blocks(
     noticed: Iterable[Notice], missing: Mapping[str, int], n: int
 ) -> tuple[Notice, ...]:
     """The first of each kind that blocks have, and how much is missing in all of them."""
-    kinds: dict[tuple[str, str], Notice] = {}
+    kinds: dict[tuple[str, str], list[Notice]] = {}
     for notice in noticed:
-        kinds.setdefault((notice.code, notice.where), notice)
-    kept = [notice for notice in kinds.values() if notice.code != "missing-samples"]
+        kinds.setdefault((notice.code, notice.where), []).append(notice)
+    kept = [_of_all(alike) for (code, _), alike in kinds.items() if code != "missing-samples"]
     for name, count in missing.items():
         if count:
             text = f"{count:,} of {n:,} samples missing"
             values = {"missing": count}
             kept.append(Notice("missing-samples", "note", name, text, values))
     return tuple(kept)
+
+
+def _of_all(alike: Sequence[Notice]) -> Notice:
+    """The first of one kind, with what there is in all blocks where that is counted."""
+    first = alike[0]
+    if len(alike) == 1 or first.code not in CLOCK_CODES or "count" not in first.values:
+        return first
+    sums = {
+        name: sum(float(each.values[name]) for each in alike)
+        for name in ("count", "missing")
+        if name in first.values
+    }
+    if first.code == "rows-repeated":
+        return repeated_notice(int(sums["count"]))
+    text = f"{first.text} ({sums['count']:,.0f} in all, in {len(alike)} stretches)"
+    return replace(first, text=text, values={**first.values, **sums})

@@ -5,7 +5,10 @@ from gmwm.readers.clock.civil_time import (
     seconds_of_day as seconds_of_day,
     without_summer_time as without_summer_time,
 )
-from gmwm.readers.clock.clock_notices import change_notice as change_notice
+from gmwm.readers.clock.clock_notices import (
+    CLOCK_CODES as CLOCK_CODES,
+    change_notice as change_notice,
+)
 from gmwm.readers.clock.jumps import Jumps as Jumps
 from gmwm.readers.clock.stamps import Clock as Clock, repeated_notice as repeated_notice
 from gmwm.readers.clock.timing import (

@@ -12,6 +12,19 @@ from gmwm.readers.clock.jumps import Jumps, find_shifts
 from gmwm.readers.clock.stamps import Clock, repeated_notice
 from gmwm.readers.clock.uneven import Followed
 
+CLOCK_CODES = frozenset(
+    {
+        "clock-jumps",
+        "clock-off-grid",
+        "clock-set",
+        "clock-shifts",
+        "rate-changes",
+        "rows-repeated",
+        "stamps-astray",
+    }
+)
+"""Codes of notices of what happens at some rows of a clock, all of which they tell of."""
+
 
 def change_notice(
     rates: tuple[float, float], used: float, row: str, time: float | None = None
@@ -37,13 +50,14 @@ def change_notice(
 
 def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     """When the clock jumps, how far, and how many samples that costs."""
+    jumps = jumps.among_rows(clock.tells)
     if not jumps.rows.size:
         return []
     count, i = jumps.rows.size, jumps.longest
     interval = jumps.interval * seconds
     digits = 1 - math.floor(math.log10(interval))
     length = round(float(jumps.steps[i] - 1.0) * interval, digits)
-    when = round(float(clock.stamps[jumps.rows[i] - 1] - clock.stamps[0]) * seconds, digits)
+    when = round(clock.when(int(jumps.rows[i]) - 1, seconds), digits)
     total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
     place = f"by {length:.12g} s, {when:.12g} s after the start"
     if count == 1:
@@ -66,6 +80,7 @@ def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
 def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) -> list[Notice]:
     """Bursts, rows that come twice, stamps far from the clock, and a clock that was set."""
     notices = []
+    jumps = jumps.among_rows(clock.tells)
     if found.burst > 1:
         text = (
             f"{found.burst} rows come with one stamp, usually: it is taken as that of the last "
@@ -75,6 +90,7 @@ def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) 
     if count := jumps.repeated.size:
         notices.append(repeated_notice(count))
     astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
+    astray = astray[clock.tells(astray)]
     if astray.size:
         worst = astray[np.argmax(np.abs(found.late[astray]))]
         by = float(found.late[worst]) * jumps.interval * seconds
@@ -102,7 +118,7 @@ def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) 
 
 def shift_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     """Where the clock was set by less than what is followed, or while the host stalled."""
-    found = find_shifts(clock.stamps, jumps)
+    found = [each for each in find_shifts(clock.stamps, jumps) if clock.tells(np.array(each[0]))]
     if not found:
         return []
     row, by = max(found, key=lambda each: abs(each[1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -92,6 +93,18 @@ class Jumps:
         """The same by the numbers of all rows, of which some were kept and others repeat one."""
         repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
         return replace(self, rows=kept[self.rows], repeated=repeated, set_at=kept[self.set_at])
+
+    def among_rows(self, told: Callable[[_Rows], npt.NDArray[np.bool_]]) -> Jumps:
+        """Those at some rows only."""
+        some = told(self.rows)
+        return replace(
+            self,
+            rows=self.rows[some],
+            steps=self.steps[some],
+            missing=self.missing[some],
+            repeated=self.repeated[told(self.repeated)],
+            set_at=self.set_at[told(self.set_at)],
+        )
 
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.

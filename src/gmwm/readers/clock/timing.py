@@ -64,7 +64,8 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         jumps = timing.jumps
         if mended.kept is not None and mended.copies is not None:
             jumps = jumps.among(mended.kept, mended.copies)
-        return replace(timing, jumps=jumps, notices=(*timing.notices, mended.notice))
+        more = () if mended.notice is None else (mended.notice,)
+        return replace(timing, jumps=jumps, notices=(*timing.notices, *more))
     steps = _steps(clock)
     step = steps.jumps.interval
     if not _SHORTEST_STEP < step < 1.0 / _SHORTEST_STEP:
@@ -81,9 +82,8 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     notices += jump_notices(clock, steps.jumps, seconds)
     if steps.change is not None:
         row, (before, after) = steps.change.row, steps.change.rates
-        when = float(clock.stamps[row] - clock.stamps[0]) * seconds
         rates = before / seconds, after / seconds
-        notices.append(change_notice(rates, rate, clock.where(row), when))
+        notices.append(change_notice(rates, rate, clock.where(row), clock.when(row, seconds)))
     notices += shift_notices(clock, steps.jumps, seconds)
     if steps.uneven is not None:
         notices += uneven_notices(clock, steps.uneven, steps.jumps, seconds)

@@ -201,3 +201,53 @@ def test_records(tmp_path):
     records[:, 6] += 9.8 / 128.0
     records.tofile(tmp_path / "a.dat")
     same(tmp_path / "a.dat", layout="KF-GINS")
+
+
+def test_what_a_clock_does_is_told_once_and_in_times_of_the_record():
+    """Rows on either side of a block belong to others, whose notices tell of them."""
+    rows = np.delete(
+        np.arange(40_000), [*range(7990, 8000), *range(23_000, 23_040), *range(31_000, 31_007)]
+    )
+    x = np.random.default_rng(3).normal(size=rows.size)
+    table = pa.table({"time_s": 0.01 * rows, "gyro_x": x})
+    (whole,) = [n for n in gmwm.read(table, units=UNITS).notices if n.code == "clock-jumps"]
+    found = [
+        n for part in read_blocks(table, units=UNITS, rows=8000) for n in part.notices
+        if n.code == "clock-jumps"
+    ]  # fmt: skip
+    assert [n.values["missing"] for n in found] == [10, 40, 7]
+    assert [n.values["time"] for n in found] == pytest.approx([79.89, 229.99, 309.99])
+    (joined,) = [
+        n for n in gmwm.stream(table, units=UNITS, rows=8000).notices if n.code == "clock-jumps"
+    ]
+    assert joined.values["count"] == whole.values["count"] == 3
+    assert joined.values["missing"] == whole.values["missing"] == 57
+    assert "3 in all, in 3 stretches" in joined.text
+
+
+def test_a_gap_at_a_seam_is_no_clock_that_was_set():
+    """It is longer than all rows of the block before it, which sees it beyond its end."""
+    time = 0.01 * np.arange(24_000)
+    time[8000:] += 200.0
+    table = pa.table({"time_s": time, "gyro_x": np.random.default_rng(4).normal(size=24_000)})
+    codes = [n.code for n in gmwm.stream(table, units=UNITS, rows=8000).notices]
+    assert "clock-jumps" in codes
+    assert "clock-set" not in codes
+
+
+def test_bursts_that_a_seam_divides_lose_no_samples():
+    time = np.floor(np.arange(30_000) / 50) * 0.5
+    table = pa.table({"time_s": time, "gyro_x": np.random.default_rng(4).normal(size=30_000)})
+    codes = {n.code for n in gmwm.stream(table, units=UNITS, rows=9990).notices}
+    assert "stamps-in-bursts" in codes
+    assert not codes & {"clock-jumps", "clock-set", "rows-repeated"}
+
+
+def test_coarse_rows_of_a_clock_that_was_set_back_are_no_copies():
+    """Stamps come again, and now and then the samples with them, by chance."""
+    rng = np.random.default_rng(5)
+    time = 0.01 * np.concatenate([np.arange(12_000), np.arange(4000, 16_000)])
+    table = pa.table({"time_s": time, "gyro_x": np.rint(2.0 * rng.normal(size=24_000))})
+    notices = gmwm.stream(table, units=UNITS, rows=8000).notices
+    assert "rows-repeated" not in {n.code for n in notices}
+    assert gmwm.stream(table, units=UNITS, rows=8000).n == 24_000

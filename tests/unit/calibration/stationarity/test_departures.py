@@ -10,12 +10,12 @@ from scipy.stats import binom
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Departure, departures
-from gmwm.calibration.departure_notices import (
+from gmwm.calibration.stationarity.departure_notices import (
     _found_notices,
     _taken_notices,
     departure_notice,
 )
-from gmwm.calibration.removal import variance_without
+from gmwm.calibration.stationarity.removal import variance_without
 from gmwm.calibration.tuning import EVIDENT
 from gmwm.cli.hints import with_option
 from marks import slow

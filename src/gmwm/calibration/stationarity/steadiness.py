@@ -19,8 +19,8 @@ from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import Departure
-from gmwm.calibration.means import Means
+from gmwm.calibration.stationarity.departures import Departure
+from gmwm.calibration.stationarity.means import Means
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import Scales
 from gmwm.process import PSD, Model

@@ -11,7 +11,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import WIDE, Departure
+from gmwm.calibration.stationarity.departures import WIDE, Departure
 from gmwm.estimate import Fit
 from gmwm.variance import WaveletVariance
 

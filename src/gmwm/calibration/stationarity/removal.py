@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.departures import DEPARTURES, WIDE, Departure
+from gmwm.calibration.stationarity.departures import DEPARTURES, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.readers import Channel, Recording

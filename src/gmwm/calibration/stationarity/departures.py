@@ -28,8 +28,8 @@ from scipy.special import logsumexp
 from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.calibration import tuning
-from gmwm.calibration.means import Means
-from gmwm.calibration.shapes import Family, families
+from gmwm.calibration.stationarity.means import Means
+from gmwm.calibration.stationarity.shapes import Family, families
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import Scales
 from gmwm.process import PSD, Model, RandomWalk

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.calibration import tuning
-from gmwm.calibration.shapes import families
+from gmwm.calibration.stationarity.shapes import families
 
 BLOCKS, STEP, FINE = 40, 0.5, 400
 T = (np.arange(BLOCKS * FINE) + 0.5) / FINE  # in blocks
