@@ -1,6 +1,10 @@
 """``gmwm fleet``: what it prints and writes, how it ends, and how it refuses."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -73,3 +77,26 @@ def test_it_refuses_in_one_sentence_and_writes_nothing(run, lot, tmp_path, argum
     assert (code, printed, reported.count("\n")) == (2, "", 1)
     assert words in reported
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no such signals")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_what_ends_a_fleet_leaves_nothing_and_is_said_in_the_status(tmp_path, name):
+    number = getattr(signal, name)
+    for i in range(4):
+        values = WhiteNoise(1e-3).simulate(400_000, 1.0, seed=i)
+        np.savez(tmp_path / f"unit{i}.npz", gyro_x=values, gyro_y=values[::-1])
+    command = [sys.executable, "-m", "gmwm", "fleet", "*.npz", *READING[:4], "--jobs", "2"]
+    with subprocess.Popen([*command, "-o", "out"], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        end = time.monotonic() + 60.0
+        while not (tmp_path / "out" / "calibrations").exists():
+            assert time.monotonic() < end
+            assert process.poll() is None
+            time.sleep(0.02)
+        time.sleep(0.5)
+        process.send_signal(number)
+        _, reported = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert b"interrupted, no file is half-written" in reported
+    assert b"Traceback" not in reported
+    assert b"resource_tracker" not in reported

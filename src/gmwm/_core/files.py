@@ -209,8 +209,9 @@ def one_writer(folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-        if all(each == path for each in folder.iterdir()):
-            path.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # someone removed the folder
+            if all(each == path for each in folder.iterdir()):
+                path.unlink(missing_ok=True)
 
 
 def _not_written(path: Path, error: OSError) -> InputError:

@@ -87,7 +87,8 @@ def fleet(
                 cluster=cluster, progress=bar, **arguments_of_read(**reading),
             )  # fmt: skip
     except KeyboardInterrupt:
-        click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)
+        if (output / "calibrations").is_dir():
+            click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)
         raise
     if as_json:
         click.echo(json.dumps(found.to_dict(), allow_nan=False))

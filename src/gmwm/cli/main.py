@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import signal
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from io import StringIO, TextIOWrapper
 
 import click
@@ -59,8 +61,11 @@ def main() -> None:
             # What the encoding of a terminal lacks is written as an escape.
             stream.reconfigure(errors="backslashreplace")
     try:
-        status = _run()
+        with _ended_as_interrupted() as ended:
+            status = _run()
         sys.stdout.flush()
+        if status == _EXIT_INTERRUPTED and ended:
+            status = 128 + ended[0]
     except OSError as error:
         if error.filename is not None:
             raise
@@ -69,6 +74,31 @@ def main() -> None:
         if error.errno not in (errno.EPIPE, errno.EINVAL):
             status = _failed(f"the output cannot be written ({error.strerror}): send it elsewhere")
     sys.exit(status)
+
+
+@contextmanager
+def _ended_as_interrupted() -> Iterator[list[int]]:
+    """Let what ends a process do so as an interrupt does, after which nothing is left behind.
+
+    Yields: the signals that come.
+    """
+    came: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        came.append(number)
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell that runs us behind it
+            raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
+
+    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
+    usual = [n for n in numbers if n is not None and signal.getsignal(n) is signal.SIG_DFL]
+    for number in usual:
+        signal.signal(number, end)
+    try:
+        yield came
+    finally:
+        for number in usual:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def _run() -> int:

@@ -53,9 +53,16 @@ def _matching(text: str, folder: Path | None) -> list[str]:
     if not glob.has_magic(text) or os.path.lexists(text):
         return [text]
     found = [path for path in sorted(glob.glob(text, recursive=True)) if not _is_own(path, folder)]
+    # ``**`` names the folders on the way too; that of a bag is a recording.
+    on_the_way = {str(above) for path in found for above in Path(path).parents}
+    found = [path for path in found if path.rstrip(os.sep) not in on_the_way or _is_bag(path)]
     if not found:
         raise InputError(f"no file matches {printable(text)[:200]!r}: check the pattern")
     return found
+
+
+def _is_bag(path: str) -> bool:
+    return os.path.isfile(os.path.join(path, "metadata.yaml"))
 
 
 def _is_own(path: str, folder: Path | None) -> bool:

@@ -2,11 +2,12 @@
 
 import errno
 import os
+import shutil
 import signal
 
 import pytest
 
-from gmwm._core.files import moved_together, output_folder, written
+from gmwm._core.files import moved_together, one_writer, output_folder, written
 from gmwm.errors import InputError
 
 
@@ -164,3 +165,11 @@ def test_an_interrupt_comes_before_or_after_the_files(tmp_path, monkeypatch):
         for name in ("a", "b"):
             (folder / name).write_text("new")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+
+
+def test_a_folder_that_was_removed_meanwhile_hides_no_error(tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with pytest.raises(InputError, match="cannot be written"), one_writer(folder):
+        shutil.rmtree(folder)
+        raise InputError("cannot be written")

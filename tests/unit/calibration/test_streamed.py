@@ -1,6 +1,7 @@
 """Calibration of files beyond a memory budget."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -164,6 +165,21 @@ def test_a_channel_that_moved_is_not_silent(tmp_path):
     assert "not-static" not in [notice.code for notice in static["gyro_x"].notices]
     with pytest.raises(InputError, match="screening for 'x' is unknown"):
         gmwm.calibrate_stream(tmp_path / "moved.npy", MODEL, screening=("x",), **reading)
+
+
+def test_the_part_at_rest_is_one_of_the_record(tmp_path):
+    """Times of the notice count from the stretch; what is advised does not."""
+    x = np.random.default_rng(5).normal(size=(60_000, 1)) * 1e-3
+    x[45_000:47_000, 0] += np.sin(0.01 * np.arange(2_000))
+    np.save(tmp_path / "moved.npy", x)
+    found = gmwm.health_stream(tmp_path / "moved.npy", **READING | {"channels": {"gyro_x": 0}})
+    (moved,) = found.of(code="not-static")
+    assert "cut a part at rest from the file" in moved.action
+    start, stop = (float(each) for each in re.findall(r"[\d.]+", moved.action))
+    assert 470.0 <= start < 480.0
+    assert stop == pytest.approx(600.0, abs=0.02)
+    assert moved.values["stretch_start"] == 400.0
+    assert not {"start", "stop"} & moved.values.keys()
 
 
 def stretched(tmp_path, change, **reading):

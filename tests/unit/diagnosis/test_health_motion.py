@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, hypot, sin
 
 import numpy as np
@@ -111,6 +112,29 @@ def test_a_shock_is_no_motion(moved):
     found = gmwm.health(moved(rate))
     assert not [n for n in found.notices if n.severity == "bad"]
     assert found.of("gyro_x", "event")
+
+
+@pytest.mark.parametrize("at", [0, 29_994])
+def test_a_shock_at_an_end_is_no_motion(moved, at):
+    """All six axes of a stretch were not static for it."""
+    rate = np.zeros((30_000, 3))
+    rate[at : at + 6, 2] = 0.5
+    found = gmwm.health(moved(rate))
+    assert not found.of(code="not-static")
+    assert found.of("gyro_z", "event")
+
+
+def test_a_record_that_begins_moving_does_move(moved):
+    rate = turn(30_000, 0, 20, 60.0, (0, 0, 1))
+    assert gmwm.health(moved(rate)).of(code="not-static")
+
+
+def test_an_axis_that_is_missing_warns_of_nothing(moved):
+    recording = moved(np.zeros((30_000, 3)))
+    gone = gmwm.Channel("accel_y", np.full(30_000, np.nan), 0.01, "accel", "m/s^2")
+    channels = tuple(gone if c.name == "accel_y" else c for c in recording.channels)
+    found = gmwm.health(replace(recording, channels=channels))
+    assert not found.of(code="not-static")
 
 
 def test_handling_by_hand(moved):

@@ -29,6 +29,14 @@ def test_a_pattern_is_every_file_that_matches_once(folder):
     assert found("x.npy", "link.csv") == {"x.npy": "x"}
 
 
+def test_folders_on_the_way_are_no_recordings_but_bags_are(folder):
+    (folder / "bag").mkdir()
+    (folder / "bag" / "metadata.yaml").touch()
+    assert "a" not in found("**")
+    assert {"a/static.csv", "b/other one.csv", "bag", "x.npy"} <= found("**").keys()
+    assert found("b/**").keys() == {"b/static.csv", "b/other one.csv"}
+
+
 def test_what_exists_is_no_pattern(folder):
     assert found("c [1]/x.csv") == {"c [1]/x.csv": "x"}
     assert found("c*/x.csv", "x.npy") == {"c [1]/x.csv": "x.csv", "x.npy": "x.npy"}
