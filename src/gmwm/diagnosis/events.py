@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice
+from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
@@ -139,7 +139,13 @@ def event_notice(
     which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
     height = readable(heights[largest], unit, sign=True)
     text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
-    if 1 < len(events) <= _LISTED + 1:
+    is_most = 2 * samples > known
+    if is_most:
+        text = (
+            f"{samples / known:.2g} of the samples differ from what is before them as spikes do: "
+            "no noise of a sensor, but values that are held, switched or made otherwise"
+        )
+    elif 1 < len(events) <= _LISTED + 1:
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
         text += f" (others at {', '.join(others)} s)"
     action = (
@@ -147,6 +153,8 @@ def event_notice(
         if harmful
         else "too small to change the variance; Health.masked leaves it out"
     )
+    if is_most:
+        action = "look at what is done to the samples between the sensor and the file"
     numbers = {
         "count": float(len(events)),
         "time": start * dt,
@@ -155,7 +163,8 @@ def event_notice(
         "samples": float(samples),
         "variance_share": float(share),
     }
-    return Notice("event", "warning" if harmful else "note", name, text, numbers, action)
+    severity: Severity = "bad" if is_most else "warning" if harmful else "note"
+    return Notice("event", severity, name, text, numbers, action)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

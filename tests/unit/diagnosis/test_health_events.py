@@ -158,3 +158,16 @@ def test_a_few_other_events_are_listed(record, count):
     (notice,) = gmwm.health(record(gyro_x=x)).of("gyro_x", "event")
     assert notice.values["count"] == count
     assert ("others at" in notice.text) == (1 < count <= _LISTED + 1)
+
+
+def test_most_of_a_record_is_no_shock(record):
+    """Values that are held until what they show has moved by a deviation of the noise."""
+    noise = np.random.default_rng(2).normal(size=60_000)
+    values, shown = noise.copy(), noise[0]
+    for i, each in enumerate(noise.tolist()):
+        if abs(each - shown) > 1.0:
+            shown = each
+        values[i] = shown
+    (event,) = gmwm.health(record(gyro_x=values)).of(code="event")
+    assert event.severity == "bad"
+    assert "no noise of a sensor" in event.text
