@@ -82,9 +82,10 @@ def widest_step(values: FloatArray, step: float) -> float:
     alone = often & (nearest > 1.5 * step)
     size = np.abs(levels)
     alone &= size > np.max(size[often & ~alone], initial=0.0)
-    if np.sum(counts[alone]) < tuning.FEWEST_WIDE * begins.size:
-        return step
-    return float(np.median(nearest[alone]))
+    # Of several steps, as about zero, the widest that enough samples have.
+    order = np.argsort(-nearest[alone], kind="stable")
+    have = np.cumsum(counts[alone][order]) >= tuning.FEWEST_WIDE * begins.size
+    return float(nearest[alone][order][np.argmax(have)]) if np.any(have) else step
 
 
 def is_coarse(values: FloatArray, step: float) -> bool:

@@ -59,7 +59,7 @@ def of_digits(values, digits=3):
 
 @pytest.mark.parametrize(
     ("mean", "digits", "widest"),
-    [(0.1, 3, 1e-3), (-0.1, 3, 1e-3), (0.101, 3, 1e-3), (0.1, 4, 1e-4), (0.0975, 3, 1e-4)],
+    [(0.0, 1, 1e-3), (0.0, 2, 1e-4), (0.1, 3, 1e-3), (-0.1, 3, 1e-3), (0.101, 3, 1e-3), (0.1, 4, 1e-4), (0.0975, 3, 1e-4)],
 )
 def test_numbers_of_few_digits_have_wider_steps_above_a_power_of_ten(mean, digits, widest):
     values = of_digits(mean + 1e-3 * np.random.default_rng(1).normal(size=40_000), digits)
@@ -98,6 +98,13 @@ def test_neighbours_of_few_digits_are_equal_by_chance(mean):
     (rounding,) = found.of(code="rounding")
     assert "where they are smaller" in rounding.text
     assert rounding.values["lsb"] == pytest.approx(1e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("digits", [1, 2, 3])
+def test_neighbours_of_few_digits_about_zero_are_equal_by_chance(digits):
+    noise = of_digits(1e-3 * np.random.default_rng(3).normal(size=60_000), digits)
+    found = gmwm.health(gmwm.Recording.from_arrays({"gyro_x": noise}, 100.0, {"gyro": "rad/s"}))
+    assert not [n for n in found.notices if n.code in ("held", "stuck", "value-repeated")]
 
 
 def test_few_digits_of_noise_far_below_their_wide_step_are_not_valid():
