@@ -59,7 +59,15 @@ def of_digits(values, digits=3):
 
 @pytest.mark.parametrize(
     ("mean", "digits", "widest"),
-    [(0.0, 1, 1e-3), (0.0, 2, 1e-4), (0.1, 3, 1e-3), (-0.1, 3, 1e-3), (0.101, 3, 1e-3), (0.1, 4, 1e-4), (0.0975, 3, 1e-4)],
+    [
+        (0.0, 1, 1e-3),
+        (0.0, 2, 1e-4),
+        (0.1, 3, 1e-3),
+        (-0.1, 3, 1e-3),
+        (0.101, 3, 1e-3),
+        (0.1, 4, 1e-4),
+        (0.0975, 3, 1e-4),
+    ],
 )
 def test_numbers_of_few_digits_have_wider_steps_above_a_power_of_ten(mean, digits, widest):
     values = of_digits(mean + 1e-3 * np.random.default_rng(1).normal(size=40_000), digits)
