@@ -68,10 +68,9 @@ def widest_step(values: FloatArray, step: float) -> float:
 
     values: (n,), samples in their order, none missing.
     step: Of `step_size`.
-    Returns: ``step`` itself if all are as wide, or if few samples are where they are not.
+    Returns: ``step`` itself if all are as wide, or if few samples are where they are not. Where the
+        smallest values hide the lattice, there is no ``step``, but a wide one.
     """
-    if step == 0.0:
-        return 0.0
     # Stuck values count once, so that none of them is a level for its frequency alone.
     begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
     levels, counts = np.unique(begins, return_counts=True)

@@ -55,6 +55,7 @@ class WaveletVarianceForm(Form):
     efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
     driftless: Levels | None
     gaps: GapsForm | None
+    fourth_cumulant: Annotated[float, Field(ge=0.0, le=tuning.LARGEST_VARIANCE**2)] = 0.0
     data_covariance: Sequence[Sequence[float]] | None
 
     @model_validator(mode="after")

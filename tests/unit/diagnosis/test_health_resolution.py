@@ -92,7 +92,7 @@ def test_steps_of_one_size_have_no_wider_ones(step):
     assert widest_step(values, step) == step
     values[np.abs(values) < 0.5 * np.max(np.abs(values))] = 0.0
     assert widest_step(values, step) == step
-    assert widest_step(values, 0.0) == 0.0
+    assert widest_step(np.random.default_rng(3).normal(size=20_000), 0.0) == 0.0
 
 
 @pytest.mark.parametrize("mean", [0.1, -0.1, 0.1003])
@@ -109,8 +109,10 @@ def test_neighbours_of_few_digits_are_equal_by_chance(mean):
 
 
 @pytest.mark.parametrize("digits", [1, 2, 3])
-def test_neighbours_of_few_digits_about_zero_are_equal_by_chance(digits):
-    noise = of_digits(1e-3 * np.random.default_rng(3).normal(size=60_000), digits)
+@pytest.mark.parametrize("mean", [0.0, 1.2e-3])
+@pytest.mark.parametrize("seed", range(3, 8))
+def test_neighbours_of_few_digits_about_zero_are_equal_by_chance(digits, mean, seed):
+    noise = of_digits(mean + 1e-3 * np.random.default_rng(seed).normal(size=60_000), digits)
     found = gmwm.health(gmwm.Recording.from_arrays({"gyro_x": noise}, 100.0, {"gyro": "rad/s"}))
     assert not [n for n in found.notices if n.code in ("held", "stuck", "value-repeated")]
 

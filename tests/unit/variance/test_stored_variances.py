@@ -58,6 +58,7 @@ def at(index, value):
     [
         (("n",), lambda n: 500), (("n",), lambda n: 0), (("dt",), lambda dt: 0.0),
         (("dt",), lambda dt: 1.1 * dt), (("confidence",), lambda c: 1.0),
+        (("fourth_cumulant",), str), (("fourth_cumulant",), lambda c: -1.0),
         (("confidence",), lambda c: 0.0), (("efficiency",), lambda e: 0.0),
         (("efficiency",), lambda e: 1.01), (("variance",), shorter), (("variance",), longer),
         (("mean",), shorter), (("tau",), shorter), (("variance",), at(0, -1e-9)),
