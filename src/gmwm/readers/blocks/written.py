@@ -20,9 +20,10 @@ class Written:
     """Numbers by which rows of the latest blocks are known again.
 
     A driver that sends its buffer again, or files that were joined with an overlap, write rows
-    twice, far from each other. Where the time stamps of a block go back before the newest one of
-    earlier blocks, and most of these rows are as earlier ones in all columns, they are copies. A
-    clock that was set back has others.
+    twice, far from each other. Where time stamps go back before the newest one so far, and most of
+    these rows of a block are as earlier ones in all columns, they are copies. A clock that was set
+    back has others. Those at the end of a block are left out here too: beside the next block they
+    would stand without the rows that they repeat.
     """
 
     def __init__(self, time: int):
@@ -33,7 +34,9 @@ class Written:
     def fresh(self, arrays: Mapping[int, FloatArray]) -> tuple[dict[int, FloatArray], int]:
         """The rows of a block without those that were written before, and how many these are."""
         keys = _keys(arrays.values())
-        back = np.asarray(arrays[self._time]) < self._newest
+        stamps = np.asarray(arrays[self._time])
+        newest = np.fmax.accumulate(np.concatenate([[self._newest], stamps]))
+        back = stamps < newest[:-1]
         copies = self._copies(back, keys)
         found = dict(arrays)
         if copies.size:
@@ -45,7 +48,7 @@ class Written:
     def _copies(self, back: BoolArray, keys: _Keys) -> NDArray[np.intp]:
         rows = np.flatnonzero(back)
         if rows.size:
-            again = np.isin(keys[rows], np.concatenate(self._kept))
+            again = np.isin(keys[rows], np.concatenate([*self._kept, keys[~back]]))
             if np.count_nonzero(again) > tuning.COPIES * rows.size:
                 return rows[again]
         return rows[:0]

@@ -138,6 +138,8 @@ CLOCKS = {
     "again after a seam": overlapping(8300, 6000),
     "again before a seam": overlapping(7800, 6000),
     "again over two seams": overlapping(16_000, 15_000),
+    "a seam within what is again": overlapping(13_000, 4500),
+    "a seam near the end of what is again": overlapping(15_000, 2000),
     "a counter that runs over": (np.arange(20_000) * 2.0**16 / SEAMS[0] % 2**16, np.arange(20_000)),
 }
 
