@@ -47,6 +47,8 @@ KINDS = {
     "exp(-t/600 s)": np.exp(-TIME / 600.0),
     "drift to 900 s": np.maximum(1.0 - TIME / 900.0, 0.0),
     "period 1500 s": np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0),
+    "1.5 periods": np.sin(3.0 * np.pi * TIME / (LENGTH * DT)),
+    "half a period": np.sin(np.pi * TIME / (LENGTH * DT)),
 }
 SIZES = np.array([0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0])
 

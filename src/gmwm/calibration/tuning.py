@@ -93,8 +93,9 @@ TABLE = 8192
 RATIO_OF_TIMES = 1.2
 """Of neighbouring time constants and ends."""
 
-MOST_CYCLES = 24.0
-"""In a record, of slow periods; `gmwm.health` finds lines from 20 on."""
+FEWEST_CYCLES, MOST_CYCLES = 0.5, 24.0
+"""In a record, of slow periods: half a one is a hump or a bend; `gmwm.health` finds lines from 20
+on."""
 
 SHARE_POINTS = 512
 """Places of a coefficient at which the share of a level is computed."""
@@ -121,6 +122,13 @@ LARGEST_LOG_EVIDENCE = 700.0
 FREQUENCIES = 64
 """At which the floor of the spectrum is looked for, from one period of the record to two blocks."""
 
+MOST_STRETCHES = 20
+"""Stretches at rest of one log that are fitted jointly, the longest ones."""
+
+WORTH_PROCESSES = 1_000_000
+"""Samples of all channels together beyond which processes share the work: one takes 1.2 s to start,
+as long as the models of two channels."""
+
 # -- noise that changes its size ------------------------------------------------------------------
 
 DIVISIONS, MEANS_OF_PART, LEAST_OF_PART = (8, 4, 2), 128, 0.5
@@ -141,10 +149,3 @@ UNSTEADY, HARMFUL_UNSTEADY = 0.1, 2.0
 """Of the deviation of all above that of the quiet quarter of the parts, for a notice: as much as a
 valid fit may miss. Deviation of the loudest part over that of the quietest, from which a fit is not
 valid: in nine channels of real recordings at rest it is 1.6 to 2.1 (docs/health.md)."""
-
-MOST_STRETCHES = 20
-"""Stretches at rest of one log that are fitted jointly, the longest ones."""
-
-WORTH_PROCESSES = 1_000_000
-"""Samples of all channels together beyond which processes share the work: one takes 1.2 s to start,
-as long as the models of two channels."""

@@ -139,13 +139,7 @@ def event_notice(
     which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
     height = readable(heights[largest], unit, sign=True)
     text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
-    is_most = 2 * samples > known
-    if is_most:
-        text = (
-            f"{samples / known:.2g} of the samples differ from what is before them as spikes do: "
-            "no noise of a sensor, but values that are held, switched or made otherwise"
-        )
-    elif 1 < len(events) <= _LISTED + 1:
+    if 1 < len(events) <= _LISTED + 1:
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
         text += f" (others at {', '.join(others)} s)"
     action = (
@@ -153,8 +147,13 @@ def event_notice(
         if harmful
         else "too small to change the variance; Health.masked leaves it out"
     )
-    if is_most:
-        action = "look at what is done to the samples between the sensor and the file"
+    severity: Severity = "warning" if harmful else "note"
+    if 2 * samples > known:
+        severity, action = "bad", "look at what is done to them between the sensor and the file"
+        text = (
+            f"{samples / known:.2g} of the samples differ from what is before them as spikes do: "
+            "no noise of a sensor, but values that are held, switched or made otherwise"
+        )
     numbers = {
         "count": float(len(events)),
         "time": start * dt,
@@ -163,7 +162,6 @@ def event_notice(
         "samples": float(samples),
         "variance_share": float(share),
     }
-    severity: Severity = "bad" if is_most else "warning" if harmful else "note"
     return Notice("event", severity, name, text, numbers, action)
 
 

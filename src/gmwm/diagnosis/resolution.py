@@ -71,6 +71,8 @@ def widest_step(values: FloatArray, step: float) -> float:
     Returns: ``step`` itself if all are as wide, or if few samples are where they are not. Where the
         smallest values hide the lattice, there is no ``step``, but a wide one.
     """
+    if step == 0.0 and not _comes_again(values):
+        return 0.0
     # Stuck values count once, so that none of them is a level for its frequency alone.
     begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
     levels, counts = np.unique(begins, return_counts=True)
@@ -85,6 +87,12 @@ def widest_step(values: FloatArray, step: float) -> float:
     order = np.argsort(-nearest[alone], kind="stable")
     have = np.cumsum(counts[alone][order]) >= tuning.FEWEST_WIDE * begins.size
     return float(nearest[alone][order][np.argmax(have)]) if np.any(have) else step
+
+
+def _comes_again(values: FloatArray) -> bool:
+    """Whether samples share levels, as numbers of few digits do and those without steps do not."""
+    part = values[:: -(-values.size // tuning.LEVELS_SAMPLED)]
+    return 2 * np.unique(part).size < part.size
 
 
 def is_coarse(values: FloatArray, step: float) -> bool:

@@ -57,7 +57,7 @@ def families(count: int, step: float) -> tuple[Family, ...]:
 
     Steps at all edges and middles of blocks; transients exp(-t/tau) with tau from one block to a
     third of the record; straight drifts that end after four blocks to two thirds of the record;
-    periods of a half to a twenty-fourth of the record, faster ones are lines; a step and the same
+    periods of twice to a twenty-fourth of the record, faster ones are lines; a step and the same
     back at edges of blocks, neither of which may be evident alone; and a straight drift of the
     whole record, with which the others compete.
     """
@@ -67,7 +67,7 @@ def families(count: int, step: float) -> tuple[Family, ...]:
     ramp = np.maximum(edge - at[:, None], 0.0)  # integral of a step
     constants = _ladder(1.0, length / 3.0)[:, None]
     ends = _ladder(4.0, length * 2.0 / 3.0)[:, None]
-    cycles = np.arange(2.0, tuning.MOST_CYCLES, 0.25)
+    cycles = np.arange(tuning.FEWEST_CYCLES, tuning.MOST_CYCLES, 0.25)
     phase = 2.0 * np.pi * cycles[:, None, None] / length * edge
     periods = np.concatenate([np.sin(phase), -np.cos(phase)], axis=1)
     periods *= length / (2.0 * np.pi * cycles[:, None, None])

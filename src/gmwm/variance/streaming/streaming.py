@@ -32,7 +32,8 @@ class StreamingVariance:
 
     Averaging times of up to 512 samples see all windows, longer ones those that begin at multiples
     of 1/512 of them: a sampling variance larger by 5e-6. Where a record without missing samples has
-    room for few of the longest, nearly all of these count. Some 5 MB a channel hold what is needed,
+    room for few of the longest, nearly all of these count; a part with ``start`` that is not joined
+    to what is before it may lack that averaging time. Some 5 MB a channel hold what is needed,
     however long the record. The sums, to the last bit, do not depend on how the samples are divided
     into blocks; a large offset does no harm.
 

@@ -63,6 +63,7 @@ def test_a_step_is_found_with_its_size(size, seed):
         ("drift-at-start", np.maximum(1.0 - TIME / 900.0, 0.0), 900.0),
         ("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0), 1500.0),
         slow("slow-period", np.sin(2.0 * np.pi * TIME / 1500.0), 1500.0),
+        ("slow-period", np.sin(3.0 * np.pi * TIME / TIME[-1]), TIME[-1] / 1.5),
     ],
 )
 def test_other_departures_are_found(kind, curve, time):

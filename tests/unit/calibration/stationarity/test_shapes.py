@@ -43,7 +43,7 @@ def test_block_means_are_those_of_the_shape(kind):
     ("kind", "low", "high"),
     [("step", 1.0, 39.0), ("pulse", 1.0, 39.0),
      ("transient", 1.0, 40 / 3), ("drift-at-start", 4.0, 80 / 3),
-     ("slow-period", 40 / (tuning.MOST_CYCLES - 0.25), 20.0), ("drift", 40.0, 40.0)],
+     ("slow-period", 40 / (tuning.MOST_CYCLES - 0.25), 80.0), ("drift", 40.0, 40.0)],
 )  # fmt: skip
 def test_times_reach_over_the_record(kind, low, high):
     times = FAMILIES[kind].times[:, 0] / STEP
