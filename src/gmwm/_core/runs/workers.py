@@ -36,12 +36,13 @@ Done = Generator[tuple[T, R], None, None]
 """Items with what came of them, as they come."""
 
 ENDED = 3
-"""Processes that may end at an item, before it is taken for the cause; Dask's own number."""
+"""Processes at least that end at an item before it is taken for the cause; Dask's own number."""
 
 PROCESSES = 2
 """That share the work on one recording by default: each takes 200 MB."""
 
 _TOGETHER = 2  # times that an item may be among those at which a process ended; then it goes alone
+_ALONE = 2  # ends of a process at an item alone: one may be of processes that were still closing
 _LAST_SECONDS = 5.0  # that the end of a thread is waited for, which takes a thousandth of one
 _WAITING = 2  # items that a process is given: the one at work, and the next
 
@@ -192,7 +193,7 @@ def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> 
         return
     from joblib import effective_n_jobs
 
-    left, ended = dict.fromkeys(items), dict.fromkeys(items, 0)
+    left, ended, alone = dict.fromkeys(items), dict.fromkeys(items, 0), dict.fromkeys(items, 0)
     while left:
         # At which item a process ended is known only of one that has the processes for itself.
         suspect = next((item for item in left if ended[item] >= _TOGETHER), None)
@@ -207,9 +208,11 @@ def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> 
                 : _WAITING * effective_n_jobs(jobs)
             ]:
                 ended[item] += 1
-            if suspect is not None and ended[suspect] >= ENDED:
-                del left[suspect]
-                yield suspect, lost(suspect)
+            if suspect is not None:
+                alone[suspect] += 1
+                if alone[suspect] == _ALONE:
+                    del left[suspect]
+                    yield suspect, lost(suspect)
 
 
 @contextmanager
