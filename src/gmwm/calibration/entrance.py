@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -39,14 +40,14 @@ from gmwm.calibration.screening import (
 )
 from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.calibration.stationarity.removal import variance_without
-from gmwm.diagnosis import thinned
+from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.variance import MIN_SAMPLES
 
-_TAKING = ("sentinel", "event", "outliers", "held")
+_TAKING = ("sentinel", "event", "outliers", "held", "rows-copied")
 """Codes of notices of what makes samples missing."""
 
 
@@ -262,6 +263,13 @@ def _check_together(recordings: Sequence[Recording]) -> None:
                     f"{other.source} has {1.0 / channel.dt:g} Hz and {first.source} "
                     f"{1.0 / known.dt:g} Hz: calibrate recordings of different rates one by one"
                 )
+    for one, other in combinations(recordings, 2):
+        if (times := first_in_common(one, other)) is not None:
+            raise InputError(
+                f"{one.source or 'a recording'} from {times[0]:.6g} s on and "
+                f"{other.source or 'another'} from {times[1]:.6g} s on have the same samples: "
+                "give each recording once, or cut off what both have"
+            )
 
 
 def _usable(
@@ -309,5 +317,5 @@ def _reason_to_skip(channel: Channel, notices: Iterable[Notice]) -> Notice | Non
         return None
     if channel.missing == channel.n:
         why = replace(why, code="all-missing", text="all samples missing")
-    causes = (n.text for n in notices if n.where == channel.name and n.code in _TAKING)
+    causes = (n.text for n in notices if n.where in ("", channel.name) and n.code in _TAKING)
     return replace(why, text=": ".join([why.text, *causes]))

@@ -224,6 +224,8 @@ def _done(
         if notice.where in robust:
             return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
         return "kept, as requested"
+    if notice.code == "rows-copied":
+        return f"left out; {notice.action}" if left_out else f"kept, as requested; {notice.action}"
     if notice.code in ("dead", "infinite") and "stretches" not in notice.values:
         return "the channel is skipped"
     if notice.code in _ADVICE:

@@ -1,6 +1,7 @@
 """What is wrong with a recording, before a model is fitted to it."""
 
 from gmwm.diagnosis.check import health as health
+from gmwm.diagnosis.copies import first_in_common as first_in_common
 from gmwm.diagnosis.gathered import gathered as gathered
 from gmwm.diagnosis.joined import health_stream as health_stream, joined as joined
 from gmwm.diagnosis.repeated import thinned as thinned

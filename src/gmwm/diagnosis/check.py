@@ -22,6 +22,7 @@ from gmwm.diagnosis.contamination import (
     light_tails_notice,
     tails_notice,
 )
+from gmwm.diagnosis.copies import Copy, copies_notice, find_copies
 from gmwm.diagnosis.drift import drift_notice, reset_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, Signal, innovations
@@ -108,6 +109,9 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
         *read,
         *_clock(recording),
     ]
+    copies = find_copies(recording)
+    if (again := copies_notice(copies, recording.dt)) is not None:
+        whole.append(again)
     if not motion.moves and (vibration := vibration_notice(recording)) is not None:
         whole.append(vibration)
     examined: dict[str, _Examined] = {}
@@ -119,7 +123,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
                 progress(len(examined), len(channels), channel.name)
             yield channel
 
-    for channel, one in shared(partial(_unrepeated, motion=motion), begun()):
+    for channel, one in shared(partial(_once, copies=copies, motion=motion), begun()):
         examined[channel.name] = one
     examined = {channel.name: examined[channel.name] for channel in channels}
     if progress is not None:
@@ -174,6 +178,28 @@ def _clock(recording: Recording) -> list[Notice]:
 def _clean(name: str) -> Notice:
     text = "nothing found that spoils the estimates"
     return Notice("clean", "good", name, text)
+
+
+def _once(channel: Channel, copies: Sequence[Copy], motion: Motion) -> _Examined:
+    """A channel without rows that are copies, which are to be left out."""
+    if not copies:
+        return _unrepeated(channel, motion)
+    values = np.array(channel.values, dtype=float)
+    for each in copies:
+        values[each.start : each.stop] = np.nan
+    one = _unrepeated(replace(channel, values=values), motion)
+    spans = [*one.facts.events, *((each.start, each.stop) for each in copies)]
+    return replace(one, facts=replace(one.facts, events=_united(spans)))
+
+
+def _united(spans: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    found: list[tuple[int, int]] = []
+    for start, stop in sorted(spans):
+        if found and start <= found[-1][1]:
+            start, before = found.pop()
+            stop = max(stop, before)
+        found.append((start, stop))
+    return tuple(found)
 
 
 def _unrepeated(channel: Channel, motion: Motion) -> _Examined:

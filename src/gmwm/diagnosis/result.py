@@ -84,7 +84,8 @@ class Health(Document, Printed):
     notices : tuple of Notice
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
-        "infinite", "size", "stuck", "held", "saturation", "abrupt-end", "value-repeated",
+        "rows-copied", "infinite", "size", "stuck", "held", "saturation", "abrupt-end",
+        "value-repeated",
         "repeated-samples", "interpolated", "filled", "event",
         "outliers", "heavy-tails", "light-tails", "rounding", "line", "resonance",
         "drift", "resets", "variance", "temperature", "crosstalk" and "clean".

@@ -405,3 +405,16 @@ FEWEST_STRAIGHT, NEARLY_STRAIGHT, BESIDE_STRAIGHT = 0.02, 0.05, 0.25
 """Share from which some samples were put between others; second differences, in those of their
 size, that noise has as often as it has smaller ones; and of these the share that vanishes by
 rounding at most, in two steps of it."""
+
+# -- copies ---------------------------------------------------------------------------------------
+
+SPARSE = 8
+"""One of so many windows is looked at, a power of two."""
+
+LAGS_OF_ROWS, MOST_OF_FINE = (0.2137, 0.4112, 0.618), 0.1
+"""Shares of the record between rows that are compared, and of those that are the same so many are
+followed by such at most, of fine samples: 32 in a row are then the same by a chance of 1e-32."""
+
+FEWEST_COPIED, FEWEST_COARSE_COPIED, CHANGES_IN_COPY = 32, 1024, 24
+"""Rows of a copy at least, fine and coarse, and changes from row to row in it: which 24 of 1,024
+rows change has 160 bits."""
