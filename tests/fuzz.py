@@ -225,7 +225,9 @@ def documents() -> tuple[str, ...]:
     model = gmwm.WhiteNoise() + gmwm.RandomWalk()
     data = {"gyro_x": 1e-3 * x, "gyro_y": 1e-3 * holes, "accel_x": x, "accel_y": np.ones(700)}
     given = gmwm.Recording.from_arrays(data, rate=100.0, units=SI, source="static.csv")
-    calibrations = [gmwm.calibrate(given, model), gmwm.calibrate([given, given], model)]
+    backwards = {name: values[::-1] for name, values in data.items()}
+    other = gmwm.Recording.from_arrays(backwards, rate=100.0, units=SI, source="static.csv")
+    calibrations = [gmwm.calibrate(given, model), gmwm.calibrate([given, other], model)]
     numbers = gmwm.bound(calibrations[0], "N+K", horizon=60.0)
     fit = gmwm.fit(gmwm.WhiteNoise() + gmwm.GaussMarkov(tau=30.0), x, 1.0)
     selection = gmwm.select(x[:300], 1.0)

@@ -37,6 +37,13 @@ EARTH_SEEN, EARTH_AGREES = 1.5e-6, 3e-3
 """rad/s/sqrt(Hz) (0.005 deg/sqrt(h)), noise of gyros whose mean is the earth's rate to 0.3 % (0.05
 deg/h): of MEMS gyros, one in a thousand has that mean by chance."""
 
+QUIETEST_GYRO = 2.9e-9
+"""rad/s/sqrt(Hz) (1e-5 deg/sqrt(h)): a tenth of the best fibre-optic and hemispherical gyros."""
+
+EARTH_SHOWS, EARTH_IS_SHOWN, NO_EARTH = 2.9e-7, 0.2, 1e-3
+"""rad/s/sqrt(Hz) (0.001 deg/sqrt(h)): gyros of less noise have biases far below the earth's rate,
+so that three at rest read it to this part. A mean below the last part of it was taken away."""
+
 UNITS_APART = 5.0
 """Ratio of two units up to which both are named where they explain the noise: deg/h and mdeg/s."""
 

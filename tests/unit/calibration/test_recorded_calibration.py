@@ -211,7 +211,8 @@ def test_which_channels_are_used_and_judged():
                     "half one": half * 0 + 1.0, "less one": more * 0 + 1.0}.items():  # fmt: skip
         found[name] = _reason_to_skip(Channel("gyro_x", x, 1.0, "gyro", "rad/s"), ())
     short, fast = (
-        Recording.from_arrays({"gyro_x": NOISE}, rate, GYRO, source="b") for rate in (1.0005, 1.002)
+        Recording.from_arrays({"gyro_x": -NOISE}, rate, GYRO, source="b")
+        for rate in (1.0005, 1.002)
     )
     given = Recording.from_arrays({"gyro_x": NOISE}, 1.0, GYRO, source="a")
     for name, other in (("same", short), ("other", fast)):

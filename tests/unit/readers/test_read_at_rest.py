@@ -115,6 +115,36 @@ def test_a_gyro_in_another_unit_is_suspected(write, true, read_as, quality, is_g
     assert factor(found.values["likely"], true) == pytest.approx(1.0, abs=0.75)
 
 
+@pytest.mark.parametrize(
+    ("true", "quality", "said"),
+    [
+        (
+            "rad/s",
+            {"gyro": 1e-4, "bias": (0.0, 0.0, 0.0)},
+            "1.6e-06 deg/sqrt(h) is less than gyros",
+        ),
+        ("rad/s", {"gyro": 3e-6, "bias": (1e-4, 0.0, 1e-4)}, "is less than gyros have"),
+        ("deg/s", {"gyro": 1e-4}, "is that of a navigation gyro, which reads the earth's 15 deg/h"),
+        ("deg/s", {"gyro": 3e-5, "bias": (2e-3, 0.0, 0.0)}, "the mean rate is 0.115 deg/h"),
+    ],
+)
+def test_a_cheap_gyro_in_degrees_per_hour_is_too_good(write, true, quality, said):
+    rows = in_units(imu(**quality), true, "g")
+    (found,) = notices(read(write(rows, header("deg/h", "g")), rate=100.0))
+    assert (found.code, found.severity) == ("gyro-unit", "warning")
+    assert said in found.text and true in found.action
+
+
+def test_a_navigation_gyro_of_one_axis_or_without_its_mean_is_right(write):
+    rows = imu(gyro=3e-8, bias=(0.4 * EARTH, 0.0, 0.0))
+    for columns, mean in (([0, 3, 4, 5], 0.0), (range(6), rows[:, :3].mean(axis=0))):
+        part = rows.copy()
+        part[:, :3] -= mean
+        names = [NAMES[column] for column in columns]
+        path = write(in_units(part, "deg/h", "g")[:, columns], header("deg/h", "g", names))
+        assert not notices(read(path, rate=100.0))
+
+
 def test_a_rate_that_no_unit_explains(write):
     path = write(in_units(imu(bias=(0.0, 0.0, 1.5)), "deg/s", "g"), header("deg/s", "g"))
     (found,) = notices(read(path, rate=100.0))

@@ -126,5 +126,17 @@ def test_the_rate_of_the_earth_in_another_unit_of_a_quiet_gyro(density, off, fou
     size = 7.292115e-5 * (1.0 + off * tuning.EARTH_AGREES) / ratio
     rate = SimpleNamespace(density=density * tuning.EARTH_SEEN / ratio, size=size)
     said = _by_earth(rate, {"deg/h": 1e-3, "rad/s": ratio})
+    is_told = said == ("the mean rate is that of the earth in rad/s", ["rad/s"])
+    assert is_told is found
+
+
+@pytest.mark.parametrize(
+    ("density", "part", "found"),
+    [(0.99, 0.79, True), (0.99, 1.21, True), (0.99, 0.81, False), (0.99, 1.19, False),
+     (1.01, 0.5, False), (0.0, 0.5, False), (0.99, 0.0011, True), (0.99, 0.0009, False)],
+)  # fmt: skip
+def test_a_navigation_gyro_reads_the_rate_of_the_earth(density, part, found):
+    rate = SimpleNamespace(density=density * tuning.EARTH_SHOWS, size=7.292115e-5 * part)
+    said = _by_earth(rate, {"mrad/s": 1.1, "deg/s": 1e7})
     assert (said is not None) is found
-    assert said is None or said == ("the mean rate is that of the earth in rad/s", ["rad/s"])
+    assert said is None or said[1] == ["mrad/s"]

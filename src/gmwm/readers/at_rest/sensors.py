@@ -333,14 +333,24 @@ def _by_size(rate: _Sensor, others: Mapping[str, float]) -> tuple[str, list[str]
             if abs(math.log(others[unit] / others[likely[0]])) < math.log(tuning.UNITS_APART)
         ]
         return f"{text} is more than gyros at rest have", near
+    noise = f"white noise of {60.0 * rate.density / _DENSITY:.2g} deg/sqrt(h) is"
+    if 0.0 < rate.density < tuning.QUIETEST_GYRO:
+        return f"{noise} less than gyros have", _less_quiet(rate, others)
     if 0.0 < rate.density < tuning.QUIET_GYRO and rate.size > tuning.QUIET_BIAS:
         likely = [unit for unit, ratio in others.items() if 10.0 < ratio < 100.0]
-        text = (
-            f"white noise of {60.0 * rate.density / _DENSITY:.2g} deg/sqrt(h) is that of a fibre-"
-            f"optic gyro, and a mean rate of {3600.0 * rate.size / _DENSITY:.3g} deg/h is not"
-        )
-        return text, likely
+        mean = f"a mean rate of {3600.0 * rate.size / _DENSITY:.3g} deg/h"
+        return f"{noise} that of a fibre-optic gyro, and {mean} is not", likely
     return None
+
+
+def _less_quiet(rate: _Sensor, others: Mapping[str, float]) -> list[str]:
+    """Units in which the noise is that of gyros which need not read the earth's rate."""
+    return [
+        unit
+        for unit, ratio in others.items()
+        if rate.density * ratio > tuning.EARTH_SHOWS
+        and _is_plausible(rate.density * ratio, rate.size * ratio)
+    ]
 
 
 def _is_plausible(density: float, mean: float) -> bool:
@@ -348,9 +358,19 @@ def _is_plausible(density: float, mean: float) -> bool:
 
 
 def _by_earth(rate: _Sensor, others: Mapping[str, float]) -> tuple[str, list[str]] | None:
-    """The earth's rate, in another unit."""
+    """The earth's rate in another unit, or none of a gyro that has to read it."""
     for unit, ratio in others.items():
         is_quiet = 0.0 < rate.density * ratio < tuning.EARTH_SEEN
         if is_quiet and abs(rate.size * ratio / _EARTH - 1.0) < tuning.EARTH_AGREES:
             return f"the mean rate is that of the earth in {unit}", [unit]
-    return None
+    part = rate.size / _EARTH
+    is_removed = part < tuning.NO_EARTH
+    if not 0.0 < rate.density < tuning.EARTH_SHOWS or is_removed:
+        return None
+    if abs(part - 1.0) < tuning.EARTH_IS_SHOWN:
+        return None
+    text = (
+        f"white noise of {60.0 * rate.density / _DENSITY:.2g} deg/sqrt(h) is that of a navigation "
+        f"gyro, which reads the earth's 15 deg/h; the mean rate is {part * 15.04:.3g} deg/h"
+    )
+    return text, _less_quiet(rate, others)
