@@ -95,6 +95,8 @@ def test_what_ends_a_fleet_leaves_nothing_and_is_said_in_the_status(tmp_path, na
             time.sleep(0.02)
         time.sleep(0.5)
         process.send_signal(number)
+        time.sleep(0.1)
+        process.send_signal(number)  # as a terminal and its shell do where a window is closed
         _, reported = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert b"interrupted, no file is half-written" in reported

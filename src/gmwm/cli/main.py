@@ -86,6 +86,9 @@ def _ended_as_interrupted() -> Iterator[list[int]]:
 
     def end(number: int, _: object) -> None:
         came.append(number)
+        # A terminal that closes sends two: the second would end what cleans up after the first.
+        for each in usual:
+            signal.signal(each, signal.SIG_IGN)
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell that runs us behind it
             raise KeyboardInterrupt
         signal.raise_signal(signal.SIGINT)
@@ -97,7 +100,7 @@ def _ended_as_interrupted() -> Iterator[list[int]]:
     try:
         yield came
     finally:
-        for number in usual:
+        for number in usual if not came else ():
             signal.signal(number, signal.SIG_DFL)
 
 

@@ -22,21 +22,11 @@ from gmwm.diagnosis.contamination import (
     light_tails_notice,
     tails_notice,
 )
-from gmwm.diagnosis.copies import Copy, copies_notice, find_copies
 from gmwm.diagnosis.drift import drift_notice, reset_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, Signal, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.repeated import (
-    held_notice,
-    held_share,
-    interpolation_notice,
-    leaves_runs,
-    repetition,
-    repetition_notice,
-    thinned,
-)
 from gmwm.diagnosis.resolution import rounding_notice, step_size, widest_step
 from gmwm.diagnosis.result import ChannelHealth, Health
 from gmwm.diagnosis.samples import (
@@ -51,6 +41,18 @@ from gmwm.diagnosis.samples import (
 )
 from gmwm.diagnosis.spectral import line_notices, peaks, resonance_notice
 from gmwm.diagnosis.still import vibration_notice
+from gmwm.diagnosis.unmeasured import (
+    Copy,
+    copies_notice,
+    find_copies,
+    held_notice,
+    held_share,
+    interpolation_notice,
+    leaves_runs,
+    repetition,
+    repetition_notice,
+    thinned,
+)
 from gmwm.readers import Channel, Recording, require_recording
 
 _SEVERE = ("warning", "bad")

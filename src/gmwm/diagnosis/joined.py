@@ -13,11 +13,11 @@ from gmwm._core.text import brief, per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
-from gmwm.diagnosis.samples import length_notice
+from gmwm.diagnosis.samples import length_notice, missing_notice
 from gmwm.errors import InputError
 from gmwm.readers import CLOCK_CODES, read_blocks
 
-_LARGEST = {"event": "height", "gap": "missing", "line": "amplitude", "resonance": "sigma"}
+_LARGEST = {"event": "height", "line": "amplitude", "resonance": "sigma"}
 """The number by which one notice stands for those of its code in all stretches."""
 
 _ADDED = ("count", "samples", "missing")
@@ -30,7 +30,7 @@ _IN_SOME = {
 }
 """What is advised where some stretches only are so."""
 
-_SUMS = frozenset({"event", "gap", "saturation", *CLOCK_CODES})
+_SUMS = frozenset({"event", "saturation", *CLOCK_CODES})
 
 _AT_REST = ("not-static", "tilt")
 
@@ -90,7 +90,11 @@ def joined(found: Sequence[Health]) -> Health:
     ]
     spoilt = {one.where for one in unsteady}
     notices = unsteady + [
-        _one_of(group, len(found), rate) for group in groups if not _falls(group, found, spoilt)
+        _missing_of(group, ends[-1])
+        if group[0].notice.code == "gap"
+        else _one_of(group, len(found), rate)
+        for group in groups
+        if not _falls(group, found, spoilt)
     ]
     whole = [
         length_notice(ends[-1], rate),
@@ -149,6 +153,14 @@ def _falls(group: Sequence[_Noticed], found: Sequence[Health], spoilt: Collectio
     one = group[0].notice
     is_clean = len(group) == len(found) and one.where not in spoilt
     return one.code == "length" or (one.code == "clean" and not is_clean)
+
+
+def _missing_of(group: Sequence[_Noticed], n: int) -> Notice:
+    """What is missing of n samples; a gap across the end of a stretch counts twice."""
+    values = [each.notice.values for each in group]
+    missing, gaps = (int(sum(each[name] for each in values)) for name in ("missing", "gaps"))
+    longest = max(float(each["longest"]) for each in values)
+    return missing_notice(group[0].notice.where, n, missing, gaps, longest)
 
 
 def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:

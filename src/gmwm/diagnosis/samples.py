@@ -14,7 +14,7 @@ from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations, Signal
-from gmwm.readers import Channel
+from gmwm.readers import Channel, Missing
 
 
 def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
@@ -26,33 +26,38 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
 
 
 def _gap_notice(channel: Channel, dt: float) -> Notice | None:
-    gone = np.isnan(channel.values)
-    missing = int(np.count_nonzero(gone))
-    if not missing:
+    found = Missing().and_then(channel.values)
+    if not found.samples:
         return None
-    edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
-    lengths = edges[1::2] - edges[::2]
-    share = missing / channel.n
+    return missing_notice(channel.name, channel.n, found.samples, found.gaps, found.longest * dt)
+
+
+def missing_notice(where: str, n: int, missing: int, gaps: int, longest: float) -> Notice:
+    """Say how much is missing of n samples, and what that does.
+
+    longest: Of the gaps, s.
+    """
+    share = missing / n
     values = {
         "missing": float(missing),
         "share": share,
-        "gaps": float(lengths.size),
-        "longest": float(np.max(lengths)) * dt,
+        "gaps": float(gaps),
+        "longest": longest,
     }
-    if missing == channel.n:
+    if missing == n:
         return Notice(
-            "gap", "bad", channel.name, "all samples missing", values, "look at cable and columns"
+            "gap", "bad", where, "all samples missing", values, "look at cable and columns"
         )
-    plural = "s" if lengths.size > 1 else ""
+    plural = "s" if gaps > 1 else ""
     text = (
-        f"{missing:,} of {channel.n:,} samples missing ({share:.2g} of all) in {lengths.size:,} "
-        f"gap{plural}, the longest {values['longest']:.3g} s"
+        f"{missing:,} of {n:,} samples missing ({share:.2g} of all) in {gaps:,} "
+        f"gap{plural}, the longest {longest:.3g} s"
     )
     if share > tuning.TOO_MUCH_MISSING:
-        return Notice("gap", "bad", channel.name, text, values, "too few are left: record again")
+        return Notice("gap", "bad", where, text, values, "too few are left: record again")
     severity: Severity = "warning" if share > tuning.MUCH_MISSING else "note"
     action = "the wavelet variance bridges short gaps and leaves out what others touch"
-    return Notice("gap", severity, channel.name, text, values, action)
+    return Notice("gap", severity, where, text, values, action)
 
 
 def length_notice(n: int, rate: float) -> Notice:

@@ -40,10 +40,10 @@ from gmwm.readers.formats import (
     shares,
     with_temperature,
 )
+from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
-from gmwm.readers.sentinels import without_sentinels
 from gmwm.readers.table import Table, column_of
 
 

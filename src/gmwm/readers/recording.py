@@ -16,6 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.readers import tuning
+from gmwm.readers.missing import Missing, missing_notices
 
 READING = frozenset(
     {"column-numbers", "preamble", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
@@ -355,30 +356,10 @@ def _series(name: str, values: FloatArray) -> FloatArray:
 
 
 def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
-    """One for all channels that miss equally many samples in equally many gaps."""
-    alike: dict[tuple[int, int, int], list[Channel]] = {}
-    for channel in channels:
-        gone = np.isnan(channel.values)
-        if np.any(gone):
-            edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
-            lengths = edges[1::2] - edges[::2]
-            key = (channel.missing, lengths.size, int(np.max(lengths)))
-            alike.setdefault(key, []).append(channel)
-    return [_notice_of_gaps(found, *key) for key, found in alike.items()]
-
-
-def _notice_of_gaps(channels: Sequence[Channel], missing: int, gaps: int, longest: int) -> Notice:
-    n = channels[0].n
-    text = f"all {n:,} samples missing" if missing == n else f"{missing:,} of {n:,} samples missing"
-    if gaps > 1:
-        plural = "s" if longest > 1 else ""
-        text += f", in {gaps:,} gaps, the longest {longest:,} sample{plural}"
-    elif missing < n:
-        text += ", in one gap"
-    names = ", ".join(channel.name for channel in channels)
-    values = {"missing": missing, "gaps": gaps, "longest": longest}
-    each = "each " if len(channels) > 1 else ""
-    return Notice("missing-samples", "note", names, f"{each}{text}", values)
+    """What is missing in channels that are whole."""
+    return missing_notices(
+        {channel.name: Missing().and_then(channel.values) for channel in channels}
+    )
 
 
 def require_recording(given: Any) -> None:

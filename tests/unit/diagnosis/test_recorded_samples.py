@@ -6,15 +6,6 @@ import pytest
 
 from gmwm import Channel
 from gmwm.diagnosis.innovations import Signal, innovations
-from gmwm.diagnosis.repeated import (
-    held_notice,
-    held_share,
-    interpolation_notice,
-    leaves_runs,
-    repetition,
-    repetition_notice,
-    thinned,
-)
 from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
 from gmwm.diagnosis.samples import (
     _longest_by_chance,
@@ -28,6 +19,15 @@ from gmwm.diagnosis.samples import (
     repeated_value_notice,
     saturation_notice,
     stuck_notice,
+)
+from gmwm.diagnosis.unmeasured import (
+    held_notice,
+    held_share,
+    interpolation_notice,
+    leaves_runs,
+    repetition,
+    repetition_notice,
+    thinned,
 )
 from recorded import assert_as_recorded, edge, first
 

@@ -7,7 +7,6 @@ from gmwm import Channel
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.repeated import held_share, leaves_runs, repetition, thinned
 from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
 from gmwm.diagnosis.samples import (
     gap_notices,
@@ -18,6 +17,7 @@ from gmwm.diagnosis.samples import (
     run_lengths,
     saturation_notice,
 )
+from gmwm.diagnosis.unmeasured import held_share, leaves_runs, repetition, thinned
 
 
 def channel(values, name="gyro_x", dt=0.01):

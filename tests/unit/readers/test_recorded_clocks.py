@@ -15,7 +15,7 @@ from gmwm.readers.clock.jumps import find_change, find_jumps, find_shifts
 from gmwm.readers.clock.line import interval_of
 from gmwm.readers.clock.stamps import _unwrapped
 from gmwm.readers.clock.unit_of_time import without_unit
-from gmwm.readers.sentinels import without_sentinels
+from gmwm.readers.missing import without_sentinels
 from recorded import assert_as_recorded, edge, first, refused, to_nine_places
 
 N = 1200

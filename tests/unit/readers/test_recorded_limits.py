@@ -14,8 +14,8 @@ from gmwm.readers.clock.stamps import _unwrapped
 from gmwm.readers.clock.tracking import follow
 from gmwm.readers.clock.uneven import _bursts, followed
 from gmwm.readers.layout import find_layout
+from gmwm.readers.missing import without_sentinels
 from gmwm.readers.reader import read
-from gmwm.readers.sentinels import without_sentinels
 from recorded import assert_as_recorded, edge, first, refused
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}

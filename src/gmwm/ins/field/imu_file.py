@@ -19,6 +19,7 @@ from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
 from gmwm.readers import (
+    Missing,
     Recording,
     bare,
     content_size,
@@ -156,21 +157,22 @@ class _Record:
         sign = np.array([-1.0 if axis in turned else 1.0 for axis in AXES])
         first = _checked(next(parts))
         samples = _samples(first, sign)
-        missing, noticed = {name: first[name].missing for name in AXES}, [*first.notices]
+        missing = {name: Missing().and_then(first[name].values) for name in AXES}
+        noticed = [*first.notices]
         spools: tuple[Spool, Spool] | None = None
         for part in parts:
             if spools is None:
                 spools = Spool(3), Spool(3)
                 _append(spools, samples)
             _append(spools, _samples(_checked(part), sign))
-            missing = {name: count + part[name].missing for name, count in missing.items()}
+            missing = {name: e.and_then(part[name].values) for name, e in missing.items()}
             noticed += part.notices
         if spools is None:
             return cls(
                 np.ascontiguousarray(samples[:, :3]), np.ascontiguousarray(samples[:, 3:]),
                 first.dt, first.source, first.notices,
             )  # fmt: skip
-        notices = notices_of_blocks(noticed, missing, spools[0].n)
+        notices = notices_of_blocks(noticed, missing)
         return cls(spools[0].array(), spools[1].array(), first.dt, first.source, notices)
 
     def column(self, name: str) -> FloatArray:

@@ -17,6 +17,7 @@ from gmwm.readers import tuning
 from gmwm.readers.blocks.written import Written
 from gmwm.readers.clock import CLOCK_CODES, agree, change_notice, check_rates, repeated_notice
 from gmwm.readers.formats import has_sensors
+from gmwm.readers.missing import Missing, missing_notices
 from gmwm.readers.reader import part_of, tables_of
 from gmwm.readers.recording import Recording
 from gmwm.readers.roles import Given, Reference, roles_of
@@ -164,19 +165,14 @@ def _size(arrays: Mapping[int, FloatArray]) -> int:
 
 
 def notices_of_blocks(
-    noticed: Iterable[Notice], missing: Mapping[str, int], n: int
+    noticed: Iterable[Notice], missing: Mapping[str, Missing]
 ) -> tuple[Notice, ...]:
-    """The first of each kind that blocks have, and how much is missing in all of them."""
+    """The first of each kind that blocks have, and what is missing in all of them."""
     kinds: dict[tuple[str, str], list[Notice]] = {}
     for notice in noticed:
         kinds.setdefault((notice.code, notice.where), []).append(notice)
     kept = [_of_all(alike) for (code, _), alike in kinds.items() if code != "missing-samples"]
-    for name, count in missing.items():
-        if count:
-            text = f"{count:,} of {n:,} samples missing"
-            values = {"missing": count}
-            kept.append(Notice("missing-samples", "note", name, text, values))
-    return tuple(kept)
+    return (*kept, *missing_notices(missing))
 
 
 def _of_all(alike: Sequence[Notice]) -> Notice:

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gmwm._core.row_keys import Keys, row_keys
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.readers import tuning
+from gmwm.readers.blocks.row_keys import RowKeys, row_keys
 
 
 class Written:
@@ -25,7 +25,7 @@ class Written:
     def __init__(self, time: int):
         self._time = time
         self._newest = -np.inf
-        self._kept: list[Keys] = []
+        self._kept: list[RowKeys] = []
 
     def fresh(self, arrays: Mapping[int, FloatArray]) -> tuple[dict[int, FloatArray], int]:
         """The rows of a block without those that were written before, and how many these are."""
@@ -41,7 +41,7 @@ class Written:
         self._keep(found[self._time], keys)
         return found, copies.size
 
-    def _copies(self, back: BoolArray, keys: Keys) -> NDArray[np.intp]:
+    def _copies(self, back: BoolArray, keys: RowKeys) -> NDArray[np.intp]:
         rows = np.flatnonzero(back)
         if rows.size:
             again = np.isin(keys[rows], np.concatenate([*self._kept, keys[~back]]))
@@ -49,7 +49,7 @@ class Written:
                 return rows[again]
         return rows[:0]
 
-    def _keep(self, stamps: FloatArray, keys: Keys) -> None:
+    def _keep(self, stamps: FloatArray, keys: RowKeys) -> None:
         if not keys.size:
             return
         self._newest = max(self._newest, float(np.fmax.reduce(stamps, initial=-np.inf)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
-from gmwm.readers import Recording, notices_of_blocks, read_blocks
+from gmwm.readers import Missing, Recording, notices_of_blocks, read_blocks
 from gmwm.variance.streaming.streaming import StreamingVariance
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -73,12 +73,12 @@ def stream(
     names = [channel.name for channel in first.inertial]
     units = {c.name: c.unit if c.unit in SI_UNIT.values() else "" for c in first.inertial}
     variance = StreamingVariance(first.dt, units)
-    missing = dict.fromkeys(names, 0)
+    missing = dict.fromkeys(names, Missing())
     noticed: list[Notice] = []
     for part in chain([first], parts):
         noticed += part.notices
         for name in names:
-            missing[name] += part[name].missing
+            missing[name] = missing[name].and_then(part[name].values)
         used = part if prepare is None else prepare(part)
         variance.update(np.stack([used[name].values for name in names], axis=1))
     results = variance.results()
@@ -92,5 +92,5 @@ def stream(
         source=first.source,
         dt=first.dt,
         n=variance.n,
-        notices=notices_of_blocks(noticed, missing, variance.n),
+        notices=notices_of_blocks(noticed, missing),
     )

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 import gmwm
-from gmwm.diagnosis.repeated import held_share
+from gmwm.diagnosis.unmeasured import held_share
 from marks import slow
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.row_keys import MIXED, Keys, row_keys
 from gmwm._core.typing import IntArray
 from gmwm.diagnosis import tuning
-from gmwm.readers import Recording
+from gmwm.readers import MIXED, Recording, RowKeys, row_keys
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def copies_notice(found: Sequence[Copy], dt: float) -> Notice | None:
     return Notice("rows-copied", "warning", "", text, values, action)
 
 
-def _copies(keys: Keys) -> Iterator[Copy]:
+def _copies(keys: RowKeys) -> Iterator[Copy]:
     window = _window(keys)
     anchors, firsts = _seen_before(keys, window)
     done = 0
@@ -92,7 +91,7 @@ def _copies(keys: Keys) -> Iterator[Copy]:
         yield Copy(anchor - before, stop, first - before)
 
 
-def _window(keys: Keys) -> int:
+def _window(keys: RowKeys) -> int:
     """Rows that are not the same twice by chance.
 
     Rows of fine samples are hardly ever; where they are coarse or slow, one that is the same makes
@@ -108,7 +107,7 @@ def _window(keys: Keys) -> int:
     return tuning.FEWEST_COPIED if is_fine else tuning.FEWEST_COARSE_COPIED
 
 
-def _seen_before(keys: Keys, window: int) -> tuple[IntArray, IntArray]:
+def _seen_before(keys: RowKeys, window: int) -> tuple[IntArray, IntArray]:
     """Rows from which a window is as an earlier one, and where that begins.
 
     Of all windows those are looked at whose number ends in some zero bits: which these are, the
@@ -135,14 +134,14 @@ def _seen_before(keys: Keys, window: int) -> tuple[IntArray, IntArray]:
     return chosen[again] + 1, firsts[again] + 1
 
 
-def _same_before(keys: Keys, row: int, first: int, most: int) -> int:
+def _same_before(keys: RowKeys, row: int, first: int, most: int) -> int:
     """Rows before two that are the same, up to some."""
     most = min(most, first)
     differ = np.flatnonzero(keys[row - most : row] != keys[first - most : first])
     return most - 1 - int(differ[-1]) if differ.size else most
 
 
-def _same_from(keys: Keys, row: int, first: int) -> int:
+def _same_from(keys: RowKeys, row: int, first: int) -> int:
     """Rows from two on that are the same."""
     size = 1 << 10
     while True:

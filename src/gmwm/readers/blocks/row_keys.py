@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
 
-Keys = NDArray[np.uint64]
+RowKeys = NDArray[np.uint64]
 
 MIXED = np.uint64(0x9E3779B97F4A7C15)
 """2^64 over the golden ratio, odd: neighbouring numbers go far apart (Knuth, *The Art of Computer
 Programming* 3, sec. 6.4)."""
 
 
-def row_keys(columns: Iterable[FloatArray]) -> Keys:
+def row_keys(columns: Iterable[FloatArray]) -> RowKeys:
     """A number for each row, the same for the same values.
 
     columns: One at least, of (n,).
     """
-    keys: Keys = np.zeros(1, dtype=np.uint64)
+    keys: RowKeys = np.zeros(1, dtype=np.uint64)
     for values in columns:
         keys = keys ^ np.ascontiguousarray(values, dtype=float).view(np.uint64)
         # Numbers of few digits differ in their highest bits alone.
