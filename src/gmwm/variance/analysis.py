@@ -91,8 +91,10 @@ def wavelet_variance(
     blocks, block = levels.block_means()
     found = None
     if data_covariance is not None:
-        factor = 1.0 / (1.0 + levels.change)
-        found = covariance_of_data(levels.coefficients(), data_covariance)
+        # What is subtracted for the filling leaves the error of that which it is subtracted from.
+        factor = (1.0 + levels.error) / (1.0 + levels.change)
+        longest = int(np.max(levels.counts))
+        found = covariance_of_data(levels.coefficients(), longest, data_covariance)
         found = found * np.outer(factor, factor)
     variance = levels.unfilled(moments)
     if not np.any(variance > 0.0):

@@ -22,10 +22,13 @@ WINDOWS = ("none", "octave")
 _SLICE = 1 << 16
 
 
-def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") -> FloatArray:
+def data_covariance(
+    coefficients: Iterable[FloatArray], longest: int, window: str = "none"
+) -> FloatArray:
     """Covariance of the mean squares of several levels' coefficients.
 
-    coefficients: iterable of (M_j,), one array a level, of falling length.
+    coefficients: iterable of (M_j,), one array a level.
+    longest: The largest M_j, which is not that of the finest where only coarser ones bridge gaps.
     window: {"none", "octave"}, "none" takes all lags, as eq. (5) does: unbiased, but as noisy as a
         periodogram. "octave" averages the cross-spectra over an eighth of an octave first, which is
         a lag window whose length grows with the period: for long records.
@@ -34,7 +37,8 @@ def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") ->
     """
     if window not in WINDOWS:
         raise InputError(f"window = {window!r}: known are {', '.join(WINDOWS)}")
-    transforms, counts, size = _transforms(coefficients)
+    size = fft.next_fast_len(longest, real=True)
+    transforms, counts = _transforms(coefficients, size)
     edges = _edges(transforms[0].size, window)
     width = np.diff(np.append(edges, transforms[0].size)).astype(float)
     # A mean of b cross-periodograms has the expected square S^2 (1 + 1/b).
@@ -48,20 +52,18 @@ def data_covariance(coefficients: Iterable[FloatArray], window: str = "none") ->
 
 
 def _transforms(
-    coefficients: Iterable[FloatArray],
-) -> tuple[list[FloatArray], FloatArray, int]:
-    """Normalised transforms, numbers of coefficients, and size.
+    coefficients: Iterable[FloatArray], size: int
+) -> tuple[list[FloatArray], FloatArray]:
+    """Normalised transforms of a size, and numbers of coefficients.
 
     Their mean is not removed, frequency zero not left out: at coarse levels that would take most of
     what there is, and a level of no variance would have all the weight.
     """
     found, counts = [], []
-    size = 0
     for level in coefficients:
-        size = size or fft.next_fast_len(level.size, real=True)
         found.append(fft.rfft(level, size)[: size // 2] / np.sqrt(level.size))
         counts.append(level.size)
-    return found, np.array(counts, dtype=float), size
+    return found, np.array(counts, dtype=float)
 
 
 def _edges(count: int, window: str) -> NDArray[np.int64]:

@@ -7,6 +7,7 @@ from scipy.linalg import toeplitz
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.problem import gls_slope, slope_dof, slope_p_value
+from gmwm.estimate.problem.ramp import Slope, detrended_covariance
 from gmwm.process import as_model
 from marks import slow
 
@@ -80,3 +81,17 @@ def test_noise_without_slow_parts_leaves_no_slope():
     with pytest.raises(gmwm.InputError, match="leaves no drift to estimate"):
         gls_slope(square, lambda f, dt: np.zeros_like(f))
     assert np.isfinite(gls_slope(square, WhiteNoise(1.0).psd).variance)
+
+
+def test_a_slope_takes_the_same_share_in_any_unit():
+    wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(4000, 1.0, 1), 1.0)
+    means = np.diag(np.linspace(1.0, 2.0, wv.tau.size))
+    found = []
+    for unit in (1.0, 1e-6, 1e6):
+        slope = Slope(0.0, (0.05 * unit) ** 2)
+        response = np.full(wv.tau.size, 10.0)
+        taken = detrended_covariance(wv.covariance * unit**4, means * unit**2, response, slope)
+        found.append(taken / unit**4)
+    assert np.all(np.diag(found[0]) > 0.0)
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-9)

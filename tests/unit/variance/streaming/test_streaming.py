@@ -138,6 +138,19 @@ def test_a_gap_over_a_cut_is_one():
     np.testing.assert_array_equal(found._series[0].gaps, streamed(x)._series[0].gaps)
 
 
+@pytest.mark.parametrize("cuts", [(40, 100, 150, 200), (20, 40, 120, 150, 160, 280), (40, 300)])
+def test_parts_of_which_nothing_is_there_merge(cuts):
+    x = noise(350, 1)
+    for start, stop in ((0, 40), (100, 150), (200, 201), (300, 350)):
+        x[start:stop] = np.nan
+    first, *others = merged(x, cuts)
+    for part in others:
+        first = first.merge(part)
+    found, whole = first._series[0], streamed(x)._series[0]
+    np.testing.assert_array_equal(found.gaps, whole.gaps)
+    np.testing.assert_array_equal(found.tallies[[0, 1, 2, 3]], whole.tallies[[0, 1, 2, 3]])
+
+
 def test_a_merged_part_goes_on():
     x = noise(40_000, 1)
     both = streamed(x[:12_345]).merge(streamed(x[12_345:20_001], start=12_345))
