@@ -114,7 +114,7 @@ class Store:
         path = self.path(item.name)
         content = read_json(path)
         try:
-            if "fleet" not in content:
+            if not isinstance(content, dict) or "fleet" not in content:
                 raise InputError("was not written by a fleet")
             origin = _OriginForm.checked(content["fleet"])
             calibration = Calibration.from_dict(content)

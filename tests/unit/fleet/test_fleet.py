@@ -230,6 +230,17 @@ def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
     assert worked == []
 
 
+@pytest.mark.parametrize("text", ["{}", "[]", "null", "3", '"fleet"', '["fleet"]'])
+def test_what_is_no_calibration_is_not_taken_for_one(lot, copied, worked, text):
+    path = copied / "calibrations" / "unit 0.json"
+    path.write_text(text)
+    for again in (lambda: gmwm.fleet(lot, folder=copied, resume=True, **QUICK),
+                  lambda: gmwm.Fleet.load(copied)):  # fmt: skip
+        with pytest.raises(InputError, match=r"unit 0\.json: was not written by a fleet: move it"):
+            again()
+    assert (worked, path.read_text()) == ([], text)
+
+
 def test_another_recording_of_the_same_name_is_not_taken_for_it(record, tmp_path, worked):
     first, second = (record(tmp_path / each / "static.npz", seed) for seed, each in
                      enumerate("ab"))  # fmt: skip
