@@ -210,6 +210,29 @@ def test_what_one_stretch_does_not_show_makes_the_whole_not_valid(tmp_path, chan
     assert not [n for n in found.notices if n.code == "clean"]
 
 
+def test_what_is_advised_for_a_step_can_be_done_with_a_stream(tmp_path):
+    """It has no part and takes nothing off."""
+    x = 1e-3 * np.random.default_rng(8).normal(size=(40_000, 2))
+    x[24_000:] += 4e-4
+    path = tmp_path / "step.csv"
+    np.savetxt(path, x, "%.7g", ",", header="gyro_x,gyro_y", comments="")
+    found = gmwm.calibrate_stream(path, MODEL, rate=100, units=UNITS, rows=10_000)
+    (step,) = [notice for notice in found["gyro_x"].notices if notice.code == "step"]
+    before, after = step.values["time_lower"], step.values["time_upper"]
+    assert before < 240.0 < after
+    assert step.action == f"cut the file: use what is before {before:.6g} s or after {after:.6g} s"
+    options = [str(path), "--rate", "100", "--gyro-unit", "rad/s", "--model", "N + K"]
+    options += ["-o", str(tmp_path / "out"), "--jobs", "1"]
+    done = CliRunner().invoke(cli, ["calibrate", *options, "--memory", "0.0005"])
+    said = " ".join(done.stdout.split())
+    assert "read a stretch at a time" in said
+    assert "if there is more memory, --memory GB with --stop" in said
+    advised = max(re.findall(r"or (--start \S+), or --remove-departures", said))
+    done = CliRunner().invoke(cli, ["calibrate", *options, "--memory", "1", *advised.split()])
+    assert done.exit_code in (0, 1)
+    assert "a step" not in done.stdout
+
+
 def test_noise_that_stays_is_clean(tmp_path):
     found = stretched(tmp_path, lambda x: None)
     assert found["gyro_x"].valid
