@@ -13,14 +13,14 @@ from gmwm._core.text import brief, per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.check import health
 from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
-from gmwm.diagnosis.samples import length_notice, missing_notice
+from gmwm.diagnosis.samples import Lost, length_notice, lost_notices
 from gmwm.errors import InputError
-from gmwm.readers import CLOCK_CODES, read_blocks
+from gmwm.readers import CLOCK_CODES, jumps_of_all, read_blocks
 
 _LARGEST = {"event": "height", "line": "amplitude", "resonance": "sigma"}
 """The number by which one notice stands for those of its code in all stretches."""
 
-_ADDED = ("count", "samples", "missing")
+_ADDED = ("count", "samples")
 """Numbers of these notices that are sums over stretches."""
 
 _IN_SOME = {
@@ -89,12 +89,10 @@ def joined(found: Sequence[Health]) -> Health:
         one for name in names if (one := _unsteady(name, [h.channels[name] for h in found]))
     ]
     spoilt = {one.where for one in unsteady}
-    notices = unsteady + [
-        _missing_of(group, ends[-1])
-        if group[0].notice.code == "gap"
-        else _one_of(group, len(found), rate)
-        for group in groups
-        if not _falls(group, found, spoilt)
+    notices = [
+        *unsteady,
+        *(_one_of(group, len(found), rate) for group in groups if not _falls(group, found, spoilt)),
+        *lost_notices({name: _lost(found, name) for name in names}),
     ]
     whole = [
         length_notice(ends[-1], rate),
@@ -149,23 +147,36 @@ def _same(one: float, other: float) -> bool:
 
 
 def _falls(group: Sequence[_Noticed], found: Sequence[Health], spoilt: Collection[str]) -> bool:
-    """Whether nothing is left of it: a length, or a channel that is not clean in all stretches."""
+    """Whether it is told for the whole, or of a channel that is not clean in all stretches."""
     one = group[0].notice
     is_clean = len(group) == len(found) and one.where not in spoilt
-    return one.code == "length" or (one.code == "clean" and not is_clean)
+    return one.code in ("gap", "length") or (one.code == "clean" and not is_clean)
 
 
-def _missing_of(group: Sequence[_Noticed], n: int) -> Notice:
-    """What is missing of n samples; a gap across the end of a stretch counts twice."""
-    values = [each.notice.values for each in group]
-    missing, gaps = (int(sum(each[name] for each in values)) for name in ("missing", "gaps"))
-    longest = max(float(each["longest"]) for each in values)
-    return missing_notice(group[0].notice.where, n, missing, gaps, longest)
+def _lost(found: Sequence[Health], name: str) -> Lost:
+    """What a channel lacks in all stretches, whether others lack the same or not.
+
+    A gap across the end of a stretch counts twice.
+    """
+    gaps = [
+        notice.values
+        for each in found
+        for notice in each.of(code="gap")
+        if notice.where in ("", name)
+    ]
+    return Lost(
+        n=sum(each.n for each in found),
+        missing=sum(int(each["missing"]) for each in gaps),
+        gaps=sum(int(each["gaps"]) for each in gaps),
+        longest=max((float(each["longest"]) for each in gaps), default=0.0),
+    )
 
 
 def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
     """The worst notice of a group, with how many stretches have one."""
     first = group[0].notice
+    if first.code == "clock-jumps":
+        return jumps_of_all([each.notice for each in group])
     at = len({each.start for each in group})
     if at == stretches and all(each.notice.text == first.text for each in group):
         return first

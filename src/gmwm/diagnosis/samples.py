@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,26 +18,40 @@ from gmwm.diagnosis.innovations import Innovations, Signal
 from gmwm.readers import Channel, Missing
 
 
+class Lost(NamedTuple):
+    """What is missing from a channel.
+
+    n, missing: Samples, and those that are missing.
+    gaps, longest: How many, and the length of the longest, s.
+    """
+
+    n: int
+    missing: int
+    gaps: int
+    longest: float
+
+
 def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
     """How much is missing; one notice for the recording where all channels miss the same."""
-    notices = [found for channel in channels if (found := _gap_notice(channel, dt))]
-    if len(notices) == len(channels) > 1 and all(n.values == notices[0].values for n in notices):
+    found = {channel.name: Missing().and_then(channel.values) for channel in channels}
+    return lost_notices(
+        {
+            name: Lost(each.n, each.samples, each.gaps, each.longest * dt)
+            for name, each in found.items()
+        }
+    )
+
+
+def lost_notices(found: Mapping[str, Lost]) -> list[Notice]:
+    """Those of `gap_notices`, from what is missing by channel."""
+    notices = [_gap_notice(name, each) for name, each in found.items() if each.missing]
+    if len(notices) == len(found) > 1 and all(n.values == notices[0].values for n in notices):
         return [replace(notices[0], where="")]
     return notices
 
 
-def _gap_notice(channel: Channel, dt: float) -> Notice | None:
-    found = Missing().and_then(channel.values)
-    if not found.samples:
-        return None
-    return missing_notice(channel.name, channel.n, found.samples, found.gaps, found.longest * dt)
-
-
-def missing_notice(where: str, n: int, missing: int, gaps: int, longest: float) -> Notice:
-    """Say how much is missing of n samples, and what that does.
-
-    longest: Of the gaps, s.
-    """
+def _gap_notice(where: str, found: Lost) -> Notice:
+    n, missing, gaps, longest = found
     share = missing / n
     values = {
         "missing": float(missing),

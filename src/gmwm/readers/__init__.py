@@ -19,7 +19,7 @@ from gmwm.readers.blocks import (
     row_keys as row_keys,
 )
 from gmwm.readers.cells import DATE as DATE, seconds_of as seconds_of
-from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES
+from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES, jumps_of_all as jumps_of_all
 from gmwm.readers.csv_table import CsvTable as CsvTable
 from gmwm.readers.formats import is_frame as is_frame, is_text as is_text
 from gmwm.readers.missing import Missing as Missing

@@ -248,6 +248,23 @@ def test_a_stretch_without_samples_is_a_gap(tmp_path):
     assert found["gyro_x"].wv.gaps.missing == 10_000
 
 
+@pytest.mark.parametrize("alike", [True, False])
+def test_gaps_of_all_stretches_are_told_together(tmp_path, alike):
+    """Also where one stretch has them in all channels and another in one only."""
+    x = 1e-3 * np.random.default_rng(7).normal(size=(40_000, 2))
+    x[2000:6000] = x[15_000:15_500] = x[31_000:32_000] = np.nan
+    if not alike:
+        x[18_000:18_500, 0] = np.nan
+    np.save(tmp_path / "gaps.npy", x)
+    reading = {key: value for key, value in READING.items() if key != "rows"}
+    whole = gmwm.health(gmwm.read(tmp_path / "gaps.npy", **reading)).of(code="gap")
+    found = gmwm.health_stream(tmp_path / "gaps.npy", **reading, rows=10_000).of(code="gap")
+    assert [notice.where for notice in whole] == ([""] if alike else ["gyro_x", "gyro_y"])
+    assert found == whole
+    assert "in 3 gaps, the longest 40 s" in found[-1].text
+    assert found[-1].severity == "warning"
+
+
 def test_the_row_of_a_number_that_is_none_is_that_of_the_file(tmp_path):
     def breaks(x):
         x[5_000] = np.inf

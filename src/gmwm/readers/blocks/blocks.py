@@ -15,7 +15,14 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
 from gmwm.readers.blocks.written import Written
-from gmwm.readers.clock import CLOCK_CODES, agree, change_notice, check_rates, repeated_notice
+from gmwm.readers.clock import (
+    CLOCK_CODES,
+    agree,
+    change_notice,
+    check_rates,
+    jumps_of_all,
+    repeated_notice,
+)
 from gmwm.readers.formats import has_sensors
 from gmwm.readers.missing import Missing, missing_notices
 from gmwm.readers.reader import part_of, tables_of
@@ -180,12 +187,10 @@ def _of_all(alike: Sequence[Notice]) -> Notice:
     first = alike[0]
     if len(alike) == 1 or first.code not in CLOCK_CODES or "count" not in first.values:
         return first
-    sums = {
-        name: sum(float(each.values[name]) for each in alike)
-        for name in ("count", "missing")
-        if name in first.values
-    }
+    if first.code == "clock-jumps":
+        return jumps_of_all(alike)
+    count = sum(float(each.values["count"]) for each in alike)
     if first.code == "rows-repeated":
-        return repeated_notice(int(sums["count"]))
-    text = f"{first.text} ({sums['count']:,.0f} in all, in {len(alike)} stretches)"
-    return replace(first, text=text, values={**first.values, **sums})
+        return repeated_notice(int(count))
+    text = f"{first.text} ({count:,.0f} in all, in {len(alike)} stretches)"
+    return replace(first, text=text, values={**first.values, "count": count})

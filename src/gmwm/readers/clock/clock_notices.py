@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -58,16 +59,13 @@ def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     digits = 1 - math.floor(math.log10(interval))
     length = round(float(jumps.steps[i] - 1.0) * interval, digits)
     when = round(clock.when(int(jumps.rows[i]) - 1, seconds), digits)
-    total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
-    place = f"by {length:.12g} s, {when:.12g} s after the start"
-    if count == 1:
-        text, which = f"the clock jumps {place}: {total}", "the jump is"
-    else:
-        text = f"the clock jumps {count:,} times, farthest {place}: in all {total}"
-        which = f"{jumps.off_grid:,} of these jumps {'are' if jumps.off_grid > 1 else 'is'}"
-    values = {"count": count, "missing": jumps.total, "longest": length, "time": when}
-    notices = [Notice("clock-jumps", "note", "", text, values)]
+    notices = [_jump_notice(count, jumps.total, length, when)]
     if jumps.off_grid:
+        which = (
+            "the jump is"
+            if count == 1
+            else f"{jumps.off_grid:,} of these jumps {'are' if jumps.off_grid > 1 else 'is'}"
+        )
         text = (
             f"{which} not near a whole number of sampling intervals: the samples after it "
             "were placed at the nearest"
@@ -75,6 +73,26 @@ def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
         values = {"count": jumps.off_grid}
         notices.append(Notice("clock-off-grid", "note", "", text, values))
     return notices
+
+
+def jumps_of_all(alike: Sequence[Notice]) -> Notice:
+    """One notice of the jumps of which those of several stretches tell."""
+    count = sum(int(each.values["count"]) for each in alike)
+    missing = sum(float(each.values["missing"]) for each in alike)
+    farthest = max(alike, key=lambda each: float(each.values["longest"])).values
+    return _jump_notice(count, missing, farthest["longest"], farthest["time"])
+
+
+def _jump_notice(count: int, missing: float, length: float, when: float) -> Notice:
+    """How often the clock jumps, and where it does so farthest, s."""
+    total = f"{missing:,.0f} sample{'s' if missing > 1.0 else ''} missing"
+    place = f"by {length:.12g} s, {when:.12g} s after the start"
+    if count == 1:
+        text = f"the clock jumps {place}: {total}"
+    else:
+        text = f"the clock jumps {count:,} times, farthest {place}: in all {total}"
+    values = {"count": count, "missing": missing, "longest": length, "time": when}
+    return Notice("clock-jumps", "note", "", text, values)
 
 
 def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) -> list[Notice]:

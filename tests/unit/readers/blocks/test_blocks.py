@@ -222,9 +222,22 @@ def test_what_a_clock_does_is_told_once_and_in_times_of_the_record():
     (joined,) = [
         n for n in gmwm.stream(table, units=UNITS, rows=8000).notices if n.code == "clock-jumps"
     ]
-    assert joined.values["count"] == whole.values["count"] == 3
-    assert joined.values["missing"] == whole.values["missing"] == 57
-    assert "3 in all, in 3 stretches" in joined.text
+    assert joined == whole
+    assert (joined.values["count"], joined.values["missing"]) == (3, 57)
+    (joined,) = gmwm.health_stream(table, units=UNITS, rows=8000).of(code="clock-jumps")
+    assert joined == whole
+
+
+def test_gaps_of_all_blocks_are_told_as_of_the_whole():
+    """One of them on both sides of a seam, which is no two."""
+    x = np.random.default_rng(5).normal(size=(40_000, 2))
+    x[3000:7000], x[7000:9000, 0], x[22_000:22_100] = np.nan, np.nan, np.nan
+    table = pa.table({"gyro_x": x[:, 0], "gyro_y": x[:, 1]})
+    for of in (table, table.select(["gyro_x"])):
+        whole = gmwm.read(of, 100, UNITS).notices
+        found = gmwm.stream(of, rate=100, units=UNITS, rows=8000).notices
+        assert "missing-samples" in {n.code for n in found}
+        assert found == whole
 
 
 def test_a_gap_at_a_seam_is_no_clock_that_was_set():
