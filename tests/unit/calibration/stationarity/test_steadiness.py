@@ -8,7 +8,8 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration import tuning
 from gmwm.calibration.stationarity.departures import Departure
-from gmwm.calibration.stationarity.steadiness import _Test, steadiness_notice
+from gmwm.calibration.stationarity.means import Means
+from gmwm.calibration.stationarity.steadiness import _rest, _Test, steadiness_notice
 
 N, RATE, HOUR = 1e-4, 25.0, 90_000
 TIME = np.arange(HOUR) / RATE
@@ -129,3 +130,19 @@ def test_a_calibration_says_so_of_the_channel():
     assert not fit.valid
     assert not fit.reasons["noise_steady"]
     assert "unsteady" in {notice.code for notice in fit.notices}
+
+
+def test_the_excess_is_that_over_the_quiet_quarter():
+    many = np.full(8, 1e9)
+    sizes = np.array([0.25] * 4 + [1.75] * 4)
+    assert _Test(sizes, many, 1.0).excess == pytest.approx(1.0, rel=1e-3)
+    assert _Test(np.ones(8) + 1e-9 * np.arange(8), many, 1.0).excess == pytest.approx(0.0, abs=1e-6)
+
+
+def test_only_the_place_of_a_step_is_left_out():
+    means = Means.of(gmwm.wavelet_variance(white(1), dt=1.0 / RATE), 512)
+    step = Departure("step", (1800.0, 1780.0, 1820.0), (1e-4, 5e-5, 2e-4), 1e6, 0.1)
+    gone = np.isnan(_rest(means, (), (step,)).blocks)
+    inside = (means.time > 1780.0 - 0.5 * means.step) & (means.time < 1820.0 + 0.5 * means.step)
+    np.testing.assert_array_equal(gone, inside)
+    assert 0 < np.count_nonzero(gone) < 10

@@ -7,7 +7,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.start.heading import compass, course, turned
 from gmwm.ins.field.start.in_motion import velocities
-from gmwm.ins.field.start.standing import at_rest, positions_of, standstills, steady
+from gmwm.ins.field.start.standing import _scatter, at_rest, positions_of, standstills, steady
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu
@@ -191,3 +191,11 @@ def test_velocities_are_differences_of_near_positions():
     np.testing.assert_allclose(found.sd[:, 0], np.sqrt(0.5) / np.array([2.0, 5.0]))
     given = fixes("velocity", [1.0], [[1.0, 0.0, 0.0]])
     assert velocities(position, given) is given
+
+
+@pytest.mark.parametrize("count", [4, 40, 400])
+def test_the_scatter_of_a_window_is_not_that_of_the_quietest(count):
+    rng = np.random.default_rng(2)
+    found = [_scatter(rng.normal(size=(count, 50, 6)), 1.0) for _ in range(40)]
+    # Of means of 50 values; the smallest of many variances scatters by less than 15 %.
+    assert np.mean(found) == pytest.approx(1.0 / np.sqrt(50.0), rel=0.05)
