@@ -141,3 +141,11 @@ def test_a_value_more_than_a_process_has_parameters_is_refused(kind):
     full = [1.0] * len(inspect.signature(kind).parameters)
     with pytest.raises(gmwm.InputError, match="its parameters are"):
         kind(*full, 1.0)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: gmwm.GaussMarkov(1.0, 2.0, 3.0), lambda: gmwm.GaussMarkov(sigma=1.0, size=2.0)]
+)
+def test_a_parameter_too_many_is_refused_with_those_that_there_are(make):
+    with pytest.raises(gmwm.InputError, match=r"its parameters are sigma, tau$"):
+        make()

@@ -50,6 +50,13 @@ def test_ramp_or_walk_names_the_slow_term(tau):
     assert "too slow" in ramp_or_walk(fit, Slope(1e-7, 1e-16)).text
 
 
+@pytest.mark.parametrize(("unit", "shown"), [("V", "V/s or slow"), ("", "u/s or slow")])
+def test_ramp_or_walk_has_the_unit_of_the_samples(unit, shown):
+    x = WhiteNoise(1e-3).simulate(2000, 0.1, 1)
+    fit = gmwm.fit(WhiteNoise(), gmwm.Channel("level", x, 0.1, None, unit))
+    assert shown in ramp_or_walk(fit, Slope(1e-7, 1e-16)).text
+
+
 def test_where_no_candidate_is_supported_the_part_that_is_takes_its_place():
     wv = gmwm.wavelet_variance(
         (WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)).simulate(8192, 1.0, 3), dt=1.0

@@ -263,3 +263,17 @@ def test_a_unit_longer_than_its_file_is_refused_before_the_library_makes_room(ve
     with pytest.raises(gmwm.InputError, match=r"a\.h5 is damaged or cut off"):
         gmwm.read(path, rate=100.0)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 100_000
+
+
+@pytest.mark.parametrize("shape", [(200, 1), (1, 200)])
+def test_a_column_of_two_dimensions_is_a_series(tmp_path, shape):
+    values = np.random.default_rng(2).normal(size=(2, 200))
+    path = tmp_path / "columns.h5"
+    with h5py.File(path, "w") as file:
+        for name, each in zip(("gyro_x", "gyro_y"), values, strict=True):
+            file[name] = each.reshape(shape)
+        file["image"] = np.zeros((200, 1, 200))  # of three dimensions, which is no series
+    found = gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
+    assert found.names == ("gyro_x", "gyro_y")
+    for channel, each in zip(found.channels, values, strict=True):
+        np.testing.assert_array_equal(channel.values, each)
