@@ -6,10 +6,17 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.field.start.heading import compass, course, turned
-from gmwm.ins.field.start.in_motion import velocities
+from gmwm.ins.field.start.in_motion import attitude_in_motion, velocities
 from gmwm.ins.field.start.standing import _scatter, at_rest, positions_of, standstills, steady
 from gmwm.ins.filter import Aiding, Fixes
-from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, offset, rpy_from_matrix
+from gmwm.ins.geometry import (
+    RATE,
+    gravity,
+    matrix_from_rpy,
+    ned_difference,
+    offset,
+    rpy_from_matrix,
+)
 from gmwm.ins.imu import Imu
 
 DT = 0.1
@@ -199,3 +206,18 @@ def test_the_scatter_of_a_window_is_not_that_of_the_quietest(count):
     found = [_scatter(rng.normal(size=(count, 50, 6)), 1.0) for _ in range(40)]
     # Of means of 50 values; the smallest of many variances scatters by less than 15 %.
     assert np.mean(found) == pytest.approx(1.0 / np.sqrt(50.0), rel=0.05)
+
+
+@pytest.mark.parametrize("epoch", [0, 150])
+def test_an_attitude_is_found_from_what_moves_after_its_epoch(epoch):
+    time = DT * np.arange(600)
+    middle = time + 0.5 * DT
+    forward = np.column_stack([np.sin(0.5 * middle), np.cos(0.3 * middle), 0.2 * np.sin(middle)])
+    C = matrix_from_rpy(np.array([0.05, -0.1, 0.7]))
+    force = (forward - [0.0, 0.0, gravity(LLA[0], LLA[2])]) @ C
+    moving = Imu(DT, np.zeros((600, 3)), DT * force)
+    speed = np.vstack([np.zeros(3), np.cumsum(DT * forward, axis=0)])[:600:10]
+    aiding = fixes("velocity", time[::10], speed, 0.05)
+    found, sd = attitude_in_motion(moving, epoch, aiding, LLA, np.zeros(3), 1e-5, 1e-4)
+    np.testing.assert_allclose(found, C, atol=1e-6)
+    assert np.all(sd < tuning.MOTION_SD)
