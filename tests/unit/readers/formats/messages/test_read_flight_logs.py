@@ -226,6 +226,18 @@ def test_dataflash_that_cannot_be_used(tmp_path):
     assert 'units={"accel": "g"}' in refusal(path)
 
 
+def test_a_message_without_fields_is_one(tmp_path):
+    """Of three bytes, the header: taken for damage, they would end what is read."""
+    many = [each for message in imu_messages(X) for each in (message, ("MARK",))]
+    plain, marked = (
+        gmwm.read(write_dataflash(tmp_path / f"{name}.bin", [IMU, ("MARK", "", "")], messages))
+        for name, messages in (("plain", imu_messages(X)), ("marked", many))
+    )
+    assert marked.notices == plain.notices
+    for one, other in zip(marked.channels, plain.channels, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+
+
 def test_fields_of_hundredths(tmp_path):
     form = ("IMU", "QBccccccIIfBBHH", IMU[2])
     messages = [
