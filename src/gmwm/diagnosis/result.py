@@ -186,7 +186,8 @@ class Health(Document, Printed):
                 for start, stop in events:
                     values[start:stop] = np.nan
                 gone = int(np.count_nonzero(np.isnan(values))) - channel.missing
-                text = f"{gone:,} samples of spikes, shocks or lost packets left out"
+                copies = "copies, " if self.of(code="rows-copied") else ""
+                text = f"{gone:,} samples of {copies}spikes, shocks or lost packets left out"
                 notices.append(Notice("events-left-out", "note", name, text, {"samples": gone}))
                 channel = replace(channel, values=values)
             channels.append(channel)

@@ -83,6 +83,9 @@ def test_health_tells_of_copies_and_leaves_them_out():
         "samples": 9_000.0, "count": 1.0, "longest": 90.0, "start": 300.0, "first": 0.0,
     }  # fmt: skip
     assert health.events("gyro_y") == ((30_000, 39_000),)
+    masked = health.masked(recording)
+    assert masked["gyro_x"].missing == 9_000
+    assert masked.notices[-1].text.startswith("9,000 samples of copies, spikes")
 
 
 def test_a_file_that_has_its_beginning_again_is_calibrated_without_it():
