@@ -134,6 +134,9 @@ lost rows have no rhythm. Longer ones are a logger that loses a row with each bl
 RATES_OF_SENSORS = (1.0, 2e4)
 """Hz, beyond which a stated unit of time is more likely wrong than right."""
 
+RATES_OF_SECONDS = (10.0, 5e3)
+"""Hz, the same of stamps that state no unit and are taken as seconds: 4 Hz are rather 4 kHz."""
+
 LEAST_STEP, LARGEST_STEP = 1e-5, 0.5
 """s: steps of a column without a unit that are taken as seconds. No IMU is faster than 100 kHz, and
 a step of 1 is more often a millisecond than a second."""

@@ -58,6 +58,18 @@ def test_a_stated_unit_that_no_sensor_has(name, step):
     assert "rate-unlikely" not in codes(gmwm.read(frame(0.01 * np.arange(N))))
 
 
+@pytest.mark.parametrize(
+    ("name", "step", "said"),
+    [("time", 0.25, True), ("time", 1 / 6000, True), ("time [s]", 0.25, False),
+     ("time", 0.1, False), ("time", 1 / 5000, False)],
+)  # fmt: skip
+def test_a_rate_that_few_sensors_have_by_stamps_without_a_unit(name, step, said):
+    found = [n for n in gmwm.read(frame(step * np.arange(N), name)).notices
+             if n.code == "rate-unlikely"]  # fmt: skip
+    assert bool(found) is said
+    assert not said or (found[0].severity == "warning" and "'time [ms]'" in found[0].action)
+
+
 def test_increments_read_as_accelerations():
     found = gmwm.read(frame(0.01 * np.arange(N), accel=(0.0, 0.0, 0.0981)))
     (notice,) = [each for each in found.notices if each.code == "gravity"]
