@@ -26,7 +26,11 @@ def repetition(channel: Channel) -> Repetition | None:
     if changes.size < tuning.FEWEST_KNOWN:
         return None
     times = int(np.gcd.reduce(np.diff(changes)))
-    return Repetition(times, int(changes[0]) % times) if times > 1 else None
+    # Where the others are missing, as in rows of which every third is empty, nothing was repeated.
+    repeats = np.count_nonzero(steps == 0.0)
+    if times == 1 or 2 * repeats < (times - 1) * changes.size:
+        return None
+    return Repetition(times, int(changes[0]) % times)
 
 
 def thinned(channel: Channel, found: Repetition) -> Channel:

@@ -44,6 +44,13 @@ def test_they_are_seen_beside_missing_rows(record):
     assert gmwm.health(record(accel_x=x)).repetition("accel_x").times == 2
 
 
+@pytest.mark.parametrize("measured", [(1, 1, 0), (1, 1, 0, 0, 0), (1, 1, 1, 0, 1, 0)])
+def test_rows_that_are_empty_are_not_repeats(record, measured):
+    x = held(1, 20_000)
+    x[~np.resize(np.array(measured, bool), x.size)] = np.nan
+    assert gmwm.health(record(accel_x=x)).repetition("accel_x") is None
+
+
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0])
 def test_samples_that_are_not_repeated(record, step):
     for seed in range(10):
