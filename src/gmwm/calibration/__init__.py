@@ -21,3 +21,4 @@ from gmwm.calibration.summary import (
     sentence as sentence,
     white_density as white_density,
 )
+from gmwm.calibration.unresolved import left_open as left_open

@@ -8,6 +8,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import brief
 from gmwm._core.units import field_units
 from gmwm.calibration import tuning
+from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.summary import random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
@@ -41,16 +42,28 @@ def with_largest_walk(fitted: Fit) -> Model | None:
 def unresolved_notice(name: str, fitted: Fit, largest: Model) -> Notice:
     """Say how large the walk and its effect may be."""
     walk, tau = largest.params["K"] or 0.0, _time(fitted)
-    unit, per_si = f"({fitted.wv.unit or 'u'})/s/sqrt(Hz)", 1.0
-    if known := field_units("u/s/sqrt(Hz)", fitted.wv.quantity):
-        unit, per_si = known[0].unit, known[0].per_si
+    value, unit = _shown(walk, fitted)
     growth = _growth(fitted, largest)
     text = (
-        f"the record leaves open a random walk of up to K = {walk * per_si:.2g} {unit} (95 %): "
+        f"the record leaves open a random walk of up to K = {value:.2g} {unit} (95 %): "
         f"with it the deviation at {tau:.4g} s is {brief(growth)} times that of the model"
     )
     values = {"K": walk, "tau": tau, "growth": growth}
     return Notice(UNRESOLVED, "note", name, text, values, "only a longer record can tell")
+
+
+def left_open(calibration: Calibration) -> dict[str, tuple[float, str]]:
+    """By channel whose model has no walk, the largest K that the record leaves open; its unit."""
+    told = (notice for notice in calibration.notices if notice.code == UNRESOLVED)
+    return {each.where: _shown(each.values["K"], calibration[each.where]) for each in told}
+
+
+def _shown(walk: float, fitted: Fit) -> tuple[float, str]:
+    """A K in the unit of the field, SI where there is none."""
+    known = field_units("u/s/sqrt(Hz)", fitted.wv.quantity)
+    if not known:
+        return walk, f"({fitted.wv.unit or 'u'})/s/sqrt(Hz)"
+    return walk * known[0].per_si, known[0].unit
 
 
 def _time(fitted: Fit) -> float:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration, Stopwatch
+    from gmwm.estimate.result import Estimate
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -271,26 +272,31 @@ def _is_shown(notice: Notice) -> bool:
 
 
 def _table(result: Calibration) -> Table:
+    from gmwm.calibration import left_open
+
+    walks = left_open(result)
     table = new_table("channel", "parameter", ">estimate", "95 % interval", "unit")
     for name, fit in result.fits.items():
-        rows = fit.estimates
-        for i, row in enumerate(rows):
-            usual = row.usual
-            cells = [name if i == 0 else "", row.key]
-            if row.kind == "bound":
-                cells += [f"{usual.value:.4g}", f"below {usual.upper:.4g}", usual.unit]
-            elif row.kind == "estimated":
-                interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
-                cells += [f"{usual.value:.4g}", interval, usual.unit]
-            else:
-                cells += [f"{usual.value:.4g}", row.kind, usual.unit]
-            if i == 1 and not fit.valid:
-                cells[0] = "not valid"
-            last = i == len(rows) - 1
-            table.add_row(*cells, end_section=last and (fit.valid or i > 0))
-        if len(rows) == 1 and not fit.valid:
-            table.add_row("not valid", "", "", "", "", end_section=True)
+        rows = [_cells(row) for row in fit.estimates]
+        if name in walks:  # which the model lacks, and the filter's numbers have
+            value, unit = walks[name]
+            rows.append(("K", "0", f"below {value:.4g}", unit))
+        if not fit.valid and len(rows) == 1:
+            rows.append(("", "", "", ""))
+        firsts = (name, "" if fit.valid else "not valid", *[""] * len(rows))
+        for i, (first, row) in enumerate(zip(firsts, rows, strict=False)):
+            table.add_row(first, *row, end_section=i == len(rows) - 1)
     return table
+
+
+def _cells(row: Estimate) -> tuple[str, str, str, str]:
+    usual = row.usual
+    interval: str = row.kind
+    if row.kind == "bound":
+        interval = f"below {usual.upper:.4g}"
+    elif row.kind == "estimated":
+        interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
+    return row.key, f"{usual.value:.4g}", interval, usual.unit
 
 
 def _command() -> str:
