@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.errors import InputError
@@ -64,6 +65,13 @@ def outlying(aiding, rows, size):
     by = np.zeros_like(position.value)
     by[rows, 1] = size
     return replace(aiding, fixes=(replace(position, value=position.moved(by)),))
+
+
+def test_those_are_rejected_whose_squares_are_beyond_their_quantile(drive, fixes):
+    gated = navigate(drive[1], drive[0].state(0), SENSORS, replace(fixes, gate=0.1)).innovations
+    squares = np.sum((gated.value / gated.sd) ** 2, axis=1)
+    np.testing.assert_array_equal(gated.used, squares <= chi2.ppf(0.9, 3))
+    assert 4 < np.count_nonzero(~gated.used) < 30  # of 150
 
 
 def test_an_outlier_is_rejected_and_leaves_the_solution_as_without_it(drive, fixes):
