@@ -51,6 +51,9 @@ OPERATORS = re.compile(
     "ReplaceTrueWithFalse|ReplaceFalseWithTrue|ReplaceAndWithOr|ReplaceOrWithAnd|ZeroIteration"
 )
 
+_NO_TESTS = (4, 5)
+"""Codes of pytest."""
+
 
 @dataclass(frozen=True)
 class Mutant:
@@ -116,11 +119,14 @@ def drawn(tree: Path, count: int, seed: int, rooms: Sequence[str] = ROOMS) -> li
     return chosen
 
 
-def tested(tree: Path, tests: Sequence[str], loops: Path, longest: float) -> bool | None:
-    """Whether the tests pass in a fork of this process; None if none ended in time.
+def tested(
+    tree: Path, tests: Sequence[str], loops: Path, longest: float, *options: str
+) -> int | None:
+    """How the tests end in a fork of this process, by pytest's code; None if they take too long.
 
     loops: Folder of what is compiled.
     longest: s.
+    options: More of pytest.
     """
     if (child := os.fork()) == 0:
         status = 3
@@ -133,8 +139,8 @@ def tested(tree: Path, tests: Sequence[str], loops: Path, longest: float) -> boo
             os.chdir(tree)
             for stream in (1, 2):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-            options = ("-x", "-q", "-p", "no:cacheprovider", "-o", "addopts=-m 'not slow'")
-            status = int(pytest.main([*options, *tests]))
+            always = ("-x", "-q", "-p", "no:cacheprovider", "-o", "addopts=-m 'not slow'")
+            status = int(pytest.main([*always, *options, *tests]))
         finally:
             os._exit(status)
     end, ended, status = time.monotonic() + longest, 0, 0
@@ -146,8 +152,7 @@ def tested(tree: Path, tests: Sequence[str], loops: Path, longest: float) -> boo
     if not ended:
         os.waitpid(child, 0)
         return None
-    code = os.waitstatus_to_exitcode(status)
-    return None if code in (4, 5) else code == 0  # these two: no test was run
+    return os.waitstatus_to_exitcode(status)
 
 
 def traced(tree: Path, folder: Path) -> CoverageData:
@@ -191,15 +196,20 @@ def survives(mutant: Mutant, tree: Path, tests: Sequence[str], longest: float) -
     file = tree / mutant.path
     source, stamps = file.read_text(), file.stat()
     changed = mutate_code(source, get_operator(mutant.operator)(), mutant.occurrence)
+    loops = tree.parent / "loops"
     try:
         file.write_text(changed)
         if "@compiled" not in source:
-            return tested(tree, tests, tree.parent / "loops", longest)
-        with TemporaryDirectory() as loops:  # what is compiled of the change is not kept
-            return tested(tree, tests, Path(loops), longest)
+            code = tested(tree, tests, loops, longest)
+        else:
+            with TemporaryDirectory() as own:  # what is compiled of the change is not kept
+                code = tested(tree, tests, Path(own), longest)
     finally:
         file.write_text(source)
         os.utime(file, ns=(stamps.st_atime_ns, stamps.st_mtime_ns))
+    if code in _NO_TESTS:  # a failure, too, if without the change there are some
+        return None if tested(tree, tests, loops, longest, "--collect-only") else False
+    return None if code is None else code == 0
 
 
 def main() -> None:
