@@ -222,6 +222,7 @@ def main() -> None:
     parser.add_argument("--longest", type=float, default=240.0, help=longest)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that a change is taken back
     folder = options.output.resolve()
     tree = folder / "tree"
     if not tree.exists():
