@@ -27,7 +27,7 @@ def test_a_value_goes_to_the_real_line_and_back(parameter, value, free):
     ("parameter", "low", "high"),
     [(of(0.0, unit="s"), 0.005, 10.0), (of(0.5, 3.0, "s"), 0.5, 3.0),
      (of(0.0, unit="Hz"), 0.1, 50.0), (of(1.0, 20.0, "Hz"), 1.0, 20.0), (of(0.0), 1.0, 1e3),
-     (of(5.0), 5.0, 5e3), (of(0.2), 0.2, 1e3)],
+     (of(5.0), 5.0, 5e3), (of(0.2), 0.2, 1e3), (of(0.2, unit="u/s"), 0.2, 1e3)],
 )  # fmt: skip
 def test_a_grid_reaches_over_what_a_record_shows(parameter, low, high):
     ratio = (high / low) ** (1.0 / 9.0)
