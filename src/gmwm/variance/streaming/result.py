@@ -27,7 +27,7 @@ def variance_of(series: Series, channel: Channel, confidence: float) -> WaveletV
         raise InputError(f"{where} has {there} samples: {MIN_SAMPLES} or more are needed")
     low = series.lowest
     check_varies(Channel(channel.name, np.array([low, low + series.spread]), channel.dt))
-    done = series.finished()
+    done = series.finished(goes_on=False)
     windows, mean, square, scarcity = done.level_sums()
     size = min(int(np.sum(np.cumprod(windows > 0.0))), dyadic_levels(series.n).size)
     if not size:

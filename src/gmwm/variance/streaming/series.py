@@ -22,6 +22,7 @@ from gmwm.variance.streaming.kernels import (
     MOST_BLOCKS,
     NEXT_BLOCK,
     OCTAVE,
+    OLD,
     ORIGIN,
     ROOM,
     RUN,
@@ -78,13 +79,14 @@ class Series:
         "data", "present", "state", "sums", "head", "blocks", "totals", "tallies", "gaps", "marks",
     )  # fmt: skip
 
-    def __init__(self, start: int = 0):
-        self.data = np.zeros((_ROWS, ROOM))
-        self.present = np.zeros((_ROWS, ROOM))
+    def __init__(self, start: int = 0, room: int = ROOM):
+        # What the state does not count is never read.
+        self.data = np.empty((_ROWS, room))
+        self.present = np.empty((_ROWS, room))
         self.state = np.zeros((_ROWS, 5), dtype=np.int64)
         self.state[0, ORIGIN] = start
         self.sums = np.zeros((_LEVELS, 6))
-        self.head = np.zeros((2, _ROWS, HALO))
+        self.head = np.empty((2, _ROWS, HALO))
         self.blocks = np.zeros((2, MOST_BLOCKS))
         self.totals = np.zeros(7)
         self.totals[[REFERENCE, LOWEST, HIGHEST]] = np.nan, np.inf, -np.inf
@@ -93,21 +95,26 @@ class Series:
         self.gaps = np.zeros((63, 2), dtype=np.int64)
         self.marks = np.full((SLOTS, 1 + PLACES), np.nan)
         self.marks[:, 0] = 0.0, -1.0, -1.0, -1.0
-        self._scratch = np.zeros((2, ROOM + 1))
+        self._scratch = np.empty((2, room + 1))
 
     def absorb(self, samples: FloatArray) -> None:
         """Take in samples (n,), NaN where one is missing, none infinite."""
         kernels.absorb(samples, *(getattr(self, name) for name in self._ARRAYS), self._scratch)
 
-    def finished(self) -> Self:
-        """A copy of which all samples are worked off."""
-        made = type(self)()
+    def finished(self, *, goes_on: bool = True) -> Self:
+        """A copy of which all samples are worked off.
+
+        goes_on: Whether it can take in more or be joined; otherwise it only tells what was found,
+            in less memory and time.
+        """
+        made = type(self)(room=ROOM if goes_on else self._room_to_finish())
         for name in ("state", "sums", "totals", "tallies", "gaps", "marks"):
             getattr(made, name)[...] = getattr(self, name)
         made.blocks[:, : self.tallies[BLOCKS]] = self.blocks[:, : self.tallies[BLOCKS]]
         for row, (filled, headed, gappy) in enumerate(self.state[:, [FILLED, HEADED, GAPPY]]):
             made.data[row, :filled] = self.data[row, :filled]
-            made.head[:, row, :headed] = self.head[:, row, :headed]
+            if goes_on:
+                made.head[:, row, :headed] = self.head[:, row, :headed]
             if gappy:
                 made.present[row, :filled] = self.present[row, :filled]
         kernels.work_off(
@@ -115,6 +122,15 @@ class Series:
             made.tallies, made.marks, made._scratch,
         )  # fmt: skip
         return made
+
+    def _room_to_finish(self) -> int:
+        """Most values of a row while all are worked off: of the new ones, half go to the next."""
+        room = new = 0
+        for filled, old in self.state[:, [FILLED, OLD]].tolist():
+            passed_on = new // 2 + 1
+            room = max(room, filled + passed_on)
+            new = filled - old + passed_on
+        return room
 
     # -- what was found ----------------------------------------------------------------------------
 
@@ -245,9 +261,10 @@ class Series:
         if np.isnan(shift):
             return
         self.totals[REFERENCE] = other.totals[REFERENCE]
-        rows = int(np.sum(self.state[:, FILLED] > 0))
-        for array in (self.data[:rows], self.head[0, :rows], self.blocks[0]):
-            array += shift
+        for row, (filled, headed) in enumerate(self.state[:, [FILLED, HEADED]]):
+            self.data[row, :filled] += shift
+            self.head[0, row, :headed] += shift
+        self.blocks[0] += shift
         self.totals[[LOWEST, HIGHEST]] += shift
         self.marks[:, 1:] += shift * (self.marks[:, :1] + offsets() - self.start)
         self.totals[SUM] += shift * (self.n - self.missing)
@@ -363,8 +380,14 @@ class Series:
         """Everything that goes on from here, as arrays by name."""
         rows = int(np.sum(self.state[:, FILLED] > 0))
         found = {name: getattr(self, name) for name in self._ARRAYS}
-        found["data"], found["present"] = self.data[:rows], self.present[:rows]
-        found["head"] = self.head[:, :rows]
+        found["data"], found["present"], found["head"] = (
+            np.where(np.arange(each.shape[-1]) < count[:rows, None], each, 0.0)
+            for each, count in (
+                (self.data[:rows], self.state[:, FILLED]),
+                (self.present[:rows], self.state[:, FILLED] * self.state[:, GAPPY]),
+                (self.head[:, :rows], self.state[:, HEADED]),
+            )
+        )
         found["blocks"] = self.blocks[:, : self.tallies[BLOCKS]]
         return found
 

@@ -383,6 +383,26 @@ def test_a_sum_keeps_what_larger_numbers_would_swallow():
     assert total.sum() == 2.0
 
 
+def test_memory_that_was_never_written_is_never_used(monkeypatch):
+    """Whatever is in it: a signalling NaN warns where anything is added to it."""
+    empty, signalling = np.empty, np.array(0x7FF0000000000001, dtype=np.uint64)
+
+    def spoilt(shape, dtype=float):
+        found = empty(shape, dtype)
+        found.view(np.uint64)[...] = signalling
+        return found
+
+    x = noise(30_000, 3, offset=5.0)
+    x[4000:4003] = np.nan
+    expected = streamed(x)
+    monkeypatch.setattr("gmwm.variance.streaming.series.np.empty", spoilt)
+    one, two = streamed(x[:9001]), streamed(x[9001:], start=9001)
+    merged = one.merge(two)
+    assert_same(merged.result(), expected.result(), rtol=1e-11)
+    stored = merged._series[0].arrays().values()
+    assert all(np.all(np.isfinite(each)) for each in stored if each.shape[-1] > 4000)
+
+
 def test_parts_of_every_length_are_joined_about_one_reference():
     """Also where a row of the second holds a single value: it stayed about its own reference."""
     x = noise(9000, 12, offset=5.0)
