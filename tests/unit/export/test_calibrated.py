@@ -14,6 +14,7 @@ import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.notices import Notice
 from gmwm.export import TARGETS
+from gmwm.export.found import axis_of
 from gmwm.process import as_model
 from imu_numbers import numbers
 
@@ -475,6 +476,17 @@ def test_consistency_is_that_of_the_upper_bound_where_the_file_holds_one(calibra
     # More walk than none is more cautious.
     without = bound(calibration["accel_x"], "N+K", 1.0).nees.values()
     assert all(float(cell) < nees for cell, nees in zip(row[-2:], without, strict=True))
+
+
+@pytest.mark.parametrize("tau", [None, 7.0])
+def test_a_slow_process_that_was_not_found_rises_as_the_largest_walk_does(calibration, tau):
+    fit = calibration["accel_x"]
+    axis = axis_of("accel_x", bound(fit, "N+GM", 60.0), 100.0, fit, tau)
+    assert (axis.tau, axis.upper) == (tau or 60.0, {"sigma"})
+    walk = gmwm.calibration.random_walk(fit).value
+    high = np.array([1.0])
+    ratio = GaussMarkov(axis.sigma, axis.tau).psd(high, 1e-6) / RandomWalk(walk).psd(high, 1e-6)
+    assert ratio == pytest.approx(1.0, abs=1e-3)
 
 
 def test_all_comments_are_at_most_80_columns_wide(slow):
