@@ -12,6 +12,7 @@ from gmwm import GaussMarkov, InputError, RandomWalk, RateRamp, Recording, White
 from gmwm.calibration import Departure, departures
 from gmwm.calibration.stationarity.departure_notices import (
     _found_notices,
+    _is_between_two_levels,
     _taken_notices,
     departure_notice,
 )
@@ -72,7 +73,10 @@ def test_other_departures_are_found(kind, curve, time):
     assert found.kind == kind
     assert found.is_evident
     assert found.time[1] < time < found.time[2] or abs(found.time[0] / time - 1.0) < 0.15
-    assert found.size[0] == pytest.approx(SAMPLE, rel=0.2)
+    value, low, high = found.size
+    assert value == pytest.approx(SAMPLE, rel=0.2)
+    assert abs(value - SAMPLE) < 1.7 * 0.5 * (high - low)
+    assert value == pytest.approx(0.5 * (low + high))
     assert found.share > 0.5
 
 
@@ -430,6 +434,22 @@ def test_steps_follow_each_other_by_their_likeliest_times():
         [*steps, *[step(1e3 + k, 2e3, 1.0) for k in range(2)]], "u", removing=False
     )
     assert notices[0].code == "departures-many"
+
+
+@pytest.mark.parametrize(("error", "between"), [(0.05, True), (0.2, False)])
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_three_steps_of_sizes_that_are_hardly_known_are_not_two_levels(unit, error, between):
+    steps = [
+        Departure(
+            "step",
+            (1e3 * k,) * 3,
+            tuple(unit * (s + 1.96 * error * z) for z in (0, -1, 1)),
+            1e3,
+            0.5,
+        )
+        for k, s in enumerate((1.0, -1.0, 1.0), 1)
+    ]
+    assert _is_between_two_levels(steps) is between
 
 
 def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
