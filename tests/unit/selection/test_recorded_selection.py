@@ -149,6 +149,20 @@ def test_choices_among_made_up_fits(monkeypatch):
     assert_as_recorded("selection/choices", found)
 
 
+@pytest.mark.parametrize(
+    ("excluded", "place"), [((True, True, True), 0), ((True, False, False), 1), ((False, True), 0)]
+)
+def test_where_nothing_is_supported_the_first_is_chosen_that_data_do_not_exclude(
+    monkeypatch, excluded, place
+):
+    fits = iter(SimpleNamespace(goodness=SimpleNamespace(is_excluded=each)) for each in excluded)
+    monkeypatch.setattr(module, "_fitted", lambda model, wv: next(fits))
+    monkeypatch.setattr(module, "_is_acceptable", lambda fit: False)
+    monkeypatch.setattr(module, "_supported_part", lambda *_: None)
+    ranking = [Candidate(model, 100.0 * k, 1.0, 1.0, 1, 3) for k, model in enumerate(MODELS)]
+    assert module._chosen(ranking[: len(excluded)], None)[0] is ranking[place]
+
+
 def test_parts_of_choices():
     found = {}
     model = WhiteNoise(1.0) + GaussMarkov(2.0, 30.0) + GaussMarkov(1.0, 300.0)
