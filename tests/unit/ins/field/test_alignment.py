@@ -6,6 +6,7 @@ import pytest
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins import tuning
 from gmwm.ins.field.start import align
+from gmwm.ins.field.start.heading import course
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, ned_difference, offset
 from gmwm.ins.imu import Imu, SensorModels
@@ -124,3 +125,18 @@ def test_heading_from_the_course():
         assert start.gyro_bias_sd is None
         errors.append(turned(start.state.rpy[2] - heading) / start.sd.heading)
     near_one(errors)
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity"])
+def test_a_course_before_the_start_does_not_count(kind):
+    """East for ten seconds, then north: from the start on it is north."""
+    east = np.minimum(TIMES, 10.0)
+    moved = np.stack([8.0 * (TIMES - east), 8.0 * east, np.zeros(TIMES.size)], axis=1)
+    value = offset(np.tile(LLA, (TIMES.size, 1)), moved)
+    if kind == "velocity":
+        value = np.where(TIMES[:, None] <= 10.0, [0.0, 8.0, 0.0], [8.0, 0.0, 0.0])
+    aiding = Aiding((Fixes(kind, TIMES, value, np.full(value.shape, 0.1)),))
+    imu = steady(np.zeros((N, 6)), np.zeros(3))
+    for epoch, expected in ((0, 0.5 * np.pi), (round(11.0 / DT), 0.0)):
+        found = course(imu, aiding, np.zeros(3), np.eye(3), epoch, 0.0)
+        assert found[0] == pytest.approx(expected, abs=1e-3)
