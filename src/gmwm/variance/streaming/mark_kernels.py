@@ -9,9 +9,12 @@ powers of two are all that they need.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from gmwm._core.compiled import compiled
+from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.variance import tuning
 from gmwm.variance.streaming.window_kernels import total
@@ -22,11 +25,13 @@ SLOTS = 4  # 0 and three powers of two
 _NEVER = 1 << 62
 
 
+@cache
 def offsets() -> IntArray:
     """Places after a mark: the first ones all, and then so many of each octave."""
     octaves = np.arange(tuning.STREAMING_OCTAVES)[:, None]
     rest = (np.arange(_DENSE) + _DENSE) << octaves + 1
-    return np.concatenate([np.arange(2 * _DENSE), rest.ravel()])
+    found: IntArray = frozen(np.concatenate([np.arange(2 * _DENSE), rest.ravel()]))
+    return found
 
 
 @compiled()

@@ -207,8 +207,7 @@ class Series:
         count = self.n - 2 * m + 1
         if self.start or self.missing or m <= tuning.STREAMING_STARTS:
             return mean, square
-        begins = offsets()
-        begins = begins[begins < count]
+        begins = offsets()[: int(np.searchsorted(offsets(), count))]
         sums = [self._sums_after(at)[: begins.size] for at in (0, m, 2 * m)]
         windows = (sums[2] - 2.0 * sums[1] + sums[0]) * (0.5 / m)
         if not np.all(np.isfinite(windows)):
@@ -230,8 +229,8 @@ class Series:
 
     def _sums_after(self, at: int) -> FloatArray:
         """Sums before the places after a mark; NaN where they are not known."""
-        slot = np.flatnonzero(self.marks[:, 0] == at)
-        return self.marks[slot[0], 1:] if slot.size else np.full(PLACES, np.nan)
+        places = self.marks[:, 0].tolist()
+        return self.marks[places.index(at), 1:] if at in places else np.full(PLACES, np.nan)
 
     # -- parts -------------------------------------------------------------------------------------
 
