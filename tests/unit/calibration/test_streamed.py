@@ -2,6 +2,7 @@
 
 import json
 import re
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -54,6 +55,22 @@ def spoilt(tmp_path_factory):
 
 
 READING = {"rate": 100, "units": UNITS, "channels": {"gyro_x": 0, "gyro_y": 1}, "rows": 20_000}
+
+
+@pytest.mark.parametrize("reading", [gmwm.stream, gmwm.health_stream])
+def test_memory_does_not_grow_with_the_file(reading, tmp_path):
+    def peak(stretches):
+        rng = np.random.default_rng(3)
+        np.save(tmp_path / "long.npy", rng.normal(size=(stretches * 10_000, 2)) * 1e-3)
+        tracemalloc.start()
+        try:
+            reading(tmp_path / "long.npy", **(READING | {"rows": 10_000}))
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(2)  # what is loaded and compiled stays
+    assert peak(40) < peak(4) + 2**19  # the longer file has 5.8 MB more
 
 
 def test_shocks_and_lines_are_found_stretch_by_stretch(spoilt):
