@@ -56,6 +56,15 @@ def test_rows_of_a_burst_in_which_the_clock_is_set(burst, extent, later, follow)
     assert _rows_that_follow(stamps, same, burst, extent).tolist() == follow
 
 
+@pytest.mark.parametrize(
+    ("first", "follow"), [(2, [3, 2, 1, 0, 3, 2, 1, 0]), (3, [2, 1, 0, 1, 0, 3, 2, 1, 0])]
+)
+def test_a_clock_that_is_set_within_the_first_burst(first, follow):
+    stamps = np.repeat([0.0, -5.0, 4.0], [first, 2, 4])
+    same = np.zeros(stamps.size, dtype=bool)
+    assert _rows_that_follow(stamps, same, 4, 10).tolist() == follow
+
+
 @pytest.mark.parametrize("burst", [1, 4])
 def test_the_interval_is_that_of_rows_and_not_of_stamps(burst):
     stamps = np.repeat(0.5 * burst * np.arange(500.0), burst)
