@@ -239,6 +239,19 @@ def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, .
     return tuple(FieldUnit(name, 1.0 / factor(name, si_unit)) for name in names)
 
 
+def customary_unit(parameter_unit: str, quantity: str | None, unit: str) -> tuple[str, float]:
+    """The unit in which the field quotes a parameter, and how many of it one SI unit is.
+
+    parameter_unit: With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
+    quantity: {"gyro", "accel", None}.
+    unit: The channel's own, which is used where the field has none.
+    """
+    known = field_units(parameter_unit, quantity)
+    if known:
+        return known[0].unit, known[0].per_si
+    return parameter_unit.replace("u", unit or "u", 1), 1.0
+
+
 def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]:
     """The unit in which a plot shows a channel, and how many of it one SI unit is.
 

@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import field_units
+from gmwm._core.units import customary_unit
 from gmwm.calibration import tuning
 from gmwm.errors import InputError
 from gmwm.estimate import estimate
@@ -136,10 +136,8 @@ def sentence(fitted: Fit) -> str:
     density, low = white_density(fitted), floor(fitted)
 
     def shown(value: float, unit: str) -> str:
-        known = field_units(unit, fitted.wv.quantity)
-        if known:
-            return f"{value * known[0].per_si:.3g} {known[0].unit}"
-        return f"{value:.3g} {unit.replace('u', fitted.wv.unit, 1)}"
+        label, per_si = customary_unit(unit, fitted.wv.quantity, fitted.wv.unit)
+        return f"{value * per_si:.3g} {label}"
 
     noise = "No white noise"
     if density > 0.0:

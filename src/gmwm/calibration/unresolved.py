@@ -6,7 +6,7 @@ import numpy as np
 
 from gmwm._core.notices import Notice
 from gmwm._core.text import brief
-from gmwm._core.units import field_units
+from gmwm._core.units import customary_unit
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.summary import random_walk
@@ -60,10 +60,8 @@ def left_open(calibration: Calibration) -> dict[str, tuple[float, str]]:
 
 def _shown(walk: float, fitted: Fit) -> tuple[float, str]:
     """A K in the unit of the field, SI where there is none."""
-    known = field_units("u/s/sqrt(Hz)", fitted.wv.quantity)
-    if not known:
-        return walk, f"({fitted.wv.unit or 'u'})/s/sqrt(Hz)"
-    return walk * known[0].per_si, known[0].unit
+    unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
+    return walk * per_si, unit
 
 
 def _time(fitted: Fit) -> float:

@@ -283,9 +283,9 @@ def _table(result: Calibration) -> Table:
             rows.append(("K", "0", f"below {value:.4g}", unit))
         if not fit.valid and len(rows) == 1:
             rows.append(("", "", "", ""))
-        firsts = (name, "" if fit.valid else "not valid", *[""] * len(rows))
-        for i, (first, row) in enumerate(zip(firsts, rows, strict=False)):
-            table.add_row(first, *row, end_section=i == len(rows) - 1)
+        firsts = {0: name, 1: "" if fit.valid else "not valid"}
+        for i, row in enumerate(rows):
+            table.add_row(firsts.get(i, ""), *row, end_section=i == len(rows) - 1)
     return table
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from gmwm._core.notices import Notice
 from gmwm._core.text import brief
-from gmwm._core.units import field_units
+from gmwm._core.units import customary_unit, field_units
 from gmwm.estimate.problem import Slope
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process
@@ -58,9 +58,7 @@ def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
         ("u/s", "R", slope.value),
         ("u/s/sqrt(Hz)", "K", fitted.params.get("K", float("nan"))),
     ):
-        shown = field_units(unit, wv.quantity)
-        plain = unit.replace("u", wv.unit or "u", 1)
-        label, factor = (shown[0].unit, shown[0].per_si) if shown else (plain, 1.0)
+        label, factor = customary_unit(unit, wv.quantity, wv.unit)
         texts.append(f"{name} = {value * factor:.3g} {label}")
     ramp, walk = texts
     if "K" not in fitted.params:

@@ -73,4 +73,4 @@ def test_of_a_channel_without_a_quantity_the_unit_is_that_of_its_samples():
     wv = gmwm.wavelet_variance(WhiteNoise(N).simulate(50_000, 0.01, seed=3), 0.01)
     fit = gmwm.fit(WhiteNoise(), wv)
     largest = with_largest_walk(fit)
-    assert "(u)/s/sqrt(Hz) (95 %)" in unresolved_notice("x", fit, largest).text
+    assert "u/s/sqrt(Hz) (95 %)" in unresolved_notice("x", fit, largest).text

@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import field_units
+from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.process import Model, Process
@@ -100,10 +100,7 @@ def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
         low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
         if not low > 0.0:
             continue  # a term of amplitude zero is no filter of the sensor's
-        units = field_units("u/sqrt(Hz)", wv.quantity)
-        unit, factor = (
-            (units[0].unit, units[0].per_si) if units else (f"{wv.unit or 'u'}/sqrt(Hz)", 1.0)
-        )
+        unit, factor = customary_unit("u/sqrt(Hz)", wv.quantity, wv.unit)
         density = float(np.sqrt(low))
         notices.append(
             Notice(
