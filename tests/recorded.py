@@ -98,7 +98,7 @@ def _plain(found: Any) -> Any:
     """In the types of JSON, numbers to eight digits."""
     if isinstance(found, Notice):
         head = f"{found.severity} {found.code} {found.where}".rstrip()
-        return [head, said(f"{found.text}; {found.action}"), _plain(dict(found.values))]
+        return [head, said(f"{found.text}; {found.hint}"), _plain(dict(found.values))]
     if is_dataclass(found) and not isinstance(found, type):
         found = {each.name: getattr(found, each.name) for each in fields(found)}
     if isinstance(found, Mapping):

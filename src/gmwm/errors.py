@@ -35,7 +35,7 @@ class InputError(ValueError):
         The message.
     code : str, optional
         What kind of thing is wrong, for programs.
-    mend : str, optional
+    hint : str, optional
         How to correct it, where the command line has words of its own; ends the message.
     values : mapping of str to (float or str), optional
         What the words of the command line hold.
@@ -43,17 +43,17 @@ class InputError(ValueError):
     Attributes
     ----------
     problem : str
-        The message without the mend.
+        The message without the hint.
     """
 
     def __init__(
-        self, text: str, code: str = "", mend: str = "", values: Mapping[str, float | str] = _NONE
+        self, text: str, code: str = "", hint: str = "", values: Mapping[str, float | str] = _NONE
     ) -> None:
         self.problem = printable(text)
-        text = f"{self.problem}: {printable(mend)}" if mend else self.problem
+        text = f"{self.problem}: {printable(hint)}" if hint else self.problem
         super().__init__(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
         self.code = code
-        self.mend = mend
+        self.hint = hint
         self.values = dict(values)
 
 

@@ -461,7 +461,7 @@ def assert_refused(code, printed, told, words=()):
     assert told.startswith("gmwm: ")
     assert told.endswith("\n")
     assert told.count("\n") == 1
-    assert ": " in told.removeprefix("gmwm: "), "no mend is given"
+    assert ": " in told.removeprefix("gmwm: "), "no hint is given"
     for word in words:
         assert word in told
 

@@ -361,7 +361,7 @@ class _References(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.found += [
-            value for name, value in attrs if name in ("src", "href", "xlink:href", "action")
+            value for name, value in attrs if name in ("src", "href", "xlink:href", "hint")
         ]
 
 

@@ -27,7 +27,7 @@ def recording():
 def numbers(content):
     """A document without the texts of its notices."""
     if isinstance(content, dict):
-        return {k: numbers(v) for k, v in content.items() if k not in ("text", "action")}
+        return {k: numbers(v) for k, v in content.items() if k not in ("text", "hint")}
     return [numbers(item) for item in content] if isinstance(content, list) else content
 
 
@@ -52,7 +52,7 @@ def reworded(monkeypatch):
 
     def changed(self, code, severity, where, text, *rest, **named):
         original(self, code, severity, where, "Etwas ganz anderes; 3.14 rad/s", *rest, **named)
-        object.__setattr__(self, "action", "" if not self.action else "anders")
+        object.__setattr__(self, "hint", "" if not self.hint else "anders")
 
     monkeypatch.setattr(Notice, "__init__", changed)
 

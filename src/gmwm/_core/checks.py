@@ -51,20 +51,20 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def positive(name: str, value: Any, mend: str = "give a positive number") -> float:
+def positive(name: str, value: Any, hint: str = "give a positive number") -> float:
     """A number above zero.
 
     Raises InputError for anything else; so do all functions of this module.
     """
     if not is_number(value) or not value > 0.0:
-        raise InputError(f"{name} = {shown(value)}: {mend}")
+        raise InputError(f"{name} = {shown(value)}: {hint}")
     return float(value)
 
 
-def whole(name: str, value: Any, least: int, mend: str = "") -> int:
+def whole(name: str, value: Any, least: int, hint: str = "") -> int:
     """A whole number, which may be written as 1e6, not below the least one."""
     if not is_number(value) or value != int(value) or value < least:
-        raise InputError(f"{name} = {shown(value)}: {mend or f'give an integer, {least} or more'}")
+        raise InputError(f"{name} = {shown(value)}: {hint or f'give an integer, {least} or more'}")
     return int(value)
 
 
@@ -93,10 +93,10 @@ def truth(name: str, value: Any) -> bool:
 
 def samples(value: Any, least: int = 1) -> int:
     """A number of samples ``n`` that a computer can hold."""
-    mend = "give a positive integer number of samples"
+    hint = "give a positive integer number of samples"
     if least > 1:
-        mend = f"give an integer number of samples, {least} or more"
-    n = whole("n", value, least, mend)
+        hint = f"give an integer number of samples, {least} or more"
+    n = whole("n", value, least, hint)
     if n > MOST_SAMPLES:
         raise InputError(
             f"n = {shown(value)}: that is too long, give at most {MOST_SAMPLES:,} samples"
@@ -106,11 +106,11 @@ def samples(value: Any, least: int = 1) -> int:
 
 def sampling_interval(value: Any) -> float:
     """A sampling interval ``dt`` that a sensor may have, s."""
-    mend = "give a positive sampling interval in seconds"
-    dt = positive("dt", value, mend)
+    hint = "give a positive sampling interval in seconds"
+    dt = positive("dt", value, hint)
     if not SHORTEST_INTERVAL <= dt <= LONGEST_INTERVAL:
         raise InputError(
-            f"dt = {shown(value)}: {mend}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}"
+            f"dt = {shown(value)}: {hint}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}"
         )
     return dt
 

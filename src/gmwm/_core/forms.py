@@ -101,7 +101,7 @@ class NoticeForm(Form):
     where: Text
     text: Text
     values: dict[Text, bool | int | float | Text | None]
-    action: Text
+    hint: Text
     source: Text
 
 

@@ -26,7 +26,7 @@ class Notice:
     where: The channel, parameter or file that it concerns; empty if it concerns the whole.
     text: The report, with numbers and units, without the place.
     values: The numbers, in SI units, and the names that ``text`` mentions.
-    action: What is done about it, or should be.
+    hint: What is done about it, or should be.
     source: The recording, where there are several.
     """
 
@@ -35,16 +35,16 @@ class Notice:
     where: str
     text: str
     values: Mapping[str, Any] = field(default_factory=dict)
-    action: str = ""
+    hint: str = ""
     source: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("code", "where", "text", "action", "source"):
+        for name in ("code", "where", "text", "hint", "source"):
             object.__setattr__(self, name, printable(getattr(self, name)))
 
     def __str__(self) -> str:
         place = "".join(f"{part}: " for part in (self.source, self.where) if part)
-        return f"{place}{self.text}" + (f" ({self.action})" if self.action else "")
+        return f"{place}{self.text}" + (f" ({self.hint})" if self.hint else "")
 
     @property
     def sentence(self) -> str:
@@ -60,7 +60,7 @@ class Notice:
             "where": self.where,
             "text": self.text,
             "values": {name: _plain(value) for name, value in self.values.items()},
-            "action": self.action,
+            "hint": self.hint,
             "source": self.source,
         }
 
@@ -72,7 +72,7 @@ class Notice:
         """
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {content['severity']!r}")
-        names = ("code", "where", "text", "action", "source")
+        names = ("code", "where", "text", "hint", "source")
         texts = {name: str(content[name]) for name in names}
         values = {
             str(name): float("nan") if value is None else value

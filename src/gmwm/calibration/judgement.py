@@ -63,9 +63,9 @@ def with_one_remedy(
         f"the longest part without the {len(departed)} steps and drifts is {kept:,.0f} s of "
         f"{length:,.0f} s, from {start:.6g} s to {stop:.6g} s"
     )
-    action = "calibrate that part"
+    hint = "calibrate that part"
     if removable:
-        action += ", or subtract them (remove_departures=True)"
+        hint += ", or subtract them (remove_departures=True)"
 
     def together(notice: Notice) -> Notice:
         if notice not in departed:
@@ -74,7 +74,7 @@ def with_one_remedy(
         return replace(
             notice,
             values=values,
-            action="leave it out with the others, or subtract them",
+            hint="leave it out with the others, or subtract them",
         )
 
     alike = {
@@ -83,7 +83,7 @@ def with_one_remedy(
         else replace(each, fit=replace(each.fit, notices=tuple(map(together, each.fit.notices))))
         for name, each in found.items()
     }
-    return alike, [Notice(LONGEST_PART, "note", "", text, values, action)]
+    return alike, [Notice(LONGEST_PART, "note", "", text, values, hint)]
 
 
 _CUT: dict[str, Callable[[Mapping[str, Any]], tuple[float, float]]] = {
@@ -135,5 +135,5 @@ def _of_channel(name: str, issues: Iterable[Notice]) -> list[Notice]:
 
 def _judged(found: ChannelModel, spoiling: Iterable[Notice]) -> ChannelModel:
     """With a fit that is not valid where an issue of its data makes its numbers wrong."""
-    notices = [Notice(e.code, "bad", "", e.text, e.values, e.action) for e in spoiling]
+    notices = [Notice(e.code, "bad", "", e.text, e.values, e.hint) for e in spoiling]
     return replace(found, fit=replace(found.fit, notices=(*notices, *found.fit.notices)))

@@ -44,7 +44,7 @@ class Screened:
     robust: Channels whose wavelet variances are to be robust.
     repeated: Channels of which each sample is written several times, and how often.
     notices: Those of the reader, then what was found, with what is done about it here as
-        ``action``.
+        ``hint``.
     """
 
     recording: Recording
@@ -181,7 +181,7 @@ def with_treatment(
         treated.append(
             replace(
                 notice,
-                action="left out" if is_mended else _done(notice, robust, left_out, taken),
+                hint="left out" if is_mended else _done(notice, robust, left_out, taken),
                 values=_values(notice, left_out, taken),
                 severity="warning" if is_mended else notice.severity,
             )
@@ -225,12 +225,12 @@ def _done(
             return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
         return "kept, as requested"
     if notice.code == "rows-copied":
-        return f"left out; {notice.action}" if left_out else f"kept, as requested; {notice.action}"
+        return f"left out; {notice.hint}" if left_out else f"kept, as requested; {notice.hint}"
     if notice.code in ("dead", "infinite") and "stretches" not in notice.values:
         return "the channel is skipped"
     if notice.code in _ADVICE:
-        return f"left as it is; {notice.action}"
-    return notice.action
+        return f"left as it is; {notice.hint}"
+    return notice.hint
 
 
 def terms_of(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
@@ -261,7 +261,7 @@ def with_outcomes(
     return tuple(
         replace(
             notice,
-            action=_outcome(notice, models[notice.where], offered.get(notice.where, ())),
+            hint=_outcome(notice, models[notice.where], offered.get(notice.where, ())),
         )
         if notice.code in ("line", "resonance") and notice.where in models
         else notice

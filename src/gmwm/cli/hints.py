@@ -42,7 +42,7 @@ HINTS = {
 
 
 def with_hint(error: InputError) -> str:
-    """The message of an error, its mend in the words of the command line."""
+    """The message of an error, its hint in the words of the command line."""
     hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
     usual = {"rate": 100.0, "column": "by its unit", "unit": "g"}
     hint = hint.format(**(usual | error.values))
@@ -50,7 +50,7 @@ def with_hint(error: InputError) -> str:
         return str(error)
     if error.code == "clock":  # to ignore the stamps is right only if nothing else is
         return str(error).replace("give rate= and time=False", f"give e.g. {hint}")
-    if error.mend:
+    if error.hint:
         return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
     return f"{error} (on the command line: {hint})"
 
@@ -71,21 +71,21 @@ def with_option(notice: Notice) -> Notice:
 
     values = notice.values
     if notice.code == "sd-assumed":
-        return replace(notice, action=f"give --{notice.where}-sd")
+        return replace(notice, hint=f"give --{notice.where}-sd")
     if notice.code == "axis-up":
-        action = (
+        hint = (
             "if it is mounted upside down, fine; else give --channel gyro_z=-NAME "
             "--channel accel_z=-NAME, and the same of y if that points left"
         )
-        return replace(notice, action=action)
+        return replace(notice, hint=hint)
     if notice.code in ("not-static", "tilt") and "start" in values:
         start, stop = values["start"], values["stop"]
-        return replace(notice, action=f"{notice.action}; --start {start:.6g} --stop {stop:.6g}")
+        return replace(notice, hint=f"{notice.hint}; --start {start:.6g} --stop {stop:.6g}")
     if notice.code == LONGEST_PART:
         ends = {"start": 0.0, "stop": values["of"]}
         cut = " ".join(f"--{k} {values[k]:.6g}" for k, end in ends.items() if values[k] != end)
-        action = cut + ", or --remove-departures, which subtracts them" * values["removable"]
-        return replace(notice, action=action)
+        hint = cut + ", or --remove-departures, which subtracts them" * values["removable"]
+        return replace(notice, hint=hint)
     if notice.severity == "note" or not values.get("evident") or values.get("together"):
         return notice
     first, last = values["time_lower"], values["time_upper"]
@@ -97,9 +97,7 @@ def with_option(notice: Notice) -> Notice:
     }[notice.code]
     options = [each for each in (cut, "--remove-departures" * values["removable"]) if each]
     if values.get("streamed"):  # read as a whole, they are taken
-        advice = (
-            f"{notice.action}; if there is more memory, --memory GB with {', or '.join(options)}"
-        )
-        return replace(notice, action=advice)
-    advice = ": ".join([notice.action.partition(",")[0], *filter(None, [", or ".join(options)])])
-    return replace(notice, action=advice)
+        advice = f"{notice.hint}; if there is more memory, --memory GB with {', or '.join(options)}"
+        return replace(notice, hint=advice)
+    advice = ": ".join([notice.hint.partition(",")[0], *filter(None, [", or ".join(options)])])
+    return replace(notice, hint=advice)

@@ -252,7 +252,7 @@ def _named_in_messages(file: Path | None) -> Iterator[None]:
         yield
     except InputError as error:
         where = "" if file is None else f"{file}: "
-        raise InputError(f"{where}{error.problem}", error.code, error.mend, error.values) from None
+        raise InputError(f"{where}{error.problem}", error.code, error.hint, error.values) from None
 
 
 def _validate(

@@ -79,7 +79,7 @@ def compare(
         notices += [replace(why, where=name, source=label) for label, why in out.items()]
     shared = [name for name, (fits, _) in members.items() if len(fits) > 1]
     if not shared:
-        why = next((str(replace(n, action="")) for n in notices if n.source), "")
+        why = next((str(replace(n, hint="")) for n in notices if n.source), "")
         raise InputError(
             f"there is nothing to compare: {why or 'they have no channel in common'}; give "
             "recordings of one rate that have a channel in common"
@@ -283,9 +283,9 @@ def _axis(
         codes = [n.code for n in fit.notices if n.severity == "bad"]
         if codes:
             text = f"its own fit is not valid ({', '.join(codes)})"
-            action = "the curve is compared all the same"
+            hint = "the curve is compared all the same"
             values = {"reasons": ", ".join(codes)}
-            notices.append(Notice("fit-not-valid", "note", name, text, values, action, label))
+            notices.append(Notice("fit-not-valid", "note", name, text, values, hint, label))
     own = float("nan")
     if joint and test and test.tau.size:
         own = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))

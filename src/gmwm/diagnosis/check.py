@@ -173,8 +173,8 @@ def _clock(recording: Recording) -> list[Notice]:
         return []
     severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
     text = f"the steps of the time stamps vary by {per_cent(jitter)} rms"
-    action = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
-    return [Notice("clock", severity, "", text, {"jitter": jitter}, action)]
+    hint = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
+    return [Notice("clock", severity, "", text, {"jitter": jitter}, hint)]
 
 
 def _clean(name: str) -> Notice:
@@ -240,7 +240,7 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
     errors = innovations(values, step)
     if errors is None:
         text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
-        short = Notice("length", "warning", name, text, action="record longer")
+        short = Notice("length", "warning", name, text, hint="record longer")
         return _Examined([short], ChannelHealth(lsb=step), None)
     events, outliers, tails = _events(errors, values, step)
     events = motion.joined(events, dt)
@@ -307,7 +307,7 @@ def _unusable(channel: Channel) -> Notice | None:
     if infinite:
         text = f"{infinite:,} infinite samples"
         return Notice(
-            "infinite", "bad", name, text, action="repair them, or set them to NaN for missing"
+            "infinite", "bad", name, text, hint="repair them, or set them to NaN for missing"
         )
     if not channel.is_of_a_sensor:
         text = f"varies by {channel.spread:.1g} {unit}, as no sensor does"

@@ -85,8 +85,8 @@ def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
         f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {brief(ratio)} times "
         "what the fast noise leaves"
     )
-    action = "estimated as random walk or slow Gauss-Markov process"
-    return Notice("drift", "note", name, text, numbers, action)
+    hint = "estimated as random walk or slow Gauss-Markov process"
+    return Notice("drift", "note", name, text, numbers, hint)
 
 
 def reset_notice(signal: Signal, values: FloatArray) -> Notice | None:
@@ -124,9 +124,9 @@ def reset_notice(signal: Signal, values: FloatArray) -> Notice | None:
     if chance * max(groups, 1) > tuning.CHANCE_OF_RESETS:
         return None
     text = f"the level steps at equal times, every {period:.3g} s at least, {times} times"
-    action = "switch off what resets it: slow terms of a model are those of what it leaves"
+    hint = "switch off what resets it: slow terms of a model are those of what it leaves"
     values_of = {"period": period, "times": float(times)}
-    return Notice("resets", "warning", signal.name, text, values_of, action)
+    return Notice("resets", "warning", signal.name, text, values_of, hint)
 
 
 def _most_regular(steps: FloatArray) -> tuple[float, float, int]:
@@ -195,10 +195,10 @@ def variance_notice(
         f"{values['part']:.3g} s, so that its mean is {per_cent(values['excess'])} above "
         "that of the quiet quarter"
     )
-    action = "use a recording, or a part, without what vibrates"
+    hint = "use a recording, or a part, without what vibrates"
     if found is not None:
         text, values = f"{found.text}; {text}", {**found.values, **values}
-    return Notice("variance", "bad", name, text, values, action)
+    return Notice("variance", "bad", name, text, values, hint)
 
 
 def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray) -> Notice | None:
@@ -243,16 +243,16 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
             f"the noise is {per_cent(abs(growth))} "
             f"{'larger' if growth > 0.0 else 'smaller'} in the second half than in the first"
         )
-        action = "the model is an average: use the part that is like the use"
-        return Notice("variance", severity, name, text, numbers, action)
+        hint = "the model is an average: use the part that is like the use"
+        return Notice("variance", severity, name, text, numbers, hint)
     if is_loud:
         start = loudest * errors.values.size // tuning.TENTHS * dt
         text = (
             f"the noise is {per_cent(jump)} larger than usual in the tenth of the record "
             f"that begins at {start:.4g} s"
         )
-        action = "look for people or machines then, and leave it out if it is none of the sensor"
-        return Notice("variance", "warning", name, text, numbers, action)
+        hint = "look for people or machines then, and leave it out if it is none of the sensor"
+        return Notice("variance", "warning", name, text, numbers, hint)
     return None
 
 

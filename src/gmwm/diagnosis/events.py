@@ -142,14 +142,14 @@ def event_notice(
     if 1 < len(events) <= _LISTED + 1:
         others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
         text += f" (others at {', '.join(others)} s)"
-    action = (
+    hint = (
         "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True"
         if harmful
         else "too small to change the variance; Health.masked leaves it out"
     )
     severity: Severity = "warning" if harmful else "note"
     if 2 * samples > known:
-        severity, action = "bad", "look at what is done to them between the sensor and the file"
+        severity, hint = "bad", "look at what is done to them between the sensor and the file"
         text = (
             f"{samples / known:.2g} of the samples differ from what is before them as spikes do: "
             "no noise of a sensor, but values that are held, switched or made otherwise"
@@ -162,7 +162,7 @@ def event_notice(
         "samples": float(samples),
         "variance_share": float(share),
     }
-    return Notice("event", severity, name, text, numbers, action)
+    return Notice("event", severity, name, text, numbers, hint)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

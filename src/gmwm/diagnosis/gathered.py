@@ -44,5 +44,5 @@ def _one(group: list[Notice]) -> Notice:
         "the power supply"
     )
     where = ", ".join(each.where for each in group)
-    actions = dict.fromkeys(each.action for each in group if each.action)
-    return replace(best, where=where, text=text, action="; ".join(actions))
+    actions = dict.fromkeys(each.hint for each in group if each.hint)
+    return replace(best, where=where, text=text, hint="; ".join(actions))

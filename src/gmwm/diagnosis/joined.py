@@ -203,11 +203,11 @@ def _one_of(group: Sequence[_Noticed], stretches: int, rate: float) -> Notice:
         "count", 0.0
     ):
         text += f", {values['count']:,.0f} in all"
-    action = _IN_SOME.get(first.code, worst.notice.action)
+    hint = _IN_SOME.get(first.code, worst.notice.hint)
     if first.code in _AT_REST and "start" in values:
         ends = [start + values.pop(end) for end in ("start", "stop")]
-        action = f"cut a part at rest from the file, such as {ends[0]:.6g} to {ends[1]:.6g} s"
-    return replace(worst.notice, text=f"{text})", values=values, action=action)
+        hint = f"cut a part at rest from the file, such as {ends[0]:.6g} to {ends[1]:.6g} s"
+    return replace(worst.notice, text=f"{text})", values=values, hint=hint)
 
 
 def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:
@@ -225,8 +225,8 @@ def _unsteady(name: str, parts: Sequence[ChannelHealth]) -> Notice | None:
     )
     values = {"ratio": ratio, "excess": excess}
     severity: Severity = "bad" if excess > tuning.UNSTEADY else "warning"
-    action = "use a part without what vibrates"
-    return Notice("variance", severity, name, text, values, action)
+    hint = "use a part without what vibrates"
+    return Notice("variance", severity, name, text, values, hint)
 
 
 def _facts(parts: Sequence[ChannelHealth], starts: Sequence[int]) -> ChannelHealth:

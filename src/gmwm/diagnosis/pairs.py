@@ -77,8 +77,8 @@ def temperature_notices(recording: Recording) -> list[Notice]:
                 f"{thermometer.unit or 'unit'} (correlation {r:.2g})"
             )
             values = {"correlation": r, "slope": slope}
-            action = "compensate for it first, or slow terms of the model will stand for it"
-            notices.append(Notice("temperature", "warning", channel.name, text, values, action))
+            hint = "compensate for it first, or slow terms of the model will stand for it"
+            notices.append(Notice("temperature", "warning", channel.name, text, values, hint))
     return notices
 
 

@@ -157,5 +157,5 @@ def rounding_notice(
         )
     severity: Severity = "note" if ratio > 0.5 else "good"
     share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
-    action = f"counted as white noise: {per_cent(share)} of it"
-    return Notice("rounding", severity, name, text, values, action)
+    hint = f"counted as white noise: {per_cent(share)} of it"
+    return Notice("rounding", severity, name, text, values, hint)

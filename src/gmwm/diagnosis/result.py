@@ -220,7 +220,7 @@ class Health(Document, Printed):
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the notices, one a row; needs pandas."""
-        columns = ("where", "code", "severity", "text", "action", "values")
+        columns = ("where", "code", "severity", "text", "hint", "values")
         return frame((notice.to_dict() for notice in self.notices), columns)
 
     def content(self) -> dict[str, Any]:
@@ -253,6 +253,6 @@ class Health(Document, Printed):
 
 
 def _wrapped(notice: Notice) -> list[str]:
-    """Severity in front, text and action beside it."""
-    text = notice.text + (f"; {notice.action}" if notice.action else "")
+    """Severity in front, text and hint beside it."""
+    text = notice.text + (f"; {notice.hint}" if notice.hint else "")
     return wrapped(text, first=f"  {notice.severity:{_INDENT - 2}}", indent=_INDENT)

@@ -71,8 +71,8 @@ def _gap_notice(where: str, found: Lost) -> Notice:
     if share > tuning.TOO_MUCH_MISSING:
         return Notice("gap", "bad", where, text, values, "too few are left: record again")
     severity: Severity = "warning" if share > tuning.MUCH_MISSING else "note"
-    action = "the wavelet variance bridges short gaps and leaves out what others touch"
-    return Notice("gap", severity, where, text, values, action)
+    hint = "the wavelet variance bridges short gaps and leaves out what others touch"
+    return Notice("gap", severity, where, text, values, hint)
 
 
 def length_notice(n: int, rate: float) -> Notice:
@@ -172,8 +172,8 @@ def stuck_notice(signal: Signal, values: FloatArray, errors: Innovations) -> Not
         f"{numbers['time']:.6g} s on, where rounding explains {longest:,}"
     ).replace("  ", " ")
     severity: Severity = "bad" if share > tuning.MUCH_MISSING else "warning"
-    action = "make such samples missing (NaN) before the fit"
-    return Notice("stuck", severity, signal.name, text, numbers, action)
+    hint = "make such samples missing (NaN) before the fit"
+    return Notice("stuck", severity, signal.name, text, numbers, hint)
 
 
 def _scale_between(errors: Innovations, present: BoolArray, lengths: IntArray) -> float:
@@ -405,8 +405,8 @@ def _cut_to_zero_notice(name: str, values: FloatArray, step: float) -> Notice | 
     )
     values_of = {"value": 0.0, "samples": float(zeros), "share": share}
     severity: Severity = "bad" if share > tuning.MUCH_REPEATED else "warning"
-    action = "round to the nearest step before the conversion to integers"
-    return Notice("value-repeated", severity, name, text, values_of, action)
+    hint = "round to the nearest step before the conversion to integers"
+    return Notice("value-repeated", severity, name, text, values_of, hint)
 
 
 def _slowest_fall(near: int, far: int) -> float:

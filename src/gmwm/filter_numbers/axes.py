@@ -183,8 +183,8 @@ def given_tau(form: str, tau: float | str | None) -> float | str | None:
             f"tau is that of one Gauss-Markov process, the form is {form}: leave tau out, or give "
             "N+GM or N+K+GM"
         )
-    mend = f"give a time in seconds, or {SHARED!r}"
-    return SHARED if tau == SHARED else checks.positive("tau", tau, mend)
+    hint = f"give a time in seconds, or {SHARED!r}"
+    return SHARED if tau == SHARED else checks.positive("tau", tau, hint)
 
 
 def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> Axis:

@@ -202,8 +202,8 @@ def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[No
     text = (
         f"too optimistic: a NEES of {nees:.3g} {when}; what the numbers leave out is not small here"
     )
-    mend = "estimate it as a state, or take it off the data"
-    return (Notice("optimistic", "warning", "", text, {"nees": nees, "time": time}, mend),)
+    hint = "estimate it as a state, or take it off the data"
+    return (Notice("optimistic", "warning", "", text, {"nees": nees, "time": time}, hint),)
 
 
 def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
@@ -216,8 +216,8 @@ def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
     )
     values = {"tightness": found.tightness, "with_state": best.tightness}
     is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
-    mend = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-    return (Notice("loose-form", "note", "", text, values, mend),)
+    hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
+    return (Notice("loose-form", "note", "", text, values, hint),)
 
 
 def stands_for(

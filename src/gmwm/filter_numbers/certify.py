@@ -236,8 +236,8 @@ def _bounded(kind: str, cause: str, horizon: float, memory: float) -> Notice:
 
 def _units(kind: str, factor: float) -> Notice:
     text = f"N in use is {factor:.3g} times that of the error model: it may be in other units"
-    mend = f"give it in {SI_UNIT.get(kind, 'u')}/sqrt(Hz)"
-    return Notice("other-units", "warning", kind, text, {"factor": factor}, mend)
+    hint = f"give it in {SI_UNIT.get(kind, 'u')}/sqrt(Hz)"
+    return Notice("other-units", "warning", kind, text, {"factor": factor}, hint)
 
 
 def _bound(group: tuple[Axis, ...], horizon: float, level: float | None = None) -> FilterNumbers:

@@ -256,11 +256,11 @@ def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...
     text = f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding"
     values = {"nees": worst.nees, "time": worst.time}
     if worst.time > longest:
-        mend = "give that time among the outages if there are such"
-        return (Notice("optimistic", "note", "", f"{text}, for which they are not", values, mend),)
+        hint = "give that time among the outages if there are such"
+        return (Notice("optimistic", "note", "", f"{text}, for which they are not", values, hint),)
     text += "; no such numbers are consistent at all times and on all axes that share them"
-    mend = "use gmwm.bound, a form with more terms, or own numbers of each axis"
-    return (Notice("optimistic", "warning", "", text, values, mend),)
+    hint = "use gmwm.bound, a form with more terms, or own numbers of each axis"
+    return (Notice("optimistic", "warning", "", text, values, hint),)
 
 
 def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:

@@ -395,8 +395,8 @@ def _check_stationary(filters: Wavelet, weights: GainWeights, density: FloatArra
     moments = filters.vanishing_moments
     slope = 2.0 * moments + 1.0 + np.log2(low / above)
     enough = int(np.floor(0.5 * (slope - 1.0 + _MARGIN))) + 1
-    mend = f"use 'db{enough}'" if enough <= 10 else "it is too steep for any wavelet"
+    hint = f"use 'db{enough}'" if enough <= 10 else "it is too steep for any wavelet"
     raise InputError(
         f"the spectrum rises like f^-{slope:.3g} towards zero frequency, too fast for the "
-        f"{moments} vanishing moment{'s'[: moments != 1]} of wavelet {filters.name!r}: {mend}"
+        f"{moments} vanishing moment{'s'[: moments != 1]} of wavelet {filters.name!r}: {hint}"
     )

@@ -106,17 +106,17 @@ def _incomplete(
     text = f"does not give the unit of {' and '.join(first.values())}"
     codes = [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in first]
     examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in first]
-    mend = f"units={{{', '.join(examples)}}}"
+    hint = f"units={{{', '.join(examples)}}}"
     if rate is None:
         it = "it" if len(codes) == 1 else "them"
         return InputError(
-            f"{source} {text}", " ".join(dict.fromkeys(codes)), f"give {it}, e.g. {mend}"
+            f"{source} {text}", " ".join(dict.fromkeys(codes)), f"give {it}, e.g. {hint}"
         )
     # What is advised of a time column ends the advice of the command line.
     codes.insert(len(codes) if rate.code == "time-unit" else 0, rate.code)
-    mend = f"give them, e.g. rate={rate.values['rate']:.6g}, {mend}"
+    hint = f"give them, e.g. rate={rate.values['rate']:.6g}, {hint}"
     codes = list(dict.fromkeys(codes))
-    return InputError(f"{rate.problem}, and it {text}", " ".join(codes), mend, rate.values)
+    return InputError(f"{rate.problem}, and it {text}", " ".join(codes), hint, rate.values)
 
 
 def _notices(

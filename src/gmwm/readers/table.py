@@ -76,8 +76,8 @@ def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
     if is_taken is None:
         raise InputError(f"{source} {what}: get a whole copy")
     if not is_taken:
-        mend = "get a whole copy, or take what is there, damaged=True"
-        raise InputError(f"{source} {what}", "damaged", mend)
+        hint = "get a whole copy, or take what is there, damaged=True"
+        raise InputError(f"{source} {what}", "damaged", hint)
     return Notice("damaged", "warning", "", f"the file {what}; what is there is used")
 
 

@@ -33,7 +33,7 @@ def health(calibration: Calibration) -> dict[str, Any]:
     return {
         "examined": examined,
         "advice": [
-            f"{_begun(n.text)}: {n.action}. "
+            f"{_begun(n.text)}: {n.hint}. "
             + part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
             for n in calibration.notices
             if n.code == LONGEST_PART
@@ -84,7 +84,7 @@ def ambiguity(calibration: Calibration, channel: str) -> list[str]:
     """Which models describe a channel equally well, and what that means for a filter."""
     fit, rivals = calibration[channel], calibration.rivals.get(channel, ())
     return [
-        f"{notice.text} ({notice.action}){_effect(fit, rivals)}"
+        f"{notice.text} ({notice.hint}){_effect(fit, rivals)}"
         for notice in calibration.notices
         if notice.code == AMBIGUITY and notice.where == channel
     ]
@@ -114,8 +114,8 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
             "label": _LABELS.get(notice.severity, notice.severity),
             "where": ", ".join(part for part in (notice.where, notice.source) if part),
             "text": _begun(notice.text),
-            "action": _begun(notice.action),
-            "done": notice.action,
+            "hint": _begun(notice.hint),
+            "done": notice.hint,
         }
         for notice in worst_first(sorted(notices, key=lambda notice: bool(notice.where)))
     ]

@@ -115,9 +115,9 @@ def test_quantity_of():
 def test_unit_of_no_sensor_is_refused_with_the_mend(unit):
     with pytest.raises(InputError) as caught:
         quantity_of(unit)
-    what, _, mend = str(caught.value).partition(": ")
+    what, _, hint = str(caught.value).partition(": ")
     assert repr(unit) in what
-    assert "deg/s" in mend
+    assert "deg/s" in hint
 
 
 def test_quantity_of_an_unknown_unit():

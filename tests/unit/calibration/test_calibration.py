@@ -420,7 +420,7 @@ def refused(path):
     message = str(caught.value)
     assert message.startswith(f"{path}: ")
     assert len(message.splitlines()) == 1
-    assert message.count(": ") >= 2, "no mend is given"
+    assert message.count(": ") >= 2, "no hint is given"
     return message
 
 
@@ -586,7 +586,7 @@ def test_notices_survive_the_file(tmp_path):
     calibration = gmwm.calibrate(noisy_recording(), WhiteNoise())
     assert {found.code for found in calibration.notices} >= {"event", "line", "length"}
     line = next(found for found in calibration.notices if found.code == "line")
-    assert line.action == "not tried as a term of the model"  # which was given
+    assert line.hint == "not tried as a term of the model"  # which was given
     path = calibration.save(tmp_path / "cal.json")
     assert gmwm.load(path).notices == calibration.notices
     content = json.loads(path.read_text())

@@ -175,7 +175,7 @@ def test_screening():
         for c in (("lines",), ("resonances",), ("lines", "resonances"))
     ]
     told = with_treatment(whole.notices, whole, {"gyro_x"}, {"gyro_z"})
-    found["treated"] = [[n.code, n.where, n.action] for n in told]
+    found["treated"] = [[n.code, n.where, n.hint] for n in told]
     found["much"] = first(lambda n: _is_much(((5, 10), (20, 20 + n)), 1000), range(200))
     line = Notice("line", "note", "a", "", {"frequency": 5.0})
     for f in (4.0, 4.89, 4.91, 5.09, 5.11):

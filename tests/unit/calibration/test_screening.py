@@ -42,7 +42,7 @@ def test_what_became_of_a_line(off, near):
     def said(models, *arguments):
         first, second = with_outcomes((line, other), models, *arguments)
         assert second is other
-        return first.action
+        return first.hint
 
     term = "a term of the model, which N and K of a filter leave out"
     assert (said(with_it, {}) == term) is near
@@ -90,11 +90,11 @@ def test_many_shocks_may_be_the_noise_of_the_sensor(pulses, is_told):
     event = [each for each in screened(given).notices if each.code == "event"]
     assert len(event) == (pulses > 0)
     if not is_told:
-        assert all("taken" not in each.values and "noise" not in each.action for each in event)
+        assert all("taken" not in each.values and "noise" not in each.hint for each in event)
         return
     (event,) = event
     m = event.values["taken_at"] * rate
     white = 1e-8 * rate / m
     added = pulses * (height * size / m) ** 2 * m / n
     assert event.values["taken"] == pytest.approx(np.sqrt(1.0 + added / white), rel=0.25)
-    assert f"{event.values['taken']:.2g} times as large" in event.action
+    assert f"{event.values['taken']:.2g} times as large" in event.hint

@@ -104,7 +104,7 @@ def test_a_stream_is_screened_as_a_recording_is(spoilt):
     assert found.is_examined
     assert found.left_out["gyro_x"] == gmwm.health_stream(spoilt, **READING).events("gyro_x")
     (line,) = [n for n in found.notices if n.code == "line" and n.where == "gyro_y"]
-    assert line.action == "a term of the model, which N and K of a filter leave out"
+    assert line.hint == "a term of the model, which N and K of a filter leave out"
     (event,) = [n for n in found.notices if n.code == "event"]
     assert event.values["left_out"]
     # As it is, shocks and lines are in the noise.
@@ -191,8 +191,8 @@ def test_the_part_at_rest_is_one_of_the_record(tmp_path):
     np.save(tmp_path / "moved.npy", x)
     found = gmwm.health_stream(tmp_path / "moved.npy", **READING | {"channels": {"gyro_x": 0}})
     (moved,) = found.of(code="not-static")
-    assert "cut a part at rest from the file" in moved.action
-    start, stop = (float(each) for each in re.findall(r"[\d.]+", moved.action))
+    assert "cut a part at rest from the file" in moved.hint
+    start, stop = (float(each) for each in re.findall(r"[\d.]+", moved.hint))
     assert 470.0 <= start < 480.0
     assert stop == pytest.approx(600.0, abs=0.02)
     assert moved.values["stretch_start"] == 400.0
@@ -237,7 +237,7 @@ def test_what_is_advised_for_a_step_can_be_done_with_a_stream(tmp_path):
     (step,) = [notice for notice in found["gyro_x"].notices if notice.code == "step"]
     before, after = step.values["time_lower"], step.values["time_upper"]
     assert before < 240.0 < after
-    assert step.action == f"cut the file: use what is before {before:.6g} s or after {after:.6g} s"
+    assert step.hint == f"cut the file: use what is before {before:.6g} s or after {after:.6g} s"
     options = [str(path), "--rate", "100", "--gyro-unit", "rad/s", "--model", "N + K"]
     options += ["-o", str(tmp_path / "out"), "--jobs", "1"]
     done = CliRunner().invoke(cli, ["calibrate", *options, "--memory", "0.0005"])

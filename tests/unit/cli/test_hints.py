@@ -61,8 +61,8 @@ def test_rows_in_no_order_are_sorted_before_their_stamps_are_ignored(tmp_path):
      ("axis-up", "accel_z", ["--channel", "--channel"])],
 )  # fmt: skip
 def test_a_notice_of_navigating_has_its_options(code, where, options):
-    action = with_option(Notice(code, "warning", where, "", {}, "do this")).action
-    assert re.findall(r"--[a-z-]+", action) == options
+    hint = with_option(Notice(code, "warning", where, "", {}, "do this")).hint
+    assert re.findall(r"--[a-z-]+", hint) == options
     known = {name for p in cli.commands["navigate"].params for name in p.opts}
     assert known.issuperset(options)
 

@@ -248,7 +248,7 @@ def test_how_coarse_a_step_is_beside_the_noise(scatter, severity):
     assert found.values == pytest.approx({"lsb": 1.0, "noise": scatter})
     if scatter > 1.0:
         share = per_cent(1.0 / 12.0 / (scatter**2 + 1.0 / 12.0))
-        assert found.action == f"counted as white noise: {share} of it"
+        assert found.hint == f"counted as white noise: {share} of it"
     assert rounding_notice(Signal("gyro_x", "rad/s", scatter=1.0)) is None
 
 

@@ -420,7 +420,7 @@ def test_a_loose_form_names_the_one_that_is_worth_its_state():
     truth = {"accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
     plain, tight = (gmwm.bound(truth, form)["accel_x"] for form in ("N+K", "N+K+GM"))
     (notice,) = (n for n in plain.notices if n.code == "loose-form")
-    assert notice.action
+    assert notice.hint
     assert notice.values["tightness"] == plain.tightness[60.0] > 1.2
     assert notice.values["with_state"] == pytest.approx(tight.tightness[60.0], abs=1e-6)
     short = gmwm.bound(truth, horizon=1.0)["accel_x"]
@@ -576,7 +576,7 @@ def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
     found = gmwm.bound(ONE + slow, "N+K", 60.0)
     # No form is better; what this one costs is there to read all the same.
     notice, why = found.notices
-    assert (notice.code, notice.action) == ("loose-form", "")
+    assert (notice.code, notice.hint) == ("loose-form", "")
     assert (why.code, list(why.values)) == ("more-than-random-walk", ["resonance"])
     assert notice.values["tightness"] == found.tightness[60.0] > 1.2
     assert notice.values["with_state"] > 1.2

@@ -111,7 +111,7 @@ def test_a_gyro_in_another_unit_is_suspected(write, true, read_as, quality, is_g
     (found,) = notices(read(path, rate=100.0, units=units))
     assert (found.code, found.severity) == ("gyro-unit", "warning")
     # Of milli-degrees per second and degrees per hour there is a factor of 3.6 between.
-    assert true in found.action
+    assert true in found.hint
     assert factor(found.values["likely"], true) == pytest.approx(1.0, abs=0.75)
 
 
@@ -132,7 +132,7 @@ def test_a_cheap_gyro_in_degrees_per_hour_is_too_good(write, true, quality, said
     rows = in_units(imu(**quality), true, "g")
     (found,) = notices(read(write(rows, header("deg/h", "g")), rate=100.0))
     assert (found.code, found.severity) == ("gyro-unit", "warning")
-    assert said in found.text and true in found.action
+    assert said in found.text and true in found.hint
 
 
 def test_a_navigation_gyro_of_one_axis_or_without_its_mean_is_right(write):
@@ -156,7 +156,7 @@ def test_a_rate_that_no_unit_explains(write):
 def test_fewer_axes_have_noise_as_well(write, axes):
     path = write(in_units(imu(), "mdeg/s", "g")[:, :axes], header("deg/s", "g", NAMES[:axes]))
     (found,) = notices(read(path, rate=100.0))
-    assert found.code == "gyro-unit" and "mdeg/s" in found.action
+    assert found.code == "gyro-unit" and "mdeg/s" in found.hint
 
 
 def counted(rows, gyro, accel):

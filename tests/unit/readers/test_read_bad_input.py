@@ -1,4 +1,4 @@
-"""What cannot be used is refused in one sentence: what, where, and the mend."""
+"""What cannot be used is refused in one sentence: what, where, and the hint."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ def test_stamps_in_no_order_are_refused(recorded, seed):
     with pytest.raises(InputError, match=r"goes back, and .* no even clock fits") as caught:
         recorded(clock)
     assert caught.value.code == "clock"
-    assert "sort the rows" in caught.value.mend
+    assert "sort the rows" in caught.value.hint
 
 
 def test_a_stopped_clock_is_refused(recorded):

@@ -67,7 +67,7 @@ def test_a_rate_that_few_sensors_have_by_stamps_without_a_unit(name, step, said)
     found = [n for n in gmwm.read(frame(step * np.arange(N), name)).notices
              if n.code == "rate-unlikely"]  # fmt: skip
     assert bool(found) is said
-    assert not said or (found[0].severity == "warning" and "'time [ms]'" in found[0].action)
+    assert not said or (found[0].severity == "warning" and "'time [ms]'" in found[0].hint)
 
 
 def test_increments_read_as_accelerations():

@@ -56,7 +56,7 @@ def test_gravity_in_another_unit_to_a_tenth(unit, off):
     assert found.code == "gravity" and found.severity == "bad"
     assert found.values["likely"] == unit
     assert found.values["norm"] == pytest.approx(size, rel=0.01)
-    assert float(found.action.split()[-1]) == pytest.approx(G / size, rel=0.01)
+    assert float(found.hint.split()[-1]) == pytest.approx(G / size, rel=0.01)
     assert notices(recording, given=["accel_y"]) == (found,)
 
 

@@ -136,7 +136,7 @@ def one_horizon(monkeypatch):
 def test_nothing_is_fetched(parsed):
     for tag, attributes in parsed.elements:
         assert tag not in ("link", "iframe", "img", "object", "embed", "base"), tag
-        for name in ("src", "srcset", "data", "poster", "action"):
+        for name in ("src", "srcset", "data", "poster", "hint"):
             assert name not in attributes, f"<{tag} {name}={attributes[name]}>"
         if "href" in attributes:
             assert attributes["href"].startswith("#")
@@ -637,25 +637,25 @@ LENGTH = Notice("length", "good", "", "an hour")  # which every examined recordi
 
 
 def issue(severity, text, where="gyro_x", **more):
-    return Notice("drift", severity, where, text, action=f"done about {text}", **more)
+    return Notice("drift", severity, where, text, hint=f"done about {text}", **more)
 
 
 def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     values = {"evident": True, "removable": True, "time_lower": 283.6, "time_upper": 303.2}
-    mend = "calibrate the part before it or after it, or take it off (remove_departures=True)"
-    step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, mend)
+    hint = "calibrate the part before it or after it, or take it off (remove_departures=True)"
+    step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, hint)
     fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}
     crosstalk = issue("warning", "correlated noise", "")
     spoilt = in_options(replace(calibration, fits=fits, notices=(LENGTH, crosstalk)))
     first, second = health(spoilt)["rows"]
     assert (first["severity"], first["where"]) == ("bad", "accel_x")
     assert first["text"] == "A step of +2.7 mg at 293 s"
-    assert first["action"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
+    assert first["hint"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
     assert second["severity"] == "warning"
 
 
 def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
-    missed = Notice("misfit", "bad", "", "the model misses the data by 40 %", action="add a term")
+    missed = Notice("misfit", "bad", "", "the model misses the data by 40 %", hint="add a term")
     moved = Notice("not-static", "bad", "", "the sensor moved")
     fits = {**calibration.fits, "gyro_x": replace(calibration["gyro_x"], notices=(missed, moved))}
     for notices in ((LENGTH, moved), ()):
@@ -763,7 +763,7 @@ def test_names_are_text_not_markup(calibration):
         skipped={f"skip {HOSTILE}": Notice("constant", "bad", "", f"why {HOSTILE}")},
         notices=(
             LENGTH,
-            Notice("line", "bad", HOSTILE, f"found {HOSTILE}", action=f"done {HOSTILE}"),
+            Notice("line", "bad", HOSTILE, f"found {HOSTILE}", hint=f"done {HOSTILE}"),
             Notice("ambiguity", "note", HOSTILE, f"tie {HOSTILE}"),
         ),
     )

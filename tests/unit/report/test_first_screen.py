@@ -14,7 +14,7 @@ from gmwm.report.answer import filter_sentence
 from gmwm.report.health import ambiguity, health
 from gmwm.report.length import known_at, length_sentence, parameters_sentence
 
-TIE = Notice("ambiguity", "note", "gyro_x", "2 models fit", action="the first is used")
+TIE = Notice("ambiguity", "note", "gyro_x", "2 models fit", hint="the first is used")
 
 
 def seconds(text):

@@ -53,16 +53,16 @@ def of_a_stream(fitted: Fit) -> Fit:
 
     def advised(notice: Notice) -> Notice:
         values = notice.values
-        if notice.code not in DEPARTURES or not values["evident"] or not notice.action:
+        if notice.code not in DEPARTURES or not values["evident"] or not notice.hint:
             return notice
         first, last = values["time_lower"], values["time_upper"]
-        action = {
+        hint = {
             "step": f"cut the file: use what is before {first:.6g} s or after {last:.6g} s",
             "transient": f"cut the first {3.0 * last:.6g} s off the file",
             "drift-at-start": f"cut the first {last:.6g} s off the file",
             "slow-period": "find what varies so, such as the temperature",
         }[notice.code]
-        return replace(notice, action=action, values={**values, "streamed": True})
+        return replace(notice, hint=hint, values={**values, "streamed": True})
 
     return replace(fitted, notices=tuple(map(advised, fitted.notices)))
 
@@ -83,8 +83,8 @@ def _taken_notices(
             f"with what was taken off, the record has {brief(values['ratio'])} times the deviation "
             f"at tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
         )
-        action = "find its cause, or let a slow term of the model describe it"
-        notices.append(Notice("departures-removed", "warning", "", text, values, action))
+        hint = "find its cause, or let a slow term of the model describe it"
+        notices.append(Notice("departures-removed", "warning", "", text, values, hint))
     between = _is_between_two_levels(removed)
     if between or len(removed) > tuning.MOST_REMOVED:
         how = "steps between two levels" if between else "changes so often"
@@ -92,8 +92,8 @@ def _taken_notices(
             f"{len(removed)} departures were taken off: a level that {how} is noise of the sensor"
         )
         values = {"removed": len(removed), "two_levels": between}
-        action = "fit a slow term in place of it, such as a Gauss-Markov process"
-        notices.append(Notice("departures-many", "bad", "", text, values, action))
+        hint = "fit a slow term in place of it, such as a Gauss-Markov process"
+        notices.append(Notice("departures-many", "bad", "", text, values, hint))
     return notices
 
 
@@ -123,7 +123,7 @@ def _way_back(step: Departure, found: Sequence[Departure]) -> Departure | None:
 
 def _alone(notice: Notice) -> Notice:
     """What it is, without what follows from it."""
-    return replace(notice, severity="note", text=notice.text.partition(";")[0], action="")
+    return replace(notice, severity="note", text=notice.text.partition(";")[0], hint="")
 
 
 def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
@@ -145,7 +145,7 @@ def _is_between_two_levels(removed: Sequence[Departure]) -> bool:
 def _removed_notice(found: Departure, unit: str) -> Notice:
     """Of what a fit is without."""
     notice = _alone(departure_notice(found, unit))
-    return replace(notice, values={**notice.values, "removed": True}, action="taken off")
+    return replace(notice, values={**notice.values, "removed": True}, hint="taken off")
 
 
 def departure_notice(
@@ -190,13 +190,13 @@ def departure_notice(
             f"{what}; {who} for {part} of the model's wavelet variance, so that slow "
             "terms of the model are too large"
         )
-        action = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"
+        hint = remedy if stays else f"{remedy}, or take it off (remove_departures=True)"
     else:
         severity = "warning" if harmful else "note"
         text = f"{what}, or slow noise: this record cannot distinguish them"
-        action = "a longer record can"
+        hint = "a longer record can"
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
     values |= {"evident": found.is_evident, "removable": found.is_evident and not stays}
-    return Notice(found.kind, severity, "", text, values, action)
+    return Notice(found.kind, severity, "", text, values, hint)

@@ -46,12 +46,12 @@ def motion_notices(motion: Motion) -> list[Notice]:
 
 def _notice(code: str, text: str, motion: Motion, values: dict[str, float]) -> Notice:
     if not motion.static:
-        action = f"no stretch of {tuning.SHORTEST_STATIC:g} s is static: record again, at rest"
-        return Notice(code, "bad", "", text, values, action)
+        hint = f"no stretch of {tuning.SHORTEST_STATIC:g} s is static: record again, at rest"
+        return Notice(code, "bad", "", text, values, hint)
     start, stop = max(motion.static, key=lambda each: each[1] - each[0])
     values = values | {"start": start, "stop": stop}
-    action = f"use one static stretch: {_times(motion.static)}"
-    return Notice(code, "bad", "", text, values, action)
+    hint = f"use one static stretch: {_times(motion.static)}"
+    return Notice(code, "bad", "", text, values, hint)
 
 
 def _times(stretches: Sequence[tuple[float, float]]) -> str:

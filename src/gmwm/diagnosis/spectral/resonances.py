@@ -85,14 +85,14 @@ def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
         f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
         f"{brief(bump.ratio)} times its surroundings, {readable(bump.sigma, unit)} rms"
     )
-    action = "gmwm calibrate adds a Resonance to the model where it is needed"
+    hint = "gmwm calibrate adds a Resonance to the model where it is needed"
     numbers = {
         "frequency": bump.frequency,
         "damping": bump.damping,
         "ratio": bump.ratio,
         "sigma": bump.sigma,
     }
-    return Notice("resonance", "note", name, text, numbers, action)
+    return Notice("resonance", "note", name, text, numbers, hint)
 
 
 def _sides(height: FloatArray, j: int) -> tuple[int, int]:

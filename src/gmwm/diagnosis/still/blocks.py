@@ -72,8 +72,8 @@ def vibration_notice(recording: Recording) -> Notice | None:
         f"rest from {listed}{more}"
     )
     values = {"stretches": len(stretches), "total": total, "ratio": ratio}
-    action = "use what is at rest: gmwm.find_still has the stretches"
-    return Notice("vibration", "warning", "", text, values, action)
+    hint = "use what is at rest: gmwm.find_still has the stretches"
+    return Notice("vibration", "warning", "", text, values, hint)
 
 
 @remembered

@@ -72,8 +72,8 @@ def copies_notice(found: Sequence[Copy], dt: float) -> Notice | None:
         "start": start,
         "first": first,
     }
-    action = "look for files joined with an overlap and for buffers that are sent again"
-    return Notice("rows-copied", "warning", "", text, values, action)
+    hint = "look for files joined with an overlap and for buffers that are sent again"
+    return Notice("rows-copied", "warning", "", text, values, hint)
 
 
 def _copies(keys: RowKeys) -> Iterator[Copy]:

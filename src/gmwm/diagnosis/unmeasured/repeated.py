@@ -82,17 +82,17 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     if share < tuning.LEAST_STRAIGHT:
         values_of = {"share": share}
         text += ": put there for samples that were lost or sorted out"
-        action = "make such samples missing (NaN)"
+        hint = "make such samples missing (NaN)"
         severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
-        return Notice("filled", severity, channel.name, text, values_of, action)
+        return Notice("filled", severity, channel.name, text, values_of, hint)
     rate = 0.5 * (1.0 - share) / channel.dt
     text += f": it was interpolated from about {rate:.3g} Hz, and its noise is not the sensor's"
-    action = (
+    hint = (
         "record what the sensor gives, in a topic of its own or without the driver's interpolation "
         "(RealSense: unite_imu_method 0); the channel is skipped in the calibration"
     )
     values_of = {"share": share, "rate": rate}
-    return Notice("interpolated", "bad", channel.name, text, values_of, action)
+    return Notice("interpolated", "bad", channel.name, text, values_of, hint)
 
 
 def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, float]:

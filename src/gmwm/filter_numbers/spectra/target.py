@@ -214,8 +214,8 @@ def _ramp(label: str, rate: float, sd: float, unit: str) -> Notice:
         f"the {label} counts as a constant of standard deviation {readable(sd, unit)}: |R| times "
         "the horizon"
     )
-    mend = "a filter that lasts longer needs a state for it"
-    return Notice("ramp-as-constant", "warning", "", text, {"R": rate, "sd": sd}, mend)
+    hint = "a filter that lasts longer needs a state for it"
+    return Notice("ramp-as-constant", "warning", "", text, {"R": rate, "sd": sd}, hint)
 
 
 def _line(label: str, frequency: float, amplitude: float, fast: float, unit: str) -> Notice:

@@ -238,13 +238,13 @@ def fault_notice(fault: Explanation, start: float, assumed: Mapping[str, Notice]
     values: dict[str, Any] = {**fault.values}
     values |= {f"{name} error": each for name, each in fault.errors.items()}
     values |= {name: values[name] + start for name in _TIMES & values.keys()}
-    text, action = _WORDS[fault.code](replace(fault, values=values))
+    text, hint = _WORDS[fault.code](replace(fault, values=values))
     severity = _severity(fault)
     if fault.code == "fix-noise" and fault.where in assumed:
         severity = "note" if severity == "warning" else "warning"
-        text, action = _assumed_sd(fault.values["factor"], assumed[fault.where])
+        text, hint = _assumed_sd(fault.values["factor"], assumed[fault.where])
         values["assumed"] = True
-    return Notice(fault.code, severity, fault.where, text, values, action)
+    return Notice(fault.code, severity, fault.where, text, values, hint)
 
 
 def resolution_notice(faults: Faults) -> Notice:
@@ -410,7 +410,7 @@ def _assumed_sd(factor: float, assumed: Notice) -> tuple[str, str]:
     return (
         f"the errors of the fixes are {factor:.2g} times the standard deviations assumed here, "
         f"{shown.replace(',', ', ')} {unit}",
-        f"{assumed.action} {right}",
+        f"{assumed.hint} {right}",
     )
 
 

@@ -346,7 +346,7 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
 def _misread(
     position: FloatArray, way: FloatArray
 ) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
-    """What may be wrong and the mend, what of the way shows it, and what is right then."""
+    """What may be wrong and the hint, what of the way shows it, and what is right then."""
     level, vertical = slice(0, 2), slice(2, 3)
     which = "check which column is which"
     swap, degrees = [1, 0, 2], np.array([np.degrees(1.0), np.degrees(1.0), 1.0])

@@ -131,11 +131,11 @@ def read_imu_log(
     if mean[2] > 0.0:
         text = "its mean is positive: the axis points up, and roll is near 180 deg"
         # A right-handed triad whose z axis points up has its y axis to the left.
-        action = (
+        hint = (
             "if it is mounted upside down, fine; else turn gyro_z and accel_z round, and gyro_y "
             "and accel_y too if y points left"
         )
-        notices = (*notices, Notice("axis-up", "warning", "accel_z", text, {}, action))
+        notices = (*notices, Notice("axis-up", "warning", "accel_z", text, {}, hint))
     return ImuLog(imu, clock.start, record.source, (*record.notices, *notices))
 
 
@@ -284,8 +284,8 @@ def _held(record: _Record, clock: _Clock) -> tuple[Notice, ...]:
         start = clock.start + (first + 1) * clock.dt  # an increment ends at its stamp
         text = f"one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck there"
         values = {"start": start, "length": length}
-        action = "leave that part of the log out, or check what is in the column"
-        notices.append(Notice("stuck", "warning", name, text, values, action))
+        hint = "leave that part of the log out, or check what is in the column"
+        notices.append(Notice("stuck", "warning", name, text, values, hint))
     return tuple(notices)
 
 

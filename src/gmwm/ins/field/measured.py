@@ -185,8 +185,8 @@ class Measured:
                     "down are assumed"
                 )
                 values = dict(zip(("north", "east", "down"), usual, strict=True))
-                action = f"give {name}"
-                assumed = (*assumed, Notice("sd-assumed", "note", kind, text, values, action))
+                hint = f"give {name}"
+                assumed = (*assumed, Notice("sd-assumed", "note", kind, text, values, hint))
         return cls(
             imu=log.imu,
             aiding=aiding,

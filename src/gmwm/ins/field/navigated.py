@@ -217,7 +217,7 @@ class Navigated:
                 "expects, and white.",
             )  # fmt: skip
         if largest > tuning.LOST:
-            up = [each.action for each in self.measured.notices if each.code == "axis-up"]
+            up = [each.hint for each in self.measured.notices if each.code == "axis-up"]
             first = f"accel_z, which points up ({up[0]}), then at " if up else ""
             stuck = [each.where for each in self.measured.notices if each.code == "stuck"]
             first = (f"{', '.join(stuck)}, which held one value, then at " if stuck else "") + first

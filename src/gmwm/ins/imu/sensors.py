@@ -91,9 +91,9 @@ class SensorModels:
             return ()
         fit, are, them = ("fits", "are", "them") if self.not_valid[1:] else ("fit", "is", "it")
         text = f"the {fit} {are} not valid, nor is a filter that believes {them}"
-        action = "read the notices of the calibration first"
+        hint = "read the notices of the calibration first"
         return (
-            Notice("fit-not-valid", "warning", ", ".join(self.not_valid), text, {}, action),
+            Notice("fit-not-valid", "warning", ", ".join(self.not_valid), text, {}, hint),
         )  # fmt: skip
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:

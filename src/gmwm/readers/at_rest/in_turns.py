@@ -56,10 +56,10 @@ def turn_notices(
             f" all through, of one sensor that is read so or of {rows} sensors in turns{which}: "
             "the samples do not tell"
         )
-    action = (
+    hint = (
         f"if of {rows} sensors, keep the rows of one: N comes out too small by the root of {rows}"
     )
-    return (Notice("sensors-in-turns", "warning", "", text, values, action),)
+    return (Notice("sensors-in-turns", "warning", "", text, values, hint),)
 
 
 @dataclass(frozen=True)

@@ -173,8 +173,8 @@ def _gravity(
         )
     values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
     off = _GRAVITY / force.size
-    action = f"check the unit: everything of the accelerometer is off by {off:.4g}"
-    return (Notice("gravity", "bad", "accel", text, values, action),)
+    hint = f"check the unit: everything of the accelerometer is off by {off:.4g}"
+    return (Notice("gravity", "bad", "accel", text, values, hint),)
 
 
 def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[Notice, ...]:
@@ -189,16 +189,16 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
         )
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
         text += ", gravity over one sampling interval: increments of velocity, not accelerations"
-        action = "divide them, and those of the gyro, by the sampling interval"
-        return (Notice("gravity", "bad", "", text, values, action),)
+        hint = "divide them, and those of the gyro, by the sampling interval"
+        return (Notice("gravity", "bad", "", text, values, hint),)
     is_none = (
         force.usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * force.usual
     )
     if is_none or abs(ratio - 1.0) < tuning.SCALE_AGREES:
         return ()
     text += ", which is neither that nor none"
-    action = "check its scale and range, and that the numbers are no counts"
-    return (Notice("gravity", "warning", "accel", text, values, action),)
+    hint = "check its scale and range, and that the numbers are no counts"
+    return (Notice("gravity", "warning", "accel", text, values, hint),)
 
 
 def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]:
@@ -217,11 +217,11 @@ def _gyro_unit(recording: Recording, rate: _Sensor | None) -> tuple[Notice, ...]
         return ()
     text, likely = found
     values: dict[str, Any] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
-    action = "check the unit and the sampling rate"
+    hint = "check the unit and the sampling rate"
     if likely:
         values["likely"] = likely[0]
-        action = f"{action}: {' or '.join(likely)}, not {rate.unit}, would explain it"
-    return (Notice("gyro-unit", "warning", "gyro", text, values, action),)
+        hint = f"{hint}: {' or '.join(likely)}, not {rate.unit}, would explain it"
+    return (Notice("gyro-unit", "warning", "gyro", text, values, hint),)
 
 
 def _mean_rate(rate: _Sensor | None) -> tuple[Notice, ...]:
@@ -232,8 +232,8 @@ def _mean_rate(rate: _Sensor | None) -> tuple[Notice, ...]:
         f"a mean rate of {rate.size / _DENSITY:.3g} deg/s is more than the bias of most gyros: "
         "it turned from the first sample to the last, or is a cheap gyro that was not calibrated"
     )
-    action = "make sure that it was at rest"
-    return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, action),)
+    hint = "make sure that it was at rest"
+    return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, hint),)
 
 
 def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, ...]:
@@ -254,8 +254,8 @@ def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, .
             f"{', '.join(found)}: every sample is a whole number, with noise of {noise:.3g} of "
             f"them: counts of the converter, not {units[found[0]]}"
         )
-        action = "multiply them by what a count is worth by the data sheet"
-        notices.append(Notice("counts", "bad", sensor, text, {"noise": noise}, action))
+        hint = "multiply them by what a count is worth by the data sheet"
+        notices.append(Notice("counts", "bad", sensor, text, {"noise": noise}, hint))
     return tuple(notices)
 
 
@@ -288,9 +288,9 @@ def _axis_unit(recording: Recording, sensor: str, found: _Sensor | None) -> tupl
                 f"its noise is {times:.3g} times that of the other axes, as if it were in {unit}, "
                 f"not {found.unit}"
             )
-            action = f"if so, name its unit in the header: {name} [{unit}]"
+            hint = f"if so, name its unit in the header: {name} [{unit}]"
             values = {"ratio": times, "likely": unit}
-            return (Notice("axis-unit", "warning", name, text, values, action),)
+            return (Notice("axis-unit", "warning", name, text, values, hint),)
     return ()
 
 

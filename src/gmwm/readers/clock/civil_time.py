@@ -67,6 +67,6 @@ def without_summer_time(
         f"dates without a zone {'jump by an hour' if forward else 'go back by an hour'} at "
         f"{where(int(rows[0]))}: taken as the change of summer time, so that no sample is missing"
     )
-    action = "write the zone beside the dates, or UTC"
+    hint = "write the zone beside the dates, or UTC"
     values = {"row": int(rows[0]), "changes": int(rows.size), "hour": float(shift[rows[0]])}
-    return stamps - np.cumsum(shift), [Notice("summer-time", "warning", "", text, values, action)]
+    return stamps - np.cumsum(shift), [Notice("summer-time", "warning", "", text, values, hint)]

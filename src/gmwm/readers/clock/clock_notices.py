@@ -45,8 +45,8 @@ def change_notice(
     )
     values = {"before": first, "after": then, "rate": used}
     values |= {} if time is None else {"time": time}
-    action = f"use the part before or after ({row})"
-    return Notice("rate-changes", "bad", "", text, values, action)
+    hint = f"use the part before or after ({row})"
+    return Notice("rate-changes", "bad", "", text, values, hint)
 
 
 def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
@@ -129,8 +129,8 @@ def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) 
             f"{clock.where(first)}: the samples were taken as evenly spaced there"
         )
         numbers = {"count": float(count), "largest": largest}
-        action = "if samples are missing there, use the part before or after"
-        notices.append(Notice("clock-set", "warning", "", text, numbers, action))
+        hint = "if samples are missing there, use the part before or after"
+        notices.append(Notice("clock-set", "warning", "", text, numbers, hint))
     return notices
 
 
@@ -147,5 +147,5 @@ def shift_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
         "spaced there"
     )
     values = {"count": len(found), "largest": by * jumps.interval * seconds, "row": row}
-    action = "if samples are missing there, use the part before or after"
-    return [Notice("clock-shifts", "warning", "", " ".join(text.split()), values, action)]
+    hint = "if samples are missing there, use the part before or after"
+    return [Notice("clock-shifts", "warning", "", " ".join(text.split()), values, hint)]

@@ -91,10 +91,10 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     slowest, fastest = tuning.RATES_OF_SENSORS if is_told else tuning.RATES_OF_SECONDS
     if not slowest <= rate <= fastest:
         text = f"{rate:.6g} Hz is a rate that inertial sensors hardly have"
-        action = "check the unit of the time column"
+        hint = "check the unit of the time column"
         if not is_told:
-            action = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
-        notices.append(Notice("rate-unlikely", "warning", "", text, {"rate": rate}, action))
+            hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
+        notices.append(Notice("rate-unlikely", "warning", "", text, {"rate": rate}, hint))
     return Timing(rate, steps.jumps, tuple(notices), steps.jitter)
 
 

@@ -47,5 +47,5 @@ def without_unit(
         if likely
         else (100.0, "by its unit")
     )
-    mend = f"name the column {called}, or give the sampling rate, rate={rate:.6g}"
-    return InputError(text, "time-unit", mend, {"rate": rate, "column": called})
+    hint = f"name the column {called}, or give the sampling rate, rate={rate:.6g}"
+    return InputError(text, "time-unit", hint, {"rate": rate, "column": called})

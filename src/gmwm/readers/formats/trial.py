@@ -158,6 +158,6 @@ def _answer(opener: Opener, path: Path) -> dict[str, Any]:
                 unread[name] = str(error)
     except InputError as error:
         return {
-            "text": error.problem, "code": error.code, "mend": error.mend, "values": error.values
+            "text": error.problem, "code": error.code, "hint": error.hint, "values": error.values
         }  # fmt: skip
     return {"unread": unread}

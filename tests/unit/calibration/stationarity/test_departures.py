@@ -185,9 +185,9 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     assert notice.values["lower"] < SAMPLE < notice.values["upper"]
     assert notice.values["time"] == pytest.approx(4300.0, abs=30.0)
     assert notice.values["evidence"] > EVIDENT
-    assert "remove_departures" in notice.action
-    assert "or --start" in with_option(notice).action
-    assert "--remove-departures" in with_option(notice).action
+    assert "remove_departures" in notice.hint
+    assert "or --start" in with_option(notice).hint
+    assert "--remove-departures" in with_option(notice).hint
     again = gmwm.load(found.save(tmp_path / "cal.json"))
     assert again["gyro_x"].notices == fit.notices
     clean = gmwm.without_departures(rec, again)
@@ -213,7 +213,7 @@ def test_a_calibration_takes_it_off_on_request_and_reports_that():
     assert not gmwm.calibrate(rec, model)["gyro_x"].valid
     fit = gmwm.calibrate(rec, model, remove_departures=True)["gyro_x"]
     (notice,) = [one for one in fit.notices if one.code == "step"]
-    assert (notice.severity, notice.action, notice.values["removed"]) == ("note", "taken off", True)
+    assert (notice.severity, notice.hint, notice.values["removed"]) == ("note", "taken off", True)
     assert fit.valid, fit.message
     low, high = fit.interval(0.99)["K"]
     assert low < 2e-6 < high
@@ -223,13 +223,13 @@ def test_what_stays_is_not_to_be_taken_off_again():
     rec = recording(noise(10) + SAMPLE * STEP)
     (there,) = departures(gmwm.calibrate(rec, WhiteNoise() + RandomWalk())["gyro_x"])
     before, after = (departure_notice(there, "rad/s", stays=stays) for stays in (False, True))
-    assert "remove" in before.action and before.values["removable"]
+    assert "remove" in before.hint and before.values["removable"]
     assert not after.values["removable"]
     for notice in (after, with_option(after)):
-        assert "remove" not in notice.action and notice.action.startswith("calibrate the part")
-    assert "or --start" in with_option(after).action
+        assert "remove" not in notice.hint and notice.hint.startswith("calibrate the part")
+    assert "or --start" in with_option(after).hint
     unsure = departure_notice(replace(there, evidence=EVIDENT / 2.0), "rad/s")
-    assert with_option(unsure).action == unsure.action == "a longer record can"
+    assert with_option(unsure).hint == unsure.hint == "a longer record can"
 
 
 def test_the_noise_that_an_estimated_step_takes_is_given_back():
@@ -311,10 +311,10 @@ def test_several_steps_have_one_remedy_for_the_whole_recording():
         (b[0] - a[1], a[1], b[0]) for a, b in pairwise([(0, 0.0), *edges, (found.duration, 0)])
     )
     assert (advice.values["start"], advice.values["stop"]) == pytest.approx(kept[1:])
-    assert {n.action for n in steps} == {"leave it out with the others, or subtract them"}
-    action = with_option(advice).action
-    assert action.endswith("or --remove-departures, which subtracts them")
-    assert f"--start {kept[1]:.6g}" in action or f"--stop {kept[2]:.6g}" in action
+    assert {n.hint for n in steps} == {"leave it out with the others, or subtract them"}
+    hint = with_option(advice).hint
+    assert hint.endswith("or --remove-departures, which subtracts them")
+    assert f"--start {kept[1]:.6g}" in hint or f"--stop {kept[2]:.6g}" in hint
     assert with_option(steps[0]) == steps[0]
 
 
@@ -468,4 +468,4 @@ def test_a_bias_that_jumps_between_two_levels_is_noise_of_the_sensor():
     assert (notice.severity, notice.values["removed"]) == ("warning", 0)
     steps = [one for one in fit.notices if one.code == "step"]
     assert len(steps) > 4
-    assert {(one.severity, one.action) for one in steps} == {("note", "")}
+    assert {(one.severity, one.hint) for one in steps} == {("note", "")}

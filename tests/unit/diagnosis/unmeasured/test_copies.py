@@ -96,13 +96,13 @@ def test_a_file_that_has_its_beginning_again_is_calibrated_without_it():
     once = gmwm.calibrate(recorded([x]), model)
     twice = gmwm.calibrate(recorded([np.concatenate([x, x[: n // 2]])]), model)
     (found,) = (each for each in twice.notices if each.code == "rows-copied")
-    assert found.action.startswith("left out; ")
+    assert found.hint.startswith("left out; ")
     np.testing.assert_allclose(
         twice["gyro_x"].wv.variance[:14], once["gyro_x"].wv.variance[:14], rtol=1e-3
     )
     kept = gmwm.calibrate(recorded([np.concatenate([x, x[: n // 2]])]), model, screening=["lines"])
     (found,) = (each for each in kept.notices if each.code == "rows-copied")
-    assert found.action.startswith("kept, as requested; ")
+    assert found.hint.startswith("kept, as requested; ")
 
 
 def test_a_file_that_is_mostly_copies_is_refused_with_the_cause():

@@ -246,7 +246,7 @@ def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
         errors["down"] = down
     values = {"forward": 1.0, "right": 0.3, "down": -1.8}
     fault = Explanation("lever-arm", "", lambda r: r, replay, 20.0, 8.0, values, errors)
-    assert fault_notice(fault, 0.0, {}).action.startswith(advice)
+    assert fault_notice(fault, 0.0, {}).hint.startswith(advice)
 
 
 def test_coloured_fixes():
@@ -324,8 +324,8 @@ def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
     assert (fault.code, fault.where) == ("axis-signs", kind)
     assert tuple(fault.values[axis] for axis in "xyz") == shown
     assert navigated.faults.explained
-    assert ("turn gyro_z round" if kind == "gyro" else "y, accel_z round") in fault.action
-    assert "check every gyro by hand" in fault.action
+    assert ("turn gyro_z round" if kind == "gyro" else "y, accel_z round") in fault.hint
+    assert "check every gyro by hand" in fault.hint
 
 
 def test_two_faults_together():

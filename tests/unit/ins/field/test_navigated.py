@@ -210,9 +210,9 @@ def test_a_z_axis_that_points_up_is_the_first_thing_to_look_at_when_the_filter_i
     bad = {"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}
     found = Navigated.of(Measured.of(content(**bad), tmp_path))
     (up,) = (each for each in found.notices if each.code == "axis-up")
-    assert "turn gyro_z and accel_z round" in up.action
+    assert "turn gyro_z and accel_z round" in up.hint
     assert found.verdict.code == "lost"
-    assert f"look first at accel_z, which points up ({up.action}), then at" in found.verdict.text
+    assert f"look first at accel_z, which points up ({up.hint}), then at" in found.verdict.text
 
 
 @pytest.fixture

@@ -100,7 +100,7 @@ def test_a_process_that_reads_on_is_a_damaged_file(file, monkeypatch):
 def test_memory_that_no_such_file_needs_is_not_given(file):
     with pytest.raises(InputError, match=r"a\.mat needs much: use less") as caught:
         tried(takes_memory, file)
-    assert (caught.value.code, caught.value.mend) == ("memory", "use less")
+    assert (caught.value.code, caught.value.hint) == ("memory", "use less")
     assert caught.value.values == {"bytes": 3.0}
 
 
