@@ -12,7 +12,7 @@ import numpy as np
 
 from gmwm._core.files import writable_file
 from gmwm._core.text import brief, per_cent
-from gmwm.fleet import (
+from gmwm.population import (
     CONFIDENCE,
     CONTENT,
     DERIVED,
