@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice, worst_first
 from gmwm._core.pages import make
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Fit, JointFit
 from gmwm.estimate.result import plain
+from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
 from gmwm.population.numbers import AxisNumbers, ParameterSpread

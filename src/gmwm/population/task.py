@@ -14,11 +14,11 @@ from gmwm import filter_numbers
 from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm._core.notices import Notice
 from gmwm._core.runs import ENDED
 from gmwm.calibration import calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 from gmwm.population.paths import Item
 from gmwm.population.unit import DERIVED, Number, Unit
 from gmwm.process import Model

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow as pa
 
+from gmwm._core.documents import NotNegative
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
 from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import printable
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 
 DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
 """Numbers that units of any model structure have, and their units: the N and K of a filter for the
@@ -33,15 +34,16 @@ are the codes of why a fit, a channel or a unit is not valid."""
 Row = dict[str, Any]
 
 
-class Number(NamedTuple):
+@dataclass(frozen=True)
+class Number:
     """A number derived from a fit.
 
     value: SI.
     found: Else it is an upper limit: the 95 % one, or the end of a curve that is still falling.
     """
 
-    value: float
-    stderr: float | None
+    value: NotNegative
+    stderr: NotNegative | None
     found: bool
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.field import measured
-from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.logs import LogSpec, measured
 from gmwm.ins.montecarlo.scenario import Scenario
 from gmwm.ins.spec import experiment
 from gmwm.ins.spec.document import read_document
@@ -159,7 +158,7 @@ def test_every_key_is_documented() -> None:
         assert f"`{name}`" in table
     page = (REPOSITORY / "docs/own-log.md").read_text()
     example = page.split("As a file:")[1].split("```")[1]
-    for name in MeasuredSpec.model_fields:
+    for name in LogSpec.model_fields:
         assert f"\n{name}:" in example
 
 
@@ -210,7 +209,7 @@ def test_what_is_not_given_is_as_documented() -> None:
     defaults = {
         f"{kind.__name__}.{name}": repr(field.default)
         for kind in (
-            ExperimentSpec, MeasuredSpec, *(
+            ExperimentSpec, LogSpec, *(
                 each for module in (experiment, measured) for each in vars(module).values()
                 if isinstance(each, type) and issubclass(each, Spec)
             ),
