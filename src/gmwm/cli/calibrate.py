@@ -133,10 +133,10 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
-        from gmwm._core.runs import beside, spare
+        from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm._core.memory import limited

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.jobs import one_blas_thread, shared
 from gmwm._core.notices import Notice, Severity, worst_first
-from gmwm._core.runs import one_blas_thread, shared
 from gmwm._core.text import per_cent
 from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning

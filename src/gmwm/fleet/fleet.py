@@ -17,9 +17,9 @@ from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
+from gmwm._core.jobs import results
 from gmwm._core.notices import Notice
 from gmwm._core.pages import make
-from gmwm._core.runs import results
 from gmwm._core.text import bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration

@@ -14,9 +14,9 @@ from gmwm import filter_numbers
 from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.frozen import freeze
+from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm._core.notices import Notice
-from gmwm._core.runs import ENDED
 from gmwm.calibration import Calibration, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit

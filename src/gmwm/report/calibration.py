@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from gmwm._core.files import writable_file, written
+from gmwm._core.jobs import shared
 from gmwm._core.notices import worst_first
 from gmwm._core.pages import page_of
-from gmwm._core.runs import shared
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit

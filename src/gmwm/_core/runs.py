@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from gmwm._core import checks, memory
 from gmwm._core.files import folder_to_fill, moved_into_place, one_writer
-from gmwm._core.runs.workers import results
+from gmwm._core.jobs import results
 from gmwm._core.typing import Progress
 from gmwm.errors import InputError
 

@@ -1,6 +1,6 @@
-"""Who does the work: processes of this machine, or the workers of a Dask cluster.
+"""Work shared by processes of this machine or by the workers of a Dask cluster.
 
-A worker that ends before its work does loses nothing: what it was at is done again.
+A worker that ends before its work does loses nothing: its items are done again.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, partial
+from importlib import import_module
 from multiprocessing import current_process
 from pickle import PicklingError
 from pkgutil import resolve_name
@@ -22,8 +23,6 @@ from time import sleep
 from typing import Any, TypeVar
 
 from gmwm._core import checks
-from gmwm._core.runs.allocation import memory_kept
-from gmwm._core.runs.threads import one_blas_thread
 from gmwm.errors import InputError
 
 T = TypeVar("T")
@@ -41,10 +40,7 @@ ENDED = 3
 PROCESSES = 2
 """That share the work on one recording by default: each takes 200 MB."""
 
-_TOGETHER = 2  # times that an item may be among those at which a process ended; then it goes alone
-_ALONE = 2  # ends of a process at an item alone: one may be of processes that were still closing
 _LAST_SECONDS = 5.0  # that the end of a thread is waited for, which takes a thousandth of one
-_WAITING = 2  # items that a process is given: the one at work, and the next
 
 
 def results(
@@ -64,13 +60,13 @@ def results(
     Raises InputError if no scheduler answers, it has no workers, or an item is lost (code
         "worker-lost").
     """
-    given_up = _refused if lost is None else lost
+    given_up = _rejected if lost is None else lost
     if cluster is not None:
         return _on_cluster(work, items, cluster, given_up)
-    return _here(work, items, jobs, given_up)
+    return _on_this_machine(work, items, jobs, given_up)
 
 
-def spare(jobs: int, items: int) -> int:
+def extra_workers(jobs: int, items: int) -> int:
     """How many processes beside this one are of use, of which ``jobs`` are to share the work.
 
     jobs: -1 for one a core.
@@ -82,17 +78,17 @@ def spare(jobs: int, items: int) -> int:
     return max(min(cores if jobs == -1 else checks.whole("jobs", jobs, 1), cores, items) - 1, 0)
 
 
-_beside: ContextVar[tuple[Any, Sequence[Future[Any]]]] = ContextVar("beside", default=(None, ()))
+_pool: ContextVar[tuple[Any, Sequence[Future[Any]]]] = ContextVar("pool", default=(None, ()))
 """The pool, and what each of its processes begins with."""
 
 
 @contextmanager
-def beside(others: int, first: str) -> Iterator[None]:
+def worker_pool(others: int, first: str) -> Iterator[None]:
     """Processes for `shared` that end with the block, unless there are some already.
 
     first: "module:function", what they import and call while this process does something else.
     """
-    if not others or _beside.get()[0] is not None:
+    if not others or _pool.get()[0] is not None:
         yield
         return
     from joblib.externals.loky import ProcessPoolExecutor
@@ -105,11 +101,11 @@ def beside(others: int, first: str) -> Iterator[None]:
     except (ImportError, OSError):  # a machine without semaphores, or one that lets none be started
         yield
         return
-    token = _beside.set((pool, begun))
+    token = _pool.set((pool, begun))
     try:
         yield
     finally:
-        _beside.reset(token)
+        _pool.reset(token)
         pool.shutdown(kill_workers=True)
         _joined([each for each in threads() if each not in before])
 
@@ -124,20 +120,20 @@ def _joined(started: Iterable[Thread]) -> None:
             each.join(_LAST_SECONDS)
 
 
-def while_beginning(work: Callable[[], object]) -> None:
-    """Do what helps the processes `beside` this one, if one of them is not ready."""
-    if not all(each.done() for each in _beside.get()[1]):
+def during_startup(work: Callable[[], object]) -> None:
+    """Do what helps the processes of `worker_pool`, if one of them is not ready."""
+    if not all(each.done() for each in _pool.get()[1]):
         work()
 
 
 def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
-    """Do the work of every item, in any order, in this process and in those `beside` it.
+    """Do the work of every item, in any order, in this process and in those of `worker_pool`.
 
     Items, none of which is None, are drawn as work on them begins, in any thread. What cannot be
     sent to a process, or was sent to one that ended, is done here.
     """
     left, lock, sent, received = iter(items), Lock(), 0, 0
-    pool, begun = _beside.get()
+    pool, begun = _pool.get()
     ended: SimpleQueue[tuple[T, Future[tuple[T, R]] | None]] = SimpleQueue()
 
     def drawn(to_send: bool) -> T | None:
@@ -178,7 +174,7 @@ def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
             yield item, future.result()[1]
 
 
-def _refused(item: Any) -> Any:
+def _rejected(item: Any) -> Any:
     raise InputError(
         f"{ENDED} processes ended at {checks.shown(item)}: they may need more memory than there "
         "is, use fewer jobs",
@@ -186,56 +182,43 @@ def _refused(item: Any) -> Any:
     )
 
 
-def _here(work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]) -> Done[T, R]:
+def _on_this_machine(
+    work: Work[T, R], items: Sequence[T], jobs: int, lost: Work[T, R]
+) -> Done[T, R]:
     if jobs == 1 or len(items) < 2:
         for item in items:
             yield item, work(item)
         return
-    from joblib import effective_n_jobs
-
-    left, ended, alone = dict.fromkeys(items), dict.fromkeys(items, 0), dict.fromkeys(items, 0)
-    while left:
-        # At which item a process ended is known only of one that has the processes for itself.
-        suspect = next((item for item in left if ended[item] >= _TOGETHER), None)
-        group = list(left) if suspect is None else [suspect]
+    left = dict.fromkeys(items)
+    # A broken pool does not tell at which item a process ended. What is left is tried once more,
+    # then one by one.
+    groups: list[Sequence[T]] = [items, items, *([item] for item in items)]
+    for group in groups:
         try:
-            with _quietly_closing(_in_processes(work, group, jobs)) as found:
-                for item, result in found:
-                    del left[item]
-                    yield item, result
+            for item, result in _in_processes(work, [item for item in group if item in left], jobs):
+                del left[item]
+                yield item, result
         except BrokenProcessPool:
-            for item in [item for item in group if item in left][
-                : _WAITING * effective_n_jobs(jobs)
-            ]:
-                ended[item] += 1
-            if suspect is not None:
-                alone[suspect] += 1
-                if alone[suspect] == _ALONE:
-                    del left[suspect]
-                    yield suspect, lost(suspect)
-
-
-@contextmanager
-def _quietly_closing(found: Done[T, R]) -> Iterator[Done[T, R]]:
-    """Close it at the end; who interrupts work knows that some of it is not done."""
-    try:
-        yield found
-    finally:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", ".*have been cancelled", UserWarning)
-            found.close()
+            if len(group) == 1:
+                del left[group[0]]
+                yield group[0], lost(group[0])
 
 
 def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]:
     from joblib import Parallel, delayed, parallel_config
 
-    # One that has grown ends after its item, and another begins: nothing for who waits.
-    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     with parallel_config("loky", inner_max_num_threads=1):
-        pool = Parallel(
-            n_jobs=jobs, pre_dispatch=f"{_WAITING} * n_jobs", return_as="generator_unordered"
-        )
-    yield from pool(delayed(_in_worker)(work, item, os.getpid()) for item in items)
+        pool = Parallel(n_jobs=jobs, return_as="generator_unordered")
+    found = pool(delayed(_in_worker)(work, item, os.getpid()) for item in items)
+    with warnings.catch_warnings():
+        # Workers that have grown end after their item and others begin; and who interrupts the
+        # work knows that some of it is not done.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+        warnings.filterwarnings("ignore", ".*have been cancelled", UserWarning)
+        try:
+            yield from found
+        finally:
+            found.close()
 
 
 def _called(name: str) -> None:
@@ -245,7 +228,7 @@ def _called(name: str) -> None:
 def _in_worker(work: Work[T, R], item: T, parent: int) -> tuple[T, R]:
     _end_with(parent)
     with one_blas_thread():
-        return _with_item(work, item)
+        return item, work(item)
 
 
 @cache
@@ -260,47 +243,39 @@ def _end_with(parent: int) -> None:
     Thread(target=watch, daemon=True).start()
 
 
-def _with_item(work: Work[T, R], item: T) -> tuple[T, R]:
-    return item, work(item)
-
-
-def _for_cluster(work: Work[T, R], item: T) -> tuple[T, R]:
-    with memory_kept():
-        return _with_item(work, item)
-
-
 def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T, R]) -> Done[T, R]:
     with _client(address) as client:
         from distributed import KilledWorker, as_completed
 
         left = dict.fromkeys(items)
-        for_nothing = 0
-        while left:
-            before = len(left)
+        for _ in range(ENDED):
             try:
                 # Each worker is sent the work once, not with every item.
-                shared = client.scatter(work, broadcast=True)
+                sent = client.scatter(work, broadcast=True)
             except TimeoutError:
                 raise InputError(
                     f"the Dask scheduler at {address!r} has no workers: start some"
                 ) from None
-            futures = {client.submit(_for_cluster, shared, item, pure=False): item for item in left}
+            futures = {client.submit(_applied, sent, item, pure=False): item for item in left}
             for future in as_completed(futures):
                 item = futures[future]
                 try:
-                    _, result = future.result()
+                    result = future.result()
                 except KilledWorker:
                     result = lost(item)
                 except CancelledError:  # the last worker that had the work ended
                     continue
                 del left[item]
                 yield item, result
-            for_nothing = for_nothing + 1 if len(left) == before else 0
-            if for_nothing == ENDED:
-                raise InputError(
-                    f"the workers of the Dask cluster at {address!r} end before their work: see "
-                    "their logs"
-                )
+            if not left:
+                return
+        raise InputError(
+            f"the workers of the Dask cluster at {address!r} end before their work: see their logs"
+        )
+
+
+def _applied(work: Work[T, R], item: T) -> R:
+    return work(item)
 
 
 def _client(address: str) -> Any:
@@ -313,13 +288,47 @@ def _client(address: str) -> Any:
             "a cluster needs Dask: install it with pip install 'gmwm[cluster]'"
         ) from None
     try:
-        # A scheme that nobody speaks is refused before any thread is started.
+        # A scheme that nobody speaks is rejected before any thread is started.
         get_backend(parse_address(address)[0])
         return Client(address, timeout="10s")
     except TypeError as error:  # what distributed raises for tls:// without certificates
         raise InputError(
-            f"{address} cannot be spoken to ({checks.line(str(error))}): give Dask its "
+            f"{address} cannot be reached ({checks.line(str(error))}): give Dask its "
             "certificates, distributed.comm.tls in its configuration"
         ) from None
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None
+
+
+_lock = Lock()
+_within: list[Any] = []
+"""One entry for each block that runs: the first has the limits to be taken off."""
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let the BLAS work in one thread within the block, or the function that this decorates.
+
+    Matrices here are small: threads for each product cost three times what the work does, and more
+    where other programs keep the processors busy. Of blocks side by side the last one to end sets
+    what was before.
+    """
+    with _lock:
+        _within.append(None if _within else _controller().limit(limits=1, user_api="blas"))
+    try:
+        yield
+    finally:
+        with _lock:
+            last = _within[0] if len(_within) == 1 else None
+            _within.pop()
+            if last is not None:
+                last.restore_original_limits()
+
+
+@cache
+def _controller() -> Any:
+    """Of all that is loaded; looking for it takes milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    import_module("scipy.linalg")  # has a BLAS of its own, found only once it is loaded
+    return ThreadpoolController()
