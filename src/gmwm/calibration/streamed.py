@@ -30,7 +30,6 @@ from gmwm.calibration.screening import (
     with_treatment,
 )
 from gmwm.calibration.stages import stage
-from gmwm.calibration.stationarity.departure_notices import of_a_stream
 from gmwm.diagnosis import Health, Repetition, health, joined
 from gmwm.process import Process
 from gmwm.readers import Channel, Recording
@@ -102,10 +101,9 @@ def calibrate_stream(
     def one(name: str, data: WaveletVariance) -> ChannelModel | Notice:
         given = model_of(name, model)
         missing = data.gaps.missing if data.gaps is not None else 0
-        done = mostly_missing(name, missing, data.n) or channel_model(
+        return mostly_missing(name, missing, data.n) or channel_model(
             name, lambda _: [data], given, [found.source], extra=offered[name]
         )
-        return done if isinstance(done, Notice) else replace(done, fit=of_a_stream(done.fit))
 
     models: dict[str, ChannelModel | Notice] = {}
     for done, (name, data) in enumerate(found.variances.items()):
