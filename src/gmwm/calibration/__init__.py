@@ -12,7 +12,6 @@ from gmwm.calibration.judgement import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
-from gmwm.calibration.streamed import calibrate_stream as calibrate_stream
 from gmwm.calibration.summary import (
     Level as Level,
     floor as floor,
