@@ -31,6 +31,7 @@ from gmwm.calibration.channel import (
     mostly_missing,
 )
 from gmwm.calibration.judgement import judged, with_one_remedy
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
     Screened,
@@ -39,7 +40,6 @@ from gmwm.calibration.screening import (
     with_outcomes,
 )
 from gmwm.calibration.stages import Stopwatch, current, stage
-from gmwm.calibration.stationarity.removal import variance_without
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps

@@ -7,9 +7,8 @@ from scipy import stats
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration import tuning
-from gmwm.calibration.stationarity.departures import Departure
-from gmwm.calibration.stationarity.means import Means
-from gmwm.calibration.stationarity.steadiness import _rest, _Test, steadiness_notice
+from gmwm.calibration.departures import Departure
+from gmwm.calibration.steadiness import Means, _rest, _Test, steadiness_notice
 
 N, RATE, HOUR = 1e-4, 25.0, 90_000
 TIME = np.arange(HOUR) / RATE

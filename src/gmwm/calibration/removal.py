@@ -10,7 +10,7 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.calibration.stationarity.departures import DEPARTURES, WIDE, Departure
+from gmwm.calibration.departures import DEPARTURES, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.readers import Channel, Recording
@@ -59,7 +59,7 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
                 f"{recording.duration:g} s, and the fit of {name} has {fit.wv.n * fit.wv.dt:g} s"
             )
     channels = tuple(
-        _without(channel, [_departure(n) for n in fits[channel.name].notices if _is_evident(n)])
+        _without(channel, [_departure(n) for n in fits[channel.name].notices if _is_departure(n)])
         if channel.name in fits
         else channel
         for channel in recording.channels
@@ -107,8 +107,8 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
     return np.asarray(found[values > tuning.NO_INFORMATION])
 
 
-def _is_evident(notice: Notice) -> bool:
-    return notice.code in DEPARTURES and _departure(notice).is_evident
+def _is_departure(notice: Notice) -> bool:
+    return notice.code in DEPARTURES and notice.values["evidence"] >= tuning.EVIDENT
 
 
 def _departure(notice: Notice) -> Departure:
