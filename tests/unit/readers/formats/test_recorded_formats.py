@@ -5,7 +5,6 @@ import pytest
 
 import bags
 import fuzz_formats as formats
-from gmwm.readers import read_blocks
 from recorded import assert_as_recorded, reading
 
 SI = formats.SI
@@ -78,20 +77,3 @@ def test_records(tmp_path):
     path.write_bytes(bytes(5000))
     found["zeros"] = reading(path, layout="IMAR")
     assert_as_recorded("readers/records", found)
-
-
-def test_blocks(tmp_path):
-    path = tmp_path / "a.npy"
-    n = 21_000
-    rng = np.random.default_rng(2)
-    rows = np.column_stack([0.01 * np.arange(n), rng.normal(size=(n, 6))])
-    rows[9000:, 0] += 0.5
-    np.save(path, np.delete(rows, [30, 12_000, 12_001], axis=0))
-    found = {}
-    for size in (5000, 8191, 20_000):
-        parts = read_blocks(path, units=SI, rows=size)
-        found[f"{size}"] = [
-            [part.n, part.rate, len(part.notices), float(np.nansum(part["gyro_x"].values)),
-             part["gyro_x"].missing] for part in parts
-        ]  # fmt: skip
-    assert_as_recorded("readers/blocks", found)
