@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.fleet import (
+from gmwm.population import (
     CONFIDENCE,
     CONTENT,
     DERIVED,

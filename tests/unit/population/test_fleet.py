@@ -11,10 +11,9 @@ import pytest
 
 import gmwm
 from fleets import QUICK
-from gmwm import Calibration, Fleet, InputError, RandomWalk, WhiteNoise
+from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.fleet import DERIVED, SCHEMA, unit as units
-from gmwm.fleet.fleet import _about as notices_of, _task as _task_of
+from gmwm.population import DERIVED, SCHEMA, Item, Task, task as tasks
 
 READING = ("rate", "units")
 
@@ -29,12 +28,18 @@ def quick():
 
 @pytest.fixture(scope="module")
 def record():
-    """Write a recording of white noise."""
+    """Write a recording of white noise, a CSV file with time stamps or an NPZ file without."""
 
-    def _record(path, seed=0, N=1e-3, channels=("gyro_x", "gyro_y"), n=200):
+    def _record(path, seed=0, N=1e-3, channels=("gyro_x", "gyro_y"), n=200, dt=1.0):
         path.parent.mkdir(parents=True, exist_ok=True)
         rng = np.random.default_rng(seed)
-        np.savez(path, **{name: WhiteNoise(N).simulate(n, 1.0, rng) for name in channels})
+        columns = {name: WhiteNoise(N).simulate(n, 1.0, rng) for name in channels}
+        if path.suffix == ".csv":
+            rows = np.column_stack([dt * np.arange(n), *columns.values()])
+            header = ",".join(["time_s", *channels])
+            np.savetxt(path, rows, delimiter=",", header=header, comments="")
+        else:
+            np.savez(path, **columns)
         return str(path)
 
     return _record
@@ -67,13 +72,13 @@ def copied(outputs, tmp_path):
 def worked(monkeypatch):
     """Sources of the recordings that are calibrated."""
     seen = []
-    usual = units.calibrate
+    usual = tasks.calibrate
 
     def _calibrate(recording, *rest, **named):
         seen.append(recording.source)
         return usual(recording, *rest, **named)
 
-    monkeypatch.setattr(units, "calibrate", _calibrate)
+    monkeypatch.setattr(tasks, "calibrate", _calibrate)
     return seen
 
 
@@ -267,14 +272,14 @@ def test_calibrations_of_other_recordings_are_left_and_not_counted(lot, copied):
 
 @pytest.mark.parametrize("at", [0, 2])
 def test_an_interrupt_keeps_what_is_done(lot, tmp_path, at, outputs, monkeypatch):
-    usual, count = units.calibrate, iter(range(9))
+    usual, count = tasks.calibrate, iter(range(9))
 
     def interrupted(*rest, **named):
         if next(count) == at:
             raise KeyboardInterrupt
         return usual(*rest, **named)
 
-    monkeypatch.setattr(units, "calibrate", interrupted)
+    monkeypatch.setattr(tasks, "calibrate", interrupted)
     folder = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         gmwm.fleet(lot, folder=folder, **QUICK)
@@ -321,7 +326,7 @@ def test_where_nothing_can_be_calibrated_nothing_is_written(lot, tmp_path):
 
 
 def test_an_error_of_the_program_costs_one_unit_only(lot, monkeypatch):
-    usual = units.calibrate
+    usual = tasks.calibrate
 
     def failing(recording, *rest, **named):
         if recording.source == "unit 0.npz":
@@ -330,7 +335,7 @@ def test_an_error_of_the_program_costs_one_unit_only(lot, monkeypatch):
             raise MemoryError
         return usual(recording, *rest, **named)
 
-    monkeypatch.setattr(units, "calibrate", failing)
+    monkeypatch.setattr(tasks, "calibrate", failing)
     found = gmwm.fleet(lot, **QUICK)
     assert [each.code for each in found.failed.values()] == [
         "unexpected", "memory", "not-calibrated"
@@ -339,20 +344,24 @@ def test_an_error_of_the_program_costs_one_unit_only(lot, monkeypatch):
 
 
 def test_units_of_another_kind_are_reported(record, tmp_path):
-    paths = [record(tmp_path / f"{i}.npz", seed=i, channels=("gyro_x",)) for i in (1, 2)]
-    shutil.copy(paths[0], tmp_path / "copy.npz")
-    alike = gmwm.fleet([*paths, tmp_path / "copy.npz"], **QUICK)
-    assert codes(alike) == {"same-recording", "few-units"}
-    short = record(tmp_path / "short.npz", channels=("gyro_y",), n=100)
-    other = gmwm.fleet(short, **(QUICK | {"rate": 2.0}))
-    found = {notice.code for notice in notices_of({**alike.units, **other.units}.values())}
-    assert found == codes(alike) | {"rates-differ", "channels-differ", "lengths-differ"}
+    options = {key: each for key, each in QUICK.items() if key != "rate"}
+    paths = [record(tmp_path / f"{i}.csv", seed=i, channels=("gyro_x",)) for i in (1, 2)]
+    shutil.copy(paths[0], tmp_path / "copy.csv")
+    alike = [*paths, tmp_path / "copy.csv"]
+    assert codes(gmwm.fleet(alike, **options)) == {"same-recording", "few-units"}
+    short = record(tmp_path / "short.csv", channels=("gyro_y",), n=100, dt=0.5)
+    assert codes(gmwm.fleet([*alike, short], **options)) == {
+        "same-recording", "few-units", "rates-differ", "channels-differ", "lengths-differ",
+    }  # fmt: skip
 
 
 def test_another_process_gives_the_same(lot, outputs):
     """What is sent to workers, and what they send back."""
-    task = _task_of(QUICK["model"], (), True, 60.0, 0.0, None, {k: QUICK[k] for k in READING})
-    item = units.Item(lot[0], "unit 0")
+    options = {k: QUICK[k] for k in READING}
+    task = Task(
+        options, 0.0, None, {"": Model((QUICK["model"],))}, (), True, 60.0, gmwm.__version__
+    )
+    item = Item(lot[0], "unit 0")
     unit = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(task))(item)))
     assert unit.result.to_dict() == outputs[1][lot[0]].to_dict()
     assert unit.numbers == outputs[1].units[lot[0]].numbers
@@ -434,6 +443,6 @@ def test_a_recording_that_changes_meanwhile_is_not_taken_for_the_other(
         record(tmp_path / "in" / "a.npz", seed=9, n=300)
         return at_rest
 
-    monkeypatch.setattr(units, "read", changed)
+    monkeypatch.setattr(tasks, "read", changed)
     with pytest.raises(InputError, match="changed while it was calibrated"):
         gmwm.fleet(given, **QUICK)

@@ -3,7 +3,7 @@
 import pytest
 
 from gmwm import InputError
-from gmwm.fleet.paths import recordings
+from gmwm.population import recordings
 
 
 @pytest.fixture

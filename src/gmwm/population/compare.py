@@ -1,4 +1,4 @@
-"""`compare`: several recordings or units of a sensor beside each other."""
+"""`compare`: several recordings or units of a sensor side by side."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
 from gmwm.calibration import DEPARTURES, Calibration, calibrate
-from gmwm.comparison import tuning
-from gmwm.comparison.clock import suspected_clocks
-from gmwm.comparison.curves import Equality
-from gmwm.comparison.result import AxisComparison, SensorComparison
-from gmwm.comparison.structure import axis_numbers, curve_inflation, joint_fit, spreads
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
+from gmwm.population import tuning
+from gmwm.population.comparison import AxisComparison, SensorComparison
+from gmwm.population.curves import Equality
+from gmwm.population.numbers import axis_numbers, curve_inflation, joint_fit, parameter_spreads
 from gmwm.readers import Recording, is_frame
 
 _NOT_NOISE = (
@@ -30,7 +29,7 @@ _NOT_NOISE = (
 )  # fmt: skip
 """Codes of notices of a fit whose curve is not that of noise."""
 
-_LONGEST = 28  # characters of a label
+_LONGEST_LABEL = 28  # characters
 
 
 def compare(
@@ -43,8 +42,8 @@ def compare(
 
     Structures of models differ between recordings of one sensor far more than curves do. So curves
     are tested for equality, level by level with their covariances; one structure is selected for
-    all recordings, whose parameters are compared; and N and K for a filter are given by
-    `gmwm.bound`, which any structure has.
+    all recordings, and its parameters are compared; and `gmwm.bound` gives N and K for a filter,
+    whatever the structure.
 
     Parameters
     ----------
@@ -52,7 +51,7 @@ def compare(
         Two or more: `Calibration`, the path of a saved one, or a `Recording` or DataFrame, which
         is calibrated first. The keys of a mapping name them.
     horizon : float, optional
-        Time without aiding that the filter numbers are for, s.
+        Longest outage that the filter numbers are for, s.
     progress : callable, optional
         Called as ``progress(done, total, channel)``.
 
@@ -65,15 +64,14 @@ def compare(
     Notes
     -----
     The test of a channel is the sum of squares of the cube roots of the wavelet variances about
-    their generalized mean, with the covariances that each recording's own model implies: chi-square
-    with (R - 1) J degrees of freedom for R recordings of J levels that are the same noise. Channels
-    are tested together at 5 % (Holm 1979). Channels that differ by less than 10 % of the deviation
-    in every part of the curve are called close: with a million samples a change of temperature
-    shows.
+    their generalized mean, with the covariances that the models imply: chi-square with (R - 1) J
+    degrees of freedom for R recordings of J levels of the same noise. Channels are tested together
+    at 5 % (Holm 1979). Channels that differ by less than 10 % of the deviation in every part of the
+    curve are called close: with a million samples a change of temperature shows.
     """
-    horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
+    horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
     calibrations, notices = _different(_labelled(sources))
-    names = list(dict.fromkeys(name for each in calibrations.values() for name in _names(each)))
+    names = dict.fromkeys(n for each in calibrations.values() for n in (*each, *each.skipped))
     members = {name: _members(name, calibrations) for name in names}
     for name, (_, out) in members.items():
         notices += [replace(why, where=name, source=label) for label, why in out.items()]
@@ -90,14 +88,14 @@ def compare(
     for done, name in enumerate(names):
         if progress is not None:
             progress(done, len(names), name)
-        fits, out = members[name]
-        axes[name], found = _axis(name, fits, out, tests.get(name), p_values, horizon)
+        test = tests.get(name)
+        p_value = p_values.get(name, float("nan"))
+        axes[name], found = _axis(name, members[name], (test, p_value), horizon)
         notices += found
     if progress is not None:
         progress(len(names), len(names), "")
-    notices += suspected_clocks(calibrations)
     notices += [_curves_notice(axis) for axis in axes.values() if axis.state in ("close", "differ")]
-    notices.append(_few(len(calibrations)))
+    notices.append(_few_recordings(len(calibrations)))
     return SensorComparison(calibrations, axes, horizon, tuple(notices))
 
 
@@ -118,48 +116,6 @@ def _labelled(sources: Any) -> dict[str, Calibration]:
     return labelled([_calibration(each) for each in given], paths)
 
 
-def labelled(
-    calibrations: Sequence[Calibration], paths: Sequence[str | os.PathLike[str]]
-) -> dict[str, Calibration]:
-    """Calibrations by what distinguishes them.
-
-    It is the name of the recording; of recordings of one name, what differs between the paths of
-    the files that were given (empty if there is none), or else a number.
-    """
-    names = [_label(each, place + 1) for place, each in enumerate(calibrations)]
-    wanted = list(names)
-    for name in set(names):
-        same = [place for place, each in enumerate(names) if each == name]
-        if len(same) > 1:
-            for place, part in zip(same, _different_parts([paths[k] for k in same]), strict=True):
-                wanted[place] = printable(part[-_LONGEST:]) or name
-    found: dict[str, Calibration] = {}
-    for name, calibration in zip(wanted, calibrations, strict=True):
-        label, copy = name, 2
-        while label in found:
-            label, copy = f"{name} ({copy})", copy + 1
-        found[label] = calibration
-    return found
-
-
-def _different_parts(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
-    """Of each path what is between the folders and the end that all have."""
-    parts = [list(PurePath(path).with_suffix("").parts) if str(path) else [] for path in paths]
-    for end in (0, -1):
-        while all(parts) and len({each[end] for each in parts}) == 1:
-            for each in parts:
-                each.pop(end)
-    return ["/".join(each) for each in parts]
-
-
-def _label(calibration: Calibration, place: int) -> str:
-    """The name of its file without what all files have."""
-    stem = PurePath(calibration.source.replace("\\", "/").split(", ")[0]).name
-    for _ in range(2):
-        stem = stem.rsplit(".", 1)[0] if "." in stem[1:] else stem
-    return printable(stem[:_LONGEST]) or f"recording {place}"
-
-
 def _calibration(source: Any) -> Calibration:
     if isinstance(source, Calibration):
         return source
@@ -173,40 +129,73 @@ def _calibration(source: Any) -> Calibration:
     )
 
 
+def labelled(
+    calibrations: Sequence[Calibration], paths: Sequence[str | os.PathLike[str]]
+) -> dict[str, Calibration]:
+    """Calibrations by short labels.
+
+    A label is the name of the recording; where recordings have one name, it is what differs between
+    the paths of the files that were given (empty if there is none), or else a number.
+    """
+    names = []
+    for place, each in enumerate(calibrations):
+        stem = PurePath(each.source.replace("\\", "/").split(", ")[0]).name
+        for _ in range(2):
+            stem = stem.rsplit(".", 1)[0] if "." in stem[1:] else stem
+        names.append(printable(stem[:_LONGEST_LABEL]) or f"recording {place + 1}")
+    wanted = list(names)
+    for name in set(names):
+        same = [place for place, each in enumerate(names) if each == name]
+        if len(same) > 1:
+            for place, part in zip(same, _different_parts([paths[k] for k in same]), strict=True):
+                wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
+    found: dict[str, Calibration] = {}
+    for name, calibration in zip(wanted, calibrations, strict=True):
+        label, copy = name, 2
+        while label in found:
+            label, copy = f"{name} ({copy})", copy + 1
+        found[label] = calibration
+    return found
+
+
+def _different_parts(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Each path without the folders at its beginning and end that all have."""
+    parts = [list(PurePath(path).with_suffix("").parts) if str(path) else [] for path in paths]
+    for end in (0, -1):
+        while all(parts) and len({each[end] for each in parts}) == 1:
+            for each in parts:
+                each.pop(end)
+    return ["/".join(each) for each in parts]
+
+
 def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration], list[Notice]]:
-    """Each recording once."""
+    """Each recording once, and notices of copies."""
+
+    def is_same(a: Calibration, b: Calibration) -> bool:
+        shared = [name for name in a if name in b]
+        return bool(shared) and all(
+            np.array_equal(a[name].wv.variance, b[name].wv.variance) for name in shared
+        )
+
     kept: dict[str, Calibration] = {}
     notices = []
     for label, each in given.items():
-        same = next((other for other, known in kept.items() if _is_same(each, known)), None)
+        same = next((other for other, known in kept.items() if is_same(each, known)), None)
         if same is None:
             kept[label] = each
             continue
-        text = f"the same recording as {same}"
-        notices.append(
-            Notice("same-recording", "warning", "", text, {"other": same}, "left out", label)
-        )
+        text, values = f"the same recording as {same}", {"other": same}
+        notices.append(Notice("same-recording", "warning", "", text, values, "left out", label))
     if len(kept) < 2:
         why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
         raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
     return kept, notices
 
 
-def _is_same(a: Calibration, b: Calibration) -> bool:
-    shared = [name for name in a if name in b]
-    return bool(shared) and all(
-        np.array_equal(a[name].wv.variance, b[name].wv.variance) for name in shared
-    )
-
-
-def _names(calibration: Calibration) -> Iterable[str]:
-    return (*calibration, *calibration.skipped)
-
-
 def _members(
     name: str, calibrations: Mapping[str, Calibration]
 ) -> tuple[dict[str, Fit], dict[str, Notice]]:
-    """Fits of a channel that can be compared, and why others cannot."""
+    """Fits of a channel that can be compared, and why the others cannot."""
     fits: dict[str, Fit] = {}
     out: dict[str, Notice] = {}
     for label, each in calibrations.items():
@@ -217,38 +206,32 @@ def _members(
         else:
             bad = [n for n in each[name].notices if n.severity == "bad" and n.code in _NOT_NOISE]
             if bad:
-                values = {"reason": bad[0].code}
                 out[label] = Notice(
-                    "not-noise", "warning", "", bad[0].text, values,
+                    "not-noise", "warning", "", bad[0].text, {"reason": bad[0].code},
                     "not compared: the curve is not that of noise alone",
                 )  # fmt: skip
             else:
                 fits[label] = each[name]
-    for label, why in _unlike(fits).items():
-        out[label] = why
-        del fits[label]
-    return fits, out
+    unlike = _unlike(fits)
+    return {k: fit for k, fit in fits.items() if k not in unlike}, out | unlike
 
 
 def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
-    """Those of another rate, unit or wavelet than most have."""
-
-    def kind(fit: Fit) -> tuple[int, str, str]:
-        return round(np.log(fit.wv.dt) / tuning.SAME_RATE), fit.wv.unit, fit.wv.wavelet
+    """Fits of another rate, unit or wavelet than most have."""
 
     def is_like(a: Fit, b: Fit) -> bool:
         near = abs(np.log(a.wv.dt / b.wv.dt)) < tuning.SAME_RATE
-        return bool(near and kind(a)[1:] == kind(b)[1:])
+        return bool(near and (a.wv.unit, a.wv.wavelet) == (b.wv.unit, b.wv.wavelet))
 
     if not fits:
         return {}
-    # Of equal numbers the higher rate: the order in which they are given changes nothing.
+    # A tie is won by the higher rate, so that the order of the recordings changes nothing.
     usual = max(
         fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
     )
-    found = {}
     most = [label for label, fit in fits.items() if is_like(fit, usual)]
     others = most[0] if len(most) == 1 else "the others"
+    found = {}
     for label, fit in fits.items():
         if label in most:
             continue
@@ -266,32 +249,36 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
 
 def _axis(
     name: str,
-    fits: dict[str, Fit],
-    out: dict[str, Notice],
-    test: Equality | None,
-    p_values: Mapping[str, float],
+    members: tuple[dict[str, Fit], dict[str, Notice]],
+    tested: tuple[Equality | None, float],
     horizon: float,
 ) -> tuple[AxisComparison, list[Notice]]:
+    """A channel: its fits, recordings left out, test and p-value, made into a comparison."""
+    (fits, out), (test, p_value) = members, tested
     notices: list[Notice] = []
-    found = joint_fit(list(fits.values())) if len(fits) > 1 else None
-    joint = found if isinstance(found, JointFit) else None
-    if isinstance(found, Notice):
-        notices.append(found)
+    joint = None
+    if len(fits) > 1:
+        found = joint_fit(list(fits.values()))
+        if isinstance(found, JointFit):
+            joint = found
+        else:
+            notices.append(found)
     numbers, problems = axis_numbers(name, fits, joint, horizon)
     notices += problems
     for label, fit in fits.items():
-        codes = [n.code for n in fit.notices if n.severity == "bad"]
+        codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
-            text = f"its own fit is not valid ({', '.join(codes)})"
-            hint = "the curve is compared all the same"
-            values = {"reasons": ", ".join(codes)}
+            text, hint = f"its own fit is not valid ({codes})", "the curve is compared all the same"
+            values = {"reasons": codes}
             notices.append(Notice("fit-not-valid", "note", name, text, values, hint, label))
-    own = float("nan")
+    inflation = float("nan")
     if joint and test and test.tau.size:
-        own = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
-    rows = spreads(joint) if joint else ()
-    p = p_values.get(name, float("nan"))
-    return AxisComparison(name, fits, out, test, p, joint, rows, numbers, own), notices
+        inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
+    rows = parameter_spreads(joint) if joint else ()
+    return (
+        AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation),
+        notices,
+    )
 
 
 def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
@@ -306,20 +293,17 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
 
 def _curves_notice(axis: AxisComparison) -> Notice:
     severity: Severity = "warning" if axis.state == "differ" else "note"
-    worst = axis.main[0] if axis.main else None
     values = {"p_value": axis.p_value}
-    if worst is not None:
+    if axis.main:
+        worst = axis.main[0]
         values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
     return Notice(f"curves-{axis.state}", severity, axis.name, axis.sentence, values)
 
 
-def _few(count: int) -> Notice:
+def _few_recordings(count: int) -> Notice:
     """How well so many recordings know their spread."""
     dof = count - 1
     tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
     high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
-    text = (
-        f"of {count} recordings the spread is known only to within factors of {low:.2g} and "
-        f"{high:.2g} (95 %)"
-    )
+    text = f"{count} recordings know the spread within factors of {low:.2g} and {high:.2g} (95 %)"
     return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})

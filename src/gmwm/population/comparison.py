@@ -1,4 +1,4 @@
-"""What a comparison found, axis by axis."""
+"""The result of `compare`, axis by axis."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from gmwm._core.pages import make
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
-from gmwm.comparison import tuning
-from gmwm.comparison.curves import Difference, Equality
-from gmwm.comparison.structure import AxisNumbers, ParameterSpread
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Fit, JointFit
 from gmwm.estimate.result import plain
+from gmwm.population import tuning
+from gmwm.population.curves import Difference, Equality
+from gmwm.population.numbers import AxisNumbers, ParameterSpread
 
 if TYPE_CHECKING:
     import pandas
@@ -38,36 +38,28 @@ STATES: dict[State, str] = {
 }
 """Verdicts in words, the best first."""
 
-_ONE = {word: word.replace(verb, f"{verb}s") for word in STATES.values()
-        for verb in ("agree", "differ") if word.startswith(verb)}  # fmt: skip
-
 _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 _NAMES = {"short": "short times", "R": "drift"}
 
 
-def percent(share: float) -> str:
+def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
-
-
-def _reason(notice: Notice) -> str:
-    """Why a recording is left out, in a word or two."""
-    return str(notice.values.get("reason", notice.code)).replace("-", " ")
 
 
 @dataclass(frozen=True, eq=False)
 class AxisComparison:
     """One channel in several recordings.
 
-    fits: Recording -> its own fit, of those that are compared.
-    left_out: Recording -> why it is not.
+    fits: Recording that is compared -> its own fit.
+    left_out: Recording that is not -> why.
     equality: Test of the curves; ``None`` where fewer than two recordings are compared.
-    p_value: Of that test, made larger for the number of channels (Holm); NaN without a test.
-    joint: The structure that is recommended for all of them.
-    parameters: Of the joint model.
+    p_value: p-value of that test, adjusted for the number of channels (Holm); NaN without a test.
+    joint: The model recommended for all of them.
+    parameters: Parameters of the joint model.
     numbers: N and K for a filter.
-    curve_inflation: By how much the amplitudes of the joint model must grow so that its curve is
-        nowhere below that of a recording's own model; NaN without a joint model.
+    curve_inflation: Factor on the amplitudes of the joint model with which its curve is nowhere
+        below the one of a recording's own model; NaN without a joint model.
     """
 
     name: str
@@ -120,17 +112,18 @@ class AxisComparison:
     @property
     def sentence(self) -> str:
         """The verdict in one line."""
-        out = ", ".join(f"{label} ({_reason(n)})" for label, n in self.left_out.items())
+        reasons = {k: str(n.values.get("reason", n.code)) for k, n in self.left_out.items()}
+        out = ", ".join(f"{k} ({reason.replace('-', ' ')})" for k, reason in reasons.items())
         if self.equality is None or self.state == "untested":
             return f"not compared: without {out}" if out else "not compared"
         if self.state == "agree":
             known = [d for d in self.equality.differences if d.part in "NK"]
-            shown = [f"{percent(d.resolution)} in {d.part}" for d in known]
+            shown = [f"{_percent(d.resolution)} in {d.part}" for d in known]
             tail = f"; {', '.join(shown)} would show" if shown else ""
             text = f"agree (p = {self.p_value:.2g}{tail})"
         else:
             parts = [
-                f"{_NAMES.get(d.part, d.part)} by {percent(d.extent)} ({brief(d.sigma)} sigma)"
+                f"{_NAMES.get(d.part, d.part)} by {_percent(d.extent)} ({brief(d.sigma)} sigma)"
                 for d in self.main
             ] or [f"shape (p = {self.p_value:.2g})"]
             words = "differ in" if self.state == "differ" else "differ by less than 10 %:"
@@ -138,7 +131,7 @@ class AxisComparison:
         return f"{text}; without {out}" if out else text
 
     def number_text(self, letter: str, value: float) -> tuple[str, str]:
-        """An N or a K in the unit of the field, and that unit."""
+        """An N or a K in the data-sheet unit, and that unit."""
         known = field_units(_UNITS[letter], self.quantity)
         unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
         text = f"{value * (known[0].per_si if known else 1.0):.3g}"
@@ -189,9 +182,9 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         By recording.
     axes : dict of str to AxisComparison
     horizon : float
-        Time without aiding that the filter numbers are for, s.
+        Longest outage that the filter numbers are for, s.
     notices : tuple of Notice
-        What was found: channels that are missing or left out, other rates, a suspected clock.
+        What was found: channels that are missing or left out, other rates, too few recordings.
     """
 
     calibrations: Mapping[str, Calibration]
@@ -223,11 +216,13 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
     def summary(self) -> str:
         """How many axes agree."""
         counts = Counter(axis.state for axis in self.values())
-        parts = [
-            f"{counts[state]} {_ONE.get(word, word) if counts[state] == 1 else word}"
-            for state, word in STATES.items()
-            if counts[state]
-        ]
+        parts = []
+        for state, word in STATES.items():
+            verb = word.split()[0]
+            if counts[state] == 1 and state != "untested":
+                word = word.replace(verb, f"{verb}s", 1)
+            if counts[state]:
+                parts.append(f"{counts[state]} {word}")
         return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
 
     def __repr__(self) -> str:
@@ -243,7 +238,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         lines.append("")
         for name, axis in self.items():
             lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
-        lines += ["", f"Filter numbers for {self.horizon:g} s without aiding that cover all:"]
+        lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
         for name, axis in self.items():
             lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
@@ -263,18 +258,18 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
                 found.append(f"{letter} {sign}{shown}{times}")
         own = len(axis.numbers.each)
         if not found:
-            return "none: no recording has a curve of noise alone"
+            return "none: no recording can be used"
         few = f" (of {own} only)" if own < len(self.labels) else ""
         return ", ".join(found) + few
 
     @property
     def promise(self) -> str:
-        """What the covering numbers promise, and what they do not."""
+        """What the covering numbers hold for, and what they do not."""
         return (
-            "They are never too optimistic for any of the recordings compared, each with its "
-            "fitted model; the uncertainty of these fits is not covered. A further recording of "
-            f"the same kind exceeds the largest N of {len(self.labels)} with a probability of "
-            f"1/{len(self.labels) + 1}, and likewise the largest K."
+            "They are not overconfident for any of these recordings, each with its fitted model; "
+            "parameter uncertainty is not included. "
+            f"1-in-{len(self.labels) + 1} chance that another recording has a larger N, and the "
+            "same for K."
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,10 +12,8 @@ import pytest
 import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.comparison import labelled
-from gmwm.comparison.compare import _labelled, _members
-from gmwm.comparison.structure import spreads
 from gmwm.estimate import estimate
+from gmwm.population import labelled, parameter_spreads
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
 N = 5000
@@ -89,14 +87,6 @@ def test_recordings_of_one_name_are_distinguished_by_their_paths(three, paths, l
     assert tuple(labelled([*alike, three[2]], [*paths, ""])) == (*labels, "day3")
 
 
-def test_files_are_distinguished_by_their_folders(three, tmp_path):
-    paths = []
-    for folder, each in zip(("monday", "friday"), three, strict=False):
-        (tmp_path / folder).mkdir()
-        paths.append(replace(each, source="static.csv").save(tmp_path / folder / "cal.json"))
-    assert tuple(_labelled(paths)) == ("monday", "friday")
-
-
 def test_one_structure_with_its_spread(compared):
     gyro = compared["gyro_x"]
     rows = {row.key: row for row in gyro.parameters}
@@ -112,7 +102,7 @@ def test_the_spread_beside_a_recording_of_all_the_weight_is_unknown(compared, tm
     parts[0].estimates[0] = replace(parts[0].estimates[0], stderr=1e-15)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        rows = spreads(SimpleNamespace(estimates=axis.joint.estimates, parts=parts))
+        rows = parameter_spreads(SimpleNamespace(estimates=axis.joint.estimates, parts=parts))
     assert np.isnan([rows[0].spread, rows[0].p_value]).all()
     assert rows[1].spread == axis.parameters[1].spread
     one = replace(compared, axes={"gyro_x": replace(axis, parameters=rows)})
@@ -200,10 +190,10 @@ def test_what_is_no_noise_or_missing_is_left_out_and_named(three, compared):
     second = replace(three[1], fits={"gyro_x": stepped}, skipped={"accel_x": dead})
     with pytest.raises(InputError, match="nothing to compare: day2: gyro_x: a step"):
         gmwm.compare([three[0], second])
-    fits, out = _members("accel_x", {"a": three[0], "b": second, "c": three[2]})
-    assert list(fits) == ["a", "c"] and out["b"].code == "channel-skipped"
-    fits, out = _members("gyro_x", {"a": three[0], "b": second})
-    assert list(fits) == ["a"] and out["b"].values["reason"] == "step"
+    found = gmwm.compare({"a": three[0], "b": second, "c": three[2]})
+    assert found["accel_x"].left_out["b"].code == "channel-skipped"
+    gyro = found["gyro_x"]
+    assert list(gyro.fits) == ["a", "c"] and gyro.left_out["b"].values["reason"] == "step"
 
 
 def test_a_calibration_without_its_curve_is_refused_in_one_sentence(three, tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 
-from gmwm.fleet import (
+from gmwm.population import (
     content_of_largest,
     needed_units,
     one_sided_factor,

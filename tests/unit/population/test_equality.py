@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.comparison import Equality
 from gmwm.estimate import estimate
+from gmwm.population import Equality
 
 TRUTH = WhiteNoise(1.0) + RandomWalk(0.3)
 N, DT = 6000, 0.01

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from gmwm.fleet import outlier_distance
-from gmwm.fleet.spread import Spread, spreads_of, structures_of
-from gmwm.fleet.table import SCHEMA
+from gmwm.population import SCHEMA, Spread, outlier_distance, spreads_of, structures_of
 
 
 def row(device, parameter, value, kind="estimated", **more):

@@ -1,4 +1,4 @@
-"""One unit of a fleet: what it takes to calibrate it, and what came of it."""
+"""How every unit of a fleet is calibrated, on this machine or another."""
 
 from __future__ import annotations
 
@@ -6,85 +6,35 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from gmwm import filter_numbers
 from gmwm._core import checks
 from gmwm._core.files import opened
-from gmwm._core.frozen import freeze
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm._core.notices import Notice
-from gmwm.calibration import Calibration, calibrate, floor, noise_density, random_walk
+from gmwm.calibration import calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.population.paths import Item
+from gmwm.population.unit import DERIVED, Number, Unit
 from gmwm.process import Model
 from gmwm.readers import Recording, read
-
-DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
-"""Numbers that units of every structure have, and their units: the N and K that bound a unit for
-the horizon (`gmwm.bound`), and the bias instability at the lowest point of its curve."""
-
-
-class Number(NamedTuple):
-    """A number that was derived from a fit.
-
-    value: SI.
-    found: Else it is an upper bound: of 95 %, or the end of a curve that still falls.
-    """
-
-    value: float
-    stderr: float | None
-    found: bool
-
-
-class Item(NamedTuple):
-    """A recording that is to be calibrated, and what its unit is called."""
-
-    path: str
-    name: str
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit of a fleet.
-
-    path: Of its recording.
-    name: Short, and its own in the fleet.
-    result: Or why there is none.
-    numbers: Channel -> one of `DERIVED` -> `Number`.
-    digest: SHA-256 of the recording; empty where it cannot be read.
-    """
-
-    path: str
-    name: str
-    result: Calibration | Notice
-    numbers: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
-    digest: str = ""
-
-    def __post_init__(self) -> None:
-        freeze(self, "numbers")
-
-    @property
-    def valid(self) -> bool:
-        """Whether a channel has a valid model."""
-        return isinstance(self.result, Calibration) and any(
-            fit.valid for fit in self.result.values()
-        )
 
 
 @dataclass(frozen=True)
 class Task:
-    """How every unit is calibrated; as a function it does so, on whatever machine.
+    """The calibration of a unit as a function of its recording, which can be sent to workers.
 
     reading: Arguments of `gmwm.read`.
     start, stop: Part of the recordings, s.
-    models: Channel, sensor ("gyro", "accel") or "" for all -> what is fitted; selected if empty.
+    models: Channel, sensor ("gyro", "accel") or "" for all -> fitted model; selected if empty.
     still: See `gmwm.calibrate`.
-    horizon: Of the N and K of a filter, s.
-    version: Of the program that numbers are to be from.
+    horizon: Longest outage that N and K of a filter are for, s.
+    version: Version of gmwm that all numbers come from.
     """
 
     reading: Mapping[str, Any]
@@ -98,7 +48,7 @@ class Task:
 
     @property
     def options(self) -> dict[str, Any]:
-        """All that numbers depend on beside the recording, in JSON types."""
+        """Everything but the recording that the numbers depend on, in JSON types."""
         content = {
             "reading": dict(self.reading),
             "start": self.start,
@@ -115,22 +65,23 @@ class Task:
         return dict(json.loads(json.dumps(content)))
 
     def __call__(self, item: Item) -> Unit:
+        """Calibrate a unit; a failure becomes its result and costs no other unit anything."""
         try:
-            return self._done(item)
+            return self._calibrated(item)
         except InputError as error:
             return _failed(item, error.code or "not-calibrated", str(error))
         except MemoryError:
             return _failed(item, "memory", OUT_OF_MEMORY)
-        except Exception as error:  # one recording may cost itself, never the others
+        except Exception as error:
             text = f"{type(error).__name__}: {checks.line(str(error))}"
             return _failed(item, "unexpected", text)
 
     def lost(self, item: Item) -> Unit:
-        """What is reported of a recording at which processes end."""
+        """The result for a recording whose worker processes end."""
         text = f"{ENDED} processes ended at it: it may need more memory than there is"
         return _failed(item, "worker-lost", text)
 
-    def _done(self, item: Item) -> Unit:
+    def _calibrated(self, item: Item) -> Unit:
         from gmwm._core import __version__
 
         if __version__ != self.version:
@@ -148,20 +99,14 @@ class Task:
                 f"{item.path}: changed while it was calibrated: calibrate it again with resume",
                 "recording-changed",
             )
-        return Unit(
-            path=item.path,
-            name=item.name,
-            result=calibration,
-            numbers={name: _numbers(fit, self.horizon) for name, fit in calibration.items()},
-            digest=digest,
-        )
+        numbers = {name: _numbers(fit, self.horizon) for name, fit in calibration.items()}
+        return Unit(item.path, item.name, calibration, numbers, digest)
 
     def _models(self, recording: Recording) -> dict[str, Model] | None:
         if not self.models:
             return None
         found = {}
-        for channel in recording.inertial:
-            name = channel.name
+        for name in (channel.name for channel in recording.inertial):
             keys = [key for key in (name, name.partition("_")[0], "") if key in self.models]
             if keys:
                 found[name] = self.models[keys[0]]
@@ -173,16 +118,16 @@ def _failed(item: Item, code: str, text: str) -> Unit:
 
 
 def _state(path: str) -> list[tuple[int, int]]:
-    """Size and time of change of a file, or of those of a folder."""
+    """Size and time of change of a file, or of the files of a folder."""
     try:
         parts = sorted(Path(path).iterdir()) if os.path.isdir(path) else [Path(path)]
         return [(each.stat().st_size, each.stat().st_mtime_ns) for each in parts]
-    except (OSError, ValueError):  # hashing it says why
+    except (OSError, ValueError):  # the digest reports why
         return []
 
 
 def digest_of(path: str) -> str:
-    """SHA-256 of a file, or of the files of a folder, which a bag of ROS 2 is.
+    """SHA-256 of a file, or of the files of a folder such as a bag of ROS 2.
 
     Raises InputError if it cannot be read.
     """
@@ -190,8 +135,8 @@ def digest_of(path: str) -> str:
         if not os.path.isdir(path):
             with opened(path) as stream:
                 return hashlib.file_digest(stream, "sha256").hexdigest()
-        parts = [f"{each.name} {digest_of(str(each))}\n"
-                 for each in sorted(Path(path).iterdir()) if each.is_file()]  # fmt: skip
+        files = [each for each in sorted(Path(path).iterdir()) if each.is_file()]
+        parts = [f"{each.name} {digest_of(str(each))}\n" for each in files]
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{path}: cannot be read ({why}): check the path") from None
@@ -199,19 +144,18 @@ def digest_of(path: str) -> str:
 
 
 def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
-    """Those of `DERIVED` that a fit gives."""
-    low = floor(fit)
-    found = {"floor_B": Number(low.bias_instability, None, not low.falls)}
+    """The numbers of `DERIVED` that a fit gives."""
+    found: dict[str, Number] = {}
     try:
-        numbers = filter_numbers.bound(fit, horizon=horizon)
-        for letter, value, level in (
-            ("N", numbers.N, noise_density), ("K", numbers.K, random_walk),
-        ):  # fmt: skip
-            if value > 0.0:
-                number = Number(value, numbers.stderr.get(letter), True)
-            else:
-                number = Number(level(fit).value, None, False)
-            found[f"filter_{letter}"] = number
+        bound = filter_numbers.bound(fit, horizon=horizon)
+        for letter, value, level in (("N", bound.N, noise_density), ("K", bound.K, random_walk)):
+            found[f"filter_{letter}"] = (
+                Number(value, bound.stderr.get(letter), True)
+                if value > 0.0
+                else Number(level(fit).value, None, False)
+            )
     except InputError:
-        pass  # no filter of white noise and a random walk bounds it
+        pass  # no white noise and random walk bound this model
+    low = floor(fit)
+    found["floor_B"] = Number(low.bias_instability, None, not low.falls)
     return {name: found[name] for name in DERIVED if name in found}

@@ -1,7 +1,7 @@
 """Whether the wavelet variances of several recordings are equal, level by level.
 
-Structures differ between recordings of one sensor far more than curves do, so the test knows the
-models by the covariances of the wavelet variances only, which they imply.
+Structures of models differ between recordings of one sensor far more than curves do. So the test
+uses the models only for the covariances of the wavelet variances.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
-from gmwm.comparison import tuning
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import (
     Scales,
@@ -23,6 +22,7 @@ from gmwm.estimate.problem import (
     gls_slope,
     weight_root,
 )
+from gmwm.population import tuning
 from gmwm.process import Model
 
 PARTS = ("short", "Q", "N", "B", "K", "R")
@@ -37,9 +37,8 @@ class Curve:
     """Wavelet variances of one recording with their errors.
 
     tau: (J,), averaging times, s.
-    variance: (J,), without a drift where one was removed, u^2.
-    relative: (J, J), covariance of ``variance`` over the product of the variances, as models imply
-        it.
+    variance: (J,), u^2, without a drift where one was removed.
+    relative: (J, J), covariance of the variances over the product of those that the models imply.
     """
 
     tau: FloatArray
@@ -48,14 +47,14 @@ class Curve:
 
     @classmethod
     def of(cls, fit: Fit, noises: Sequence[Model], *, drifting: bool) -> Curve:
-        """The data of a fit, at the levels that are known well enough.
+        """The data of a fit, up to the last level that is known well enough.
 
-        The covariances are those of the mean spectrum of all recordings. If these are equal, it is
-        nearer to the truth than each: a walk that one of them misses changes the covariances at
-        long averaging times by half.
+        Covariances are those of the mean spectrum of all recordings. If they are equal, it is
+        nearer to the truth than each: a random walk that one model misses changes the covariances
+        at long averaging times by half.
 
-        noises: Those of all recordings, without drifts.
-        drifting: Whether a drift is removed, also one that the fitted model does not have.
+        noises: Models of all recordings, without drifts.
+        drifting: Whether a drift is removed, even one that the fitted model does not have.
         """
         wv, scales, share = fit.wv, Scales.of(fit.wv), 1.0 / len(noises)
         spectra = [scales.spectrum(noise) for noise in noises]
@@ -95,14 +94,14 @@ class Difference:
 
     @property
     def extent(self) -> float:
-        """The largest over the smallest of the deviations, less one."""
+        """The largest deviation over the smallest, less one."""
         return float(np.nanmax(self.ratios) / np.nanmin(self.ratios) - 1.0)
 
     @property
     def sigma(self) -> float:
-        """Standard errors of the difference: the point of a normal variable that is as unlikely.
+        """Significance as the point of a normal variable that is as improbable.
 
-        Of two recordings, their difference over its standard error.
+        For two recordings, their difference over its standard error.
         """
         known = np.isfinite(self.ratios)
         values, weight = np.log(self.ratios[known]), self.errors[known] ** -2.0
@@ -115,7 +114,7 @@ class Difference:
 
     @property
     def resolution(self) -> float:
-        """Relative difference of two of the recordings that would have been found, mostly."""
+        """Relative difference of two of the recordings that would most likely have been found."""
         errors = self.errors[np.isfinite(self.errors)]
         return float(tuning.POWER * np.sqrt(2.0 * np.mean(errors**2)))
 
@@ -124,12 +123,12 @@ class Difference:
 class Equality:
     """Test that several recordings have the same wavelet variances.
 
-    tau: (J,), averaging times that two recordings have at least, s.
-    common: (J,), their mean wavelet variance, u^2.
+    tau: (J,), averaging times that at least two recordings have, s.
+    common: (J,), mean wavelet variance, u^2.
     ratios, errors: (R, J), Allan deviation of each recording over the common one, and relative
         standard errors; NaN where a recording has no such level.
     chi_square: Weighted sum of squares about the common curve, on cube roots of the variances.
-    differences: Part by part of the plot.
+    differences: Differences in the parts of the plot.
     """
 
     tau: FloatArray
@@ -142,7 +141,7 @@ class Equality:
 
     @property
     def p_value(self) -> float:
-        """Of recordings that are equal; NaN where nothing can be compared."""
+        """p-value of equal recordings; NaN where nothing can be compared."""
         return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
 
     @property
@@ -153,14 +152,10 @@ class Equality:
 
     @classmethod
     def of(cls, fits: Sequence[Fit]) -> Equality:
-        """Of fits to several recordings of one channel at one rate.
-
-        Cube roots of chi-square variables are close to normal (Wilson & Hilferty 1931, *PNAS* 17,
-        684-688); the common curve is their mean by generalized least squares.
-        """
+        """The test for fits to several recordings of one channel at one rate."""
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
         terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]
-        noises = [Model(each) for each in terms if each]  # lines of an Allan plot may be a ramp
+        noises = [Model(each) for each in terms if each]  # an Allan fit may have a ramp only
         curves = [Curve.of(fit, noises, drifting=drifting) for fit in fits]
         levels = sorted(curve.tau.size for curve in curves)[-2]
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
@@ -173,16 +168,20 @@ class Equality:
         weight = np.where(known, 1.0 / np.where(known, share, 1.0), 0.0)
         common = np.sum(weight * np.where(known, variance, 0.0), axis=0) / np.sum(weight, axis=0)
         ratios = np.sqrt(variance / common)
-        return cls(
-            tau, common, ratios, 0.5 * np.sqrt(share),
-            *_heterogeneity(curves, common),
-            _differences(tau, common, np.log(ratios), curves),
-        )  # fmt: skip
+        chi_square, dof = _chi_square(curves, common)
+        differences = _differences(tau, common, np.log(ratios), curves)
+        return cls(tau, common, ratios, 0.5 * np.sqrt(share), chi_square, dof, differences)
 
 
-def _heterogeneity(curves: Sequence[Curve], common: FloatArray) -> tuple[float, int]:
-    """The test's statistic and its degrees of freedom."""
+def _chi_square(curves: Sequence[Curve], common: FloatArray) -> tuple[float, int]:
+    """Statistic of the test and its degrees of freedom.
+
+    Cube roots of chi-square variables are close to normal (Wilson & Hilferty 1931, *PNAS* 17,
+    684-688); the common curve is their mean by generalized least squares.
+    """
     levels = common.size
+    if levels == 0:
+        return float("nan"), 0
     information, right = np.zeros((levels, levels)), np.zeros(levels)
     points = []
     for curve in curves:
@@ -195,8 +194,6 @@ def _heterogeneity(curves: Sequence[Curve], common: FloatArray) -> tuple[float, 
         information[:size, :size] += root.T @ root
         right[:size] += root.T @ (root @ value)
         points.append((value, root))
-    if levels == 0:
-        return float("nan"), 0
     mean = np.linalg.solve(information, right)
     away = [root @ (value - mean[: value.size]) for value, root in points]
     return float(sum(each @ each for each in away)), sum(each.size for each in away) - levels
@@ -205,10 +202,12 @@ def _heterogeneity(curves: Sequence[Curve], common: FloatArray) -> tuple[float, 
 def _differences(
     tau: FloatArray, common: FloatArray, logs: FloatArray, curves: Sequence[Curve]
 ) -> tuple[Difference, ...]:
-    """The recordings' differences in each part of the plot."""
+    """Differences of the recordings in each part of the plot that two of them have."""
     if tau.size < 2:
         return ()
-    parts = _parts(tau, common)
+    fine = tau < max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * float(tau[0]))
+    slope = np.gradient(np.log(common), np.log(tau))
+    parts: NDArray[np.intp] = np.where(fine, 0, 1 + np.searchsorted(_SLOPES, slope))
     found = []
     for place, part in enumerate(PARTS):
         levels = np.flatnonzero(parts == place)
@@ -225,10 +224,3 @@ def _differences(
             ends = float(tau[levels[0]]), float(tau[levels[-1]])
             found.append(Difference(part, *ends, ratios, errors))
     return tuple(found)
-
-
-def _parts(tau: FloatArray, common: FloatArray) -> NDArray[np.intp]:
-    """Which part each level is of, by the slope of the common curve."""
-    slope = np.gradient(np.log(common), np.log(tau))
-    fine = tau < max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * float(tau[0]))
-    return np.where(fine, 0, 1 + np.searchsorted(_SLOPES, slope))

@@ -1,4 +1,4 @@
-"""Many sensors of one kind: each calibrated by itself, and what they have in common."""
+"""`fleet`: many units of a sensor, each calibrated by itself, and what they have in common."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from gmwm._core import checks
@@ -24,13 +25,13 @@ from gmwm._core.text import bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
-from gmwm.fleet import tuning
-from gmwm.fleet.paths import OUTPUTS, Paths, recordings
-from gmwm.fleet.spread import Spread, Structures, spreads_of, structures_of
-from gmwm.fleet.store import Store, opened_store, read_index, write_index
-from gmwm.fleet.table import SCHEMA, Row, arrow, rows_of
-from gmwm.fleet.tolerance import needed_units
-from gmwm.fleet.unit import DERIVED, Task, Unit
+from gmwm.population import tuning
+from gmwm.population.paths import OUTPUTS, Paths, recordings
+from gmwm.population.spread import Spread, Structures, spreads_of, structures_of
+from gmwm.population.store import Store, opened_store, read_index, write_index
+from gmwm.population.task import Task
+from gmwm.population.tolerance import needed_units
+from gmwm.population.unit import DERIVED, SCHEMA, Row, Unit, rows_of
 from gmwm.process import Model, Process, as_model
 from gmwm.readers import read
 
@@ -40,14 +41,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Fleet(Mapping[str, Calibration | Notice]):
-    """Units of a sensor: a mapping of paths to a `Calibration` each, or a `Notice` of why not.
+    """Units of a sensor: a mapping of paths to a `Calibration`, or to a `Notice` of why not.
 
     Attributes
     ----------
     units : dict
         Path -> `Unit`.
     horizon : float
-        Time without aiding of the N and K of a filter, s.
+        Longest outage that N and K of a filter are for, s.
     options : dict
         How every unit was calibrated.
     notices : tuple of Notice
@@ -75,12 +76,12 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     @property
     def done(self) -> dict[str, Calibration]:
-        """Those that are calibrated."""
+        """Units that are calibrated."""
         return {path: each for path, each in self.items() if isinstance(each, Calibration)}
 
     @property
     def failed(self) -> dict[str, Notice]:
-        """Why the others are not."""
+        """Why the other units are not."""
         return {path: each for path, each in self.items() if isinstance(each, Notice)}
 
     @property
@@ -90,7 +91,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Of the table; see `gmwm.fleet.SCHEMA`."""
+        """Rows of the table: one per unit, channel and parameter."""
         return tuple(rows_of(self.units.values()))
 
     @cached_property
@@ -112,46 +113,34 @@ class Fleet(Mapping[str, Calibration | Notice]):
         return html
 
     def __str__(self) -> str:
-        count = sum(unit.valid for unit in self.units.values())
+        valid = sum(unit.valid for unit in self.units.values())
         lines = [
-            f"{len(self)} units: {len(self.done)} calibrated, {count} of them with a valid model"
+            f"{len(self)} units: {len(self.done)} calibrated, {valid} of them with a valid model"
         ]
         shown = [each for each in self.spreads if each.parameter in DERIVED]
         if shown:
             head = f"{'channel':<10} {'number':<9} {'units':>5} {'median':>9} {'spread':>7}"
-            lines += ["", f"{head} {'limit':>9}  unit"]
-        for each in shown:
-            unit, scale = each.field_unit
-            spread = per_cent(each.sd, 3) if each.sd >= 0.0 else "-"
-            limit = f"{each.normal_limit * scale:.4g}" if each.sd >= 0.0 else "-"
-            lines.append(
-                f"{each.channel:<10} {each.parameter:<9} {each.n:>5} {each.median * scale:>9.4g} "
-                f"{spread:>7} {limit:>9}  {unit}"
+            lines += ["", f"{head} {'limit':>9}  unit", *map(_line, shown), ""]
+            lines += wrapped(
+                f"filter: for outages up to {self.horizon:g} s; floor: bias instability. Limit: "
+                "95 % of units are below this (95 % confidence, log-normal)."
             )
-        if shown:
-            lines += ["", *wrapped(
-                f"filter: for {self.horizon:g} s without aiding; floor: lowest point of the curve. "
-                "Limit: of 95 % of all units with 95 % confidence, if logarithms are normal."
-            )]  # fmt: skip
         for axis in self.structures:
             if axis.different:
-                most = next(iter(axis.counts))
-                text = (
-                    f"{axis.channel}: {axis.counts[most]} of {sum(axis.counts.values())} units are "
-                    f"{most}, {axis.different} of another structure"
-                )
-                lines += bullets([text])
+                usual = next(iter(axis.counts))
+                lines += bullets([
+                    f"{axis.channel}: {axis.counts[usual]} of {sum(axis.counts.values())} units "
+                    f"are {usual}, {axis.different} have another structure"
+                ])  # fmt: skip
             if axis.invalid:
-                text = f"{axis.channel}: not valid in {some(axis.invalid)}"
-                lines += bullets([text])
-        for each in self.spreads:
-            for outlier in each.outliers:
-                lines += wrapped(
-                    f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
-                    f"{outlier.value / each.median:.3g} times the median", first="- ", indent=2,
-                )  # fmt: skip
-        lines += bullets(self.notices)
-        return "\n".join(lines)
+                lines += bullets([f"{axis.channel}: not valid in {_some(axis.invalid)}"])
+        lines += bullets(
+            f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
+            f"{outlier.value / each.median:.3g} times the median"
+            for each in self.spreads
+            for outlier in each.outliers
+        )
+        return "\n".join(lines + bullets(self.notices))
 
     def to_frame(self) -> pandas.DataFrame:
         """A row per unit, channel and parameter, in SI units; needs pandas."""
@@ -194,7 +183,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
         Raises
         ------
         InputError
-            If the folder holds none that was finished, or one of its files is damaged.
+            If the folder holds no finished fleet, or one of its files is damaged.
         """
         units, horizon, options, notices = read_index(Path(folder))
         return cls({unit.path: unit for unit in units}, horizon, options, tuple(notices))
@@ -203,10 +192,27 @@ class Fleet(Mapping[str, Calibration | Notice]):
         """Write the table, the report and the list of units, all or none."""
         _, table, page, index = OUTPUTS
         with moved_together(store.folder) as new:
-            pq.write_table(arrow(self.rows), new / table)
+            pq.write_table(pa.Table.from_pylist(list(self.rows), schema=SCHEMA), new / table)
             self.report(new / page)
             units = self.units.values()
             write_index(new / index, units, self.horizon, self.options, self.notices)
+
+
+def _line(spread: Spread) -> str:
+    """A line of the printed table."""
+    unit, scale = spread.field_unit
+    known = spread.sd >= 0.0
+    sd = per_cent(spread.sd, 3) if known else "-"
+    limit = f"{spread.normal_limit * scale:.4g}" if known else "-"
+    return (
+        f"{spread.channel:<10} {spread.parameter:<9} {spread.n:>5} {spread.median * scale:>9.4g} "
+        f"{sd:>7} {limit:>9}  {unit}"
+    )
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first names of a list."""
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
 def fleet(
@@ -225,26 +231,26 @@ def fleet(
     progress: Progress | None = None,
     **reading: Any,
 ) -> Fleet:
-    """Calibrate many units of a sensor, a recording of each.
+    """Calibrate many units of a sensor, one recording of each.
 
-    A recording that cannot be used is reported and costs the others nothing. Several recordings of
-    one unit are for `gmwm.calibrate`.
+    A recording that cannot be used is reported and costs the others nothing. For several recordings
+    of one unit use `gmwm.calibrate`.
 
     Parameters
     ----------
     paths : path, pattern or iterable of them
-        Of the recordings; a pattern is as in ``"lot-7/**/*.csv"``.
+        The recordings; a pattern is as in ``"lot-7/**/*.csv"``.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel or sensor ("gyro", "accel"); selected by default.
     screening, still
         See `gmwm.calibrate`.
     horizon : float, optional
-        Time without aiding for which N and K of a filter are found, s; see `gmwm.bound`.
+        Longest outage that N and K of a filter are for, s; see `gmwm.bound`.
     start, stop : float, optional
         Part of each recording, s.
     folder : path, optional
-        Where each calibration is kept as soon as it is done, the table (``fleet.parquet``) and the
-        report (``fleet.html``) at the end; see `Fleet.load`.
+        Where each calibration is kept as soon as it is done, and the table (``fleet.parquet``) and
+        the report (``fleet.html``) at the end; see `Fleet.load`.
     resume : bool, optional
         Go on with what the folder holds: recordings that have not changed are not calibrated again.
     jobs : int, optional
@@ -265,154 +271,131 @@ def fleet(
     """
     place = None if folder is None else Path(folder)
     items = recordings(paths, place)
-    task = _task(model, screening, still, horizon, start, stop, reading)
+    task = _task(model, screening, still, horizon, (start, stop), reading)
     jobs = jobs if jobs == -1 else checks.whole("jobs", jobs, 1)
-    if place is not None:
-        for name in OUTPUTS[1:]:
-            replaceable(place / name)
-    kept: dict[str, Unit] = {}
-    notices: list[Notice] = []
+    for name in OUTPUTS[1:] if place is not None else ():
+        replaceable(place / name)
+    units: dict[str, Unit] = {}
     with nullcontext() if place is None else opened_store(place, task.options, resume) as store:
-
-        def report() -> None:
-            if progress is not None:
-                progress(len(kept), len(items), "")
-
-        for item in items:
-            unit = None if store is None else store.kept(item)
-            if unit is not None:
-                kept[item.path] = unit
-        report()
-        todo = [item for item in items if item.path not in kept]
+        if store is not None:
+            kept = {item.path: store.kept(item) for item in items}
+            units = {path: unit for path, unit in kept.items() if unit is not None}
+        if progress is not None:
+            progress(len(units), len(items), "")
+        todo = [item for item in items if item.path not in units]
         with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
             for item, unit in found:
                 if store is not None:
                     store.save(unit)
-                kept[item.path] = unit
-                report()
-        units = {item.path: kept[item.path] for item in items}
+                units[item.path] = unit
+                if progress is not None:
+                    progress(len(units), len(items), "")
+        units = {item.path: units[item.path] for item in items}
+        notices = _notices(units.values())
         if store is not None:
-            notices += _left_over(store.left_over(items))
-        made = Fleet(units, task.horizon, task.options, (*_about(units.values()), *notices))
+            names = {item.name for item in items}
+            notices += _left_over([e.stem for e in store.calibrations if e.stem not in names])
+        made = Fleet(units, task.horizon, task.options, tuple(notices))
         if not made.done:
-            raise _nothing_done(made)
+            first, *others = made.failed.values()
+            text = f"none of {len(others) + 1} recordings can be calibrated; the first: "
+            raise InputError((text if others else "") + first.text, first.code)
         if store is not None:
             made._conclude(store)
     return made
 
 
 def _task(
-    model: Any, screening: Collection[str], still: bool, horizon: float, start: float,
-    stop: float | None, reading: Mapping[str, Any],
+    model: Any, screening: Collection[str], still: bool, horizon: float,
+    part: tuple[float, float | None], reading: Mapping[str, Any],
 ) -> Task:  # fmt: skip
-    """How units are calibrated, checked before any work."""
+    """The options, checked before any work."""
     from gmwm._core import __version__
 
-    _, *known = signature(read).parameters.values()
-    usual = {each.name: each.default for each in known}
+    _, *parameters = signature(read).parameters.values()
+    usual = {each.name: each.default for each in parameters}
     for name in reading:
         checks.choice("argument", name, tuple(usual))
     models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
     for name in screening:
         checks.choice("screening", name, SCREENING)
+    start, stop = part
     for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
         if not checks.is_number(given):
             raise InputError(f"{name} = {checks.shown(given)}: give seconds")
     return Task(
-        # What is as by default is the same fleet, whether it was written or not.
+        # Options that are at their defaults do not tell one fleet from another.
         reading={k: v for k, v in reading.items() if v != usual[k] and v not in (None, (), {})},
         start=float(start),
         stop=None if stop is None else float(stop),
         models={str(name): as_model(each) for name, each in models.items()},
         screening=tuple(screening),
         still=checks.truth("still", still),
-        horizon=checks.positive("horizon", horizon, "give a time without aiding in seconds"),
+        horizon=checks.positive("horizon", horizon, "give the longest outage in seconds"),
         version=__version__,
     )
 
 
-def _nothing_done(made: Fleet) -> InputError:
-    reasons = list(made.failed.values())
-    text = reasons[0].text
-    if len(reasons) > 1:
-        text = f"none of {len(reasons)} recordings can be calibrated; the first: {text}"
-    return InputError(text, reasons[0].code)
+# -- notices --------------------------------------------------------------------------------------
 
 
 def _left_over(names: Sequence[str]) -> list[Notice]:
-    if not names:
-        return []
-    text = (
-        f"the folder holds {len(names)} calibrations of other recordings, which are not counted: "
-        f"{some(names)}"
-    )
-    return [Notice("left-over", "note", "", text, {"units": len(names)})]
+    """Calibrations in the folder that are of no recording given."""
+    text = f"the folder also holds {len(names)} calibrations of other recordings: {_some(names)}"
+    return [Notice("left-over", "note", "", text, {"units": len(names)})] if names else []
 
 
-def some(names: Sequence[str]) -> str:
-    """The first names of a list."""
-    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-
-
-def _about(units: Collection[Unit]) -> list[Notice]:
+def _notices(units: Collection[Unit]) -> list[Notice]:
     """Which units failed, and what makes the others unlike each other."""
     notices = [unit.result for unit in units if isinstance(unit.result, Notice)]
-    done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
-    return [*notices, *_copies(units), *_unlike(done)]
-
-
-def _have(names: Sequence[str]) -> str:
-    return "1 unit has" if len(names) == 1 else f"{len(names)} units have"
-
-
-def _channels(calibration: Calibration) -> tuple[str, ...]:
-    return (*calibration, *calibration.skipped)
-
-
-def _copies(units: Collection[Unit]) -> Iterator[Notice]:
     same: dict[str, list[str]] = {}
     for unit in units:
-        if unit.digest:
-            same.setdefault(unit.digest, []).append(unit.name)
-    for names in same.values():
-        if len(names) > 1:
-            text = f"the same recording: {some(names)}"
-            yield Notice("same-recording", "warning", "", text, {"units": len(names)},
-                         "each is counted; leave copies out")  # fmt: skip
+        same.setdefault(unit.digest or unit.path, []).append(unit.name)
+    for names in (names for names in same.values() if len(names) > 1):
+        text = f"the same recording: {_some(names)}"
+        notices.append(Notice("same-recording", "warning", "", text, {"units": len(names)},
+                              "each is counted; leave copies out"))  # fmt: skip
+    done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
+    return notices + (_differences(done) if done else [])
 
 
-def _unlike(done: Mapping[str, Calibration]) -> Iterator[Notice]:
-    """Rates, channels and lengths that are not the same in all units."""
-    if not done:
-        return
+def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
+    """Rates, channels and lengths that are not the same in all units, and too few units."""
+
+    def have(names: Sequence[str]) -> str:
+        return "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+
+    notices = []
     median = sorted(each.rate for each in done.values())[len(done) // 2]
     other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
     if other:
-        text = f"{_have(other)} another sampling rate than {median:g} Hz: {some(other)}"
-        yield Notice("rates-differ", "warning", "", text, {"units": len(other), "rate": median},
-                     "make sure that they are of one kind")  # fmt: skip
+        text = f"{have(other)} another sampling rate than {median:g} Hz: {_some(other)}"
+        values = {"units": len(other), "rate": median}
+        hint = "make sure that they are of one kind"
+        notices.append(Notice("rates-differ", "warning", "", text, values, hint))
+    channels = {name: (*each, *each.skipped) for name, each in done.items()}
     lacking: dict[tuple[str, ...], list[str]] = {}
-    for channel in dict.fromkeys(name for each in done.values() for name in _channels(each)):
-        names = tuple(name for name, each in done.items() if channel not in _channels(each))
+    for channel in dict.fromkeys(channel for own in channels.values() for channel in own):
+        names = tuple(name for name, own in channels.items() if channel not in own)
         lacking.setdefault(names, []).append(channel)
-    for names, channels in lacking.items():
+    for names, missing in lacking.items():
         if names:
-            text = f"{_have(names)} no such channel: {some(names)}"
-            values = {"units": len(names)}
-            yield Notice("channels-differ", "warning", ", ".join(channels), text, values)
+            text = f"{have(names)} no such channel: {_some(names)}"
+            notices.append(Notice("channels-differ", "warning", ", ".join(missing), text,
+                                  {"units": len(names)}))  # fmt: skip
     lengths = {name: each.duration for name, each in done.items()}
-    longest, shortest = max(lengths.values()), min(lengths.values())
+    name = min(lengths, key=lengths.__getitem__)
+    shortest, longest = lengths[name], max(lengths.values())
     if longest > tuning.LENGTHS * shortest:
-        name = min(lengths, key=lambda each: lengths[each])
         text = (
             f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
             "scatter more"
         )
-        yield Notice("lengths-differ", "note", "", text, {"shortest": shortest, "longest": longest})
+        values = {"shortest": shortest, "longest": longest}
+        notices.append(Notice("lengths-differ", "note", "", text, values))
     needed = needed_units()
     if len(done) < needed:
-        text = (
-            f"{len(done)} units: an upper limit without assuming a distribution takes {needed}; "
-            "limits of normal theory extrapolate"
-        )
-        yield Notice("few-units", "note", "", text, {"units": len(done), "needed": needed})
+        text = f"{len(done)} units: a distribution-free limit needs {needed}"
+        values = {"units": len(done), "needed": needed}
+        notices.append(Notice("few-units", "note", "", text, values))
+    return notices
