@@ -14,7 +14,8 @@ import numpy as np
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import Printed, brief, bullets, made_by, per_cent, wrapped
+from gmwm._core.pages import make
+from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.comparison import tuning
@@ -322,8 +323,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        written: Path = made_by(
-            "write_sensor_comparison_report", self, path,
+        written: Path = make(
+            "page", self, path,
             datasheet=datasheet, provenance=provenance,
         )  # fmt: skip
         return written

@@ -18,8 +18,9 @@ from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
+from gmwm._core.pages import make
 from gmwm._core.runs import results
-from gmwm._core.text import bullets, made_by, per_cent, wrapped
+from gmwm._core.text import bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import SCREENING, Calibration
 from gmwm.errors import InputError, MissingNameError
@@ -107,7 +108,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
         return f"<Fleet of {len(self)} units: {len(self.done)} calibrated{failed}>"
 
     def _repr_html_(self) -> str:
-        html: str = made_by("fleet_fragment", self)
+        html: str = make("fragment", self)
         return html
 
     def __str__(self) -> str:
@@ -169,7 +170,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the self-contained HTML report; see `gmwm.report.write_fleet_report`."""
-        written: Path = made_by("write_fleet_report", self, path)
+        written: Path = make("page", self, path)
         return written
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
@@ -305,7 +306,7 @@ def _task(
     stop: float | None, reading: Mapping[str, Any],
 ) -> Task:  # fmt: skip
     """How units are calibrated, checked before any work."""
-    from gmwm import __version__
+    from gmwm._core import __version__
 
     _, *known = signature(read).parameters.values()
     usual = {each.name: each.default for each in known}

@@ -131,7 +131,7 @@ class Task:
         return _failed(item, "worker-lost", text)
 
     def _done(self, item: Item) -> Unit:
-        from gmwm import __version__
+        from gmwm._core import __version__
 
         if __version__ != self.version:
             raise InputError(

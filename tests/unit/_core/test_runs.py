@@ -105,7 +105,7 @@ def test_runs_of_another_study_are_not_mixed_in(tmp_path, change, other):
 
 def test_nor_those_of_another_version(tmp_path, monkeypatch):
     do_runs(squares, 2, STUDY, folder=tmp_path)
-    monkeypatch.setattr("gmwm.__version__", "0.0.0")
+    monkeypatch.setattr("gmwm._core.__version__", "0.0.0")
     with pytest.raises(InputError, match=r"other version"):
         do_runs(squares, 2, STUDY, folder=tmp_path)
 

@@ -203,7 +203,7 @@ def test_units_of_other_options_are_not_mixed_in(lot, copied, worked, change, ot
 
 
 def test_nor_those_of_another_version(lot, copied, monkeypatch):
-    monkeypatch.setattr("gmwm.__version__", "0.0.0")
+    monkeypatch.setattr("gmwm._core.__version__", "0.0.0")
     with pytest.raises(InputError, match="other version"):
         gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
 

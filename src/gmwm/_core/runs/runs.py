@@ -181,7 +181,7 @@ def _stacked(rows: Sequence[Mapping[str, Any]]) -> Values:
 @contextmanager
 def _store(folder: Path | None, study: Mapping[str, Any], earlier: Earlier) -> Iterator[_Store]:
     """What is kept of a study, for one writer at a time; saved in any case at the end."""
-    from gmwm import __version__
+    from gmwm._core import __version__
 
     # Another version of the program may give other numbers.
     store = _Store(folder, json.loads(json.dumps({**study, "version": __version__})))

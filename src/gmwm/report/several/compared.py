@@ -11,6 +11,7 @@ import numpy as np
 
 from gmwm._core.files import writable_file
 from gmwm._core.notices import worst_first
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief
 from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.estimate import Estimate, Fit
@@ -32,6 +33,7 @@ _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 
 
+@page_of(SensorComparison)
 def write_sensor_comparison_report(
     comparison: SensorComparison,
     path: str | os.PathLike[str],
