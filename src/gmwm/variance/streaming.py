@@ -12,34 +12,29 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.files import existing_file, moved_into_place
-from gmwm._core.typing import ArrayLike
+from gmwm._core.typing import ArrayLike, FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers import Channel
-from gmwm.variance.streaming.kernels import first_infinite
-from gmwm.variance.streaming.result import variance_of
-from gmwm.variance.streaming.series import Series
+from gmwm.variance import stream_kernels as kernels, tuning
+from gmwm.variance.stream_result import variance_of
 from gmwm.variance.wavelet import WaveletVariance
 
-_FORMAT = "gmwm.streaming_variance"
-_VERSION = 2
-_NONE = np.zeros(0)
+_FORMAT, _VERSION = "gmwm.streaming_variance", 3
 _QUANTITY = {unit: quantity for quantity, unit in SI_UNIT.items()}
 
 
 class StreamingVariance:
-    """Haar wavelet variance of samples that come in blocks, in memory that does not grow.
+    """Haar wavelet variance of live samples that come in blocks, in memory that does not grow.
 
-    Averaging times of up to 512 samples see all windows, longer ones those that begin at multiples
-    of 1/512 of them: a sampling variance larger by 5e-6. Where a record without missing samples has
-    room for few of the longest, nearly all of these count; a part with ``start`` that is not joined
-    to what is before it may lack that averaging time. Some 5 MB a channel hold what is needed,
-    however long the record. The sums, to the last bit, do not depend on how the samples are divided
-    into blocks; a large offset does no harm.
+    Averaging times of up to 512 samples see all windows. Longer ones see those that begin at
+    multiples of 1/512 of them, which raises the sampling variance by 5e-6. Where a record without
+    missing samples has room for few of the longest windows, nearly all of these count. A channel
+    takes some 4 MB, however long the record. The sums do not depend, to the last bit, on how the
+    samples are divided into blocks; a large offset does no harm.
 
-    Missing samples are NaN. Half windows are means of the samples that are there, if these are
-    three eighths of them at least and do not leave out an end; what that adds to the expected
-    variance is taken off.
+    Missing samples are NaN. Half windows are means of the samples they have, if these are at least
+    three eighths and include both ends; what that adds to the expected variance is subtracted.
 
     Parameters
     ----------
@@ -48,9 +43,6 @@ class StreamingVariance:
     channels : sequence of str, or mapping of str to str, optional
         Names of the channels that blocks have as columns, or names -> SI units (``"rad/s"``,
         ``"m/s^2"``). By default a block is one series.
-    start : int, optional
-        Samples before the first of this part, which is to be joined with `merge`: 0 for the
-        beginning of the record.
     confidence : float, optional
         Level of the chi-square intervals of the result.
 
@@ -73,12 +65,10 @@ class StreamingVariance:
         dt: float,
         channels: Sequence[str] | Mapping[str, str] | None = None,
         *,
-        start: int = 0,
         confidence: float = 0.95,
     ):
         self.dt = checks.sampling_interval(dt)
         self.confidence = checks.share("confidence", confidence, 0.95)
-        begin = checks.whole("start", start, 0)
         if isinstance(channels, str):
             channels = (channels,)
         self._single = channels is None
@@ -92,9 +82,7 @@ class StreamingVariance:
         for unit in self._units.values():
             if unit and unit not in _QUANTITY:
                 raise InputError(f"unit {unit!r} is none of a sensor in SI: give rad/s or m/s^2")
-        self._series = [Series(begin) for _ in names]
-
-    # -- data in -----------------------------------------------------------------------------------
+        self._series = [_Series() for _ in names]
 
     def update(self, block: ArrayLike) -> None:
         """Take in the samples that follow.
@@ -117,77 +105,24 @@ class StreamingVariance:
             raise InputError(f"the block has shape {values.shape}: give one of shape {wanted}")
         columns = [np.ascontiguousarray(column) for column in columns]
         for name, column in zip(self._units, columns, strict=True):
-            bad = first_infinite(column)
+            bad = kernels.first_infinite(column)
             if bad >= 0:
                 raise InputError(
                     f"the block{f', channel {name!r},' if name else ''} is infinite at index {bad} "
-                    f"(sample {self.start + self.n + bad:,}): set it to NaN for missing"
+                    f"(sample {self.n + bad:,}): set it to NaN for missing"
                 )
         for series, column in zip(self._series, columns, strict=True):
             series.absorb(column)
 
-    def merge(self, other: StreamingVariance) -> Self:
-        """Join this part and the one that follows; neither is changed.
-
-        Parameters
-        ----------
-        other : StreamingVariance
-            Made with ``start`` equal to the `end` of this one, perhaps in another process.
-
-        Returns
-        -------
-        StreamingVariance
-            Of the same numbers as one that took in all samples, but for rounding.
-
-        Raises
-        ------
-        InputError
-            If the parts do not belong together.
-        """
-        if not isinstance(other, StreamingVariance):
-            raise InputError(f"{checks.shown(other)} is no streaming variance: merge parts of one")
-        for what in ("dt", "_units"):
-            mine, theirs = getattr(self, what), getattr(other, what)
-            if mine != theirs:
-                raise InputError(
-                    f"the parts do not belong together: {what.strip('_')} is {mine} and {theirs}"
-                )
-        if other.start != self.end:
-            raise InputError(
-                f"the part that follows begins at sample {other.start:,}, and this one ends at "
-                f"{self.end:,}: merge in the order of time, and make each part with "
-                "start=(samples before it)"
-            )
-        made = self._like()
-        pairs = zip(self._series, other._series, strict=True)
-        made._series = [first.joined(second) for first, second in pairs]
-        return made
-
-    def _like(self) -> Self:
-        channels = None if self._single else self._units
-        return type(self)(self.dt, channels, start=self.start, confidence=self.confidence)
-
-    # -- what there is -----------------------------------------------------------------------------
-
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels; none of a single series."""
+        """Names of the channels; none for a single series."""
         return () if self._single else tuple(self._units)
 
     @property
     def n(self) -> int:
         """Samples per channel so far, missing ones included."""
-        return self._series[0].n
-
-    @property
-    def start(self) -> int:
-        """Index of the first sample within the record."""
-        return self._series[0].start
-
-    @property
-    def end(self) -> int:
-        """Index of the sample that comes next."""
-        return self.start + self.n
+        return int(self._series[0].sums.tallies[kernels.N])
 
     def result(self) -> Any:
         """The wavelet variance of the samples so far; more may follow.
@@ -209,12 +144,12 @@ class StreamingVariance:
         return found[""] if self._single else found
 
     def results(self) -> dict[str, WaveletVariance | InputError]:
-        """The same by channel, with the reason in place of the variance of one that has none."""
+        """The same by channel, with the reason in place of a variance that cannot be given."""
         found: dict[str, WaveletVariance | InputError] = {}
         for (name, unit), series in zip(self._units.items(), self._series, strict=True):
             try:
-                channel = Channel(name, _NONE, self.dt, _QUANTITY.get(unit), unit)
-                found[name] = variance_of(series, channel, self.confidence)
+                channel = Channel(name, np.zeros(0), self.dt, _QUANTITY.get(unit), unit)
+                found[name] = variance_of(series.finished().sums, channel, self.confidence)
             except InputError as error:
                 found[name] = error
         return found
@@ -222,8 +157,6 @@ class StreamingVariance:
     def __repr__(self) -> str:
         what = ", ".join(self.channels) or "a series"
         return f"<{type(self).__name__} of {what}: {self.n:,} samples at {1.0 / self.dt:g} Hz>"
-
-    # -- checkpoints -------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to an NPZ file, from which `load` goes on to the last bit.
@@ -253,31 +186,83 @@ class StreamingVariance:
         Raises
         ------
         InputError
-            If the file is missing or is none of them.
+            If the file is missing or was not written by `save`.
         """
         file = existing_file(Path(path))
         with suppress(Exception):  # whatever damaged bytes raise
             # numpy leaves a file open that it cannot read.
             with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            return cls._of_arrays(arrays)
+            if arrays["format"].tolist() != [_FORMAT, str(_VERSION)]:
+                raise ValueError("another kind of file")
+            units = dict(zip(arrays["names"].tolist(), arrays["units"].tolist(), strict=True))
+            dt, confidence = arrays["interval"].tolist()
+            made = cls(dt, None if arrays["single"] else units, confidence=confidence)
+            for i, series in enumerate(made._series):
+                series.set(
+                    {k.partition(".")[2]: v for k, v in arrays.items() if k.startswith(f"{i}.")}
+                )
+            return made
         raise InputError(f"{file.name} is no saved streaming variance: write it with save()")
 
-    @classmethod
-    def _of_arrays(cls, arrays: Mapping[str, Any]) -> Self:
-        if arrays["format"].tolist() != [_FORMAT, str(_VERSION)]:
-            raise ValueError("another kind of file")
-        units = dict(zip(arrays["names"].tolist(), arrays["units"].tolist(), strict=True))
-        dt, confidence = arrays["interval"].tolist()
-        made = cls(dt, None if arrays["single"] else units, confidence=confidence)
-        made._series = [
-            Series.of_arrays(
-                {
-                    name.partition(".")[2]: array
-                    for name, array in arrays.items()
-                    if name.startswith(f"{i}.")
-                }
-            )
-            for i in range(len(units))
-        ]
+
+class _Series:
+    """Sums over the windows of one series, and the values that further windows need."""
+
+    def __init__(self) -> None:
+        rows, levels = tuning.STREAMING_ROWS, kernels.FINE + tuning.STREAMING_ROWS - 1
+        # What the state does not count is never read.
+        self.rows = kernels.Rows(
+            data=np.empty((rows, kernels.ROOM)),
+            present=np.empty((rows, kernels.ROOM)),
+            state=np.zeros((rows, 4), dtype=np.int64),
+        )
+        self.sums = kernels.Sums(
+            levels=np.zeros((levels, 6)),
+            totals=np.zeros(7),
+            tallies=np.zeros(5, dtype=np.int64),
+            gaps=np.zeros((63, 2), dtype=np.int64),
+            blocks=np.zeros((2, kernels.MOST_BLOCKS)),
+            marks=np.full((kernels.SLOTS, 1 + kernels.PLACES), np.nan),
+        )
+        limits = [kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]
+        self.sums.totals[limits] = np.nan, np.inf, -np.inf
+        self.sums.marks[:, 0] = 0.0, -1.0, -1.0, -1.0
+        self._scratch = np.empty((2, kernels.ROOM + 1))
+
+    def absorb(self, samples: FloatArray) -> None:
+        """Take in samples (n,), NaN where one is missing, none infinite."""
+        kernels.absorb(samples, self.rows, self.sums, self._scratch)
+
+    def finished(self) -> _Series:
+        """A copy with all samples worked off; it does not go on."""
+        made = _Series()
+        made.set(self.arrays())
+        kernels.work_off(1, made.rows, made.sums, made._scratch)
         return made
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Everything that goes on from here, as arrays by name."""
+        data, present, state = self.rows
+        used = int(np.sum(state[:, kernels.FILLED] > 0))
+        filled = np.arange(data.shape[1]) < state[:used, kernels.FILLED, None]
+        gappy = state[:used, kernels.GAPPY, None] > 0
+        own = {
+            "data": np.where(filled, data[:used], 0.0),
+            "present": np.where(filled & gappy, present[:used], 0.0),
+            "state": state,
+        }
+        return own | self.sums._asdict()
+
+    def set(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Inverse of `arrays`.
+
+        Raises ValueError if they do not have the shapes and types of a series.
+        """
+        for name, own in (self.rows._asdict() | self.sums._asdict()).items():
+            given = arrays[name]
+            if name in ("data", "present"):
+                own = own[: given.shape[0]]
+            if given.dtype != own.dtype or own.shape != given.shape:
+                raise ValueError(f"{name} is not an array of a series")
+            own[...] = given

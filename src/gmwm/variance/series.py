@@ -38,7 +38,7 @@ def wavelet_variance(
     All levels with at least one coefficient free of end effects are given; the mean of the series
     does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
     averaging time are filled from what is around them, and what that changes in the expected
-    variance is taken off again (`gmwm.variance.gaps.filling`). Coefficients that other missing
+    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing
     samples take part in are left out.
 
     Parameters

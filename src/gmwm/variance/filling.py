@@ -37,8 +37,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.process import PSD, haar_gain, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import block_density
-from gmwm.variance.gaps.effects import Gaps, IntArray, window_count
-from gmwm.variance.gaps.kernels import fill, neighbours
+from gmwm.variance.gap_kernels import fill, neighbours
+from gmwm.variance.gaps import Gaps, IntArray, window_count
 from gmwm.variance.kernels import cumulative
 
 _REACH = 256.0  # blocks: what the frequencies resolve

@@ -2,7 +2,7 @@
 
 A coefficient of averaging time m is made of 2 m samples, so that a few missing ones would take all
 long averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
-coefficients of that level are taken, see `gmwm.variance.gaps.filling`; longer ones split the
+coefficients of that level are taken, see `gmwm.variance.filling`; longer ones split the
 record, as do those in which the level changes by what the noise does not explain: coefficients that
 they take part in are left out.
 """
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
-from gmwm.variance.gaps.kernels import pairs_at_lag
+from gmwm.variance.gap_kernels import pairs_at_lag
 
 IntArray = NDArray[np.int64]
 
