@@ -7,7 +7,6 @@ from .budget import (
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
-    calibrate_stream as calibrate_stream,
     load as load,
     without_departures as without_departures,
 )
@@ -17,7 +16,6 @@ from .diagnosis import (
     Still as Still,
     find_still as find_still,
     health as health,
-    health_stream as health_stream,
 )
 from .errors import (
     FitWarning as FitWarning,
@@ -80,14 +78,12 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
-    StreamedRecording as StreamedRecording,
     StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
-    stream as stream,
     wavelet_variance as wavelet_variance,
 )
 

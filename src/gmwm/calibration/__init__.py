@@ -12,7 +12,6 @@ from gmwm.calibration.stationarity.departures import (
     departures as departures,
 )
 from gmwm.calibration.stationarity.removal import without_departures as without_departures
-from gmwm.calibration.streamed import calibrate_stream as calibrate_stream
 from gmwm.calibration.summary import (
     Level as Level,
     floor as floor,

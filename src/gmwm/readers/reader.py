@@ -44,6 +44,7 @@ from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.rest import rest_notices
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
+from gmwm.readers.spool import load_columns
 from gmwm.readers.table import Table, column_of
 
 
@@ -114,6 +115,12 @@ def read(
         of temperatures, voltages and further clocks are its auxiliary channels. Its
         ``notices`` report what was assumed, which columns were not used and what is missing.
 
+    Notes
+    -----
+    Columns that would need more than 1 GB, with what is made of them, are kept in temporary files
+    (in ``TMPDIR``) and mapped: reading, `gmwm.health` and `gmwm.calibrate` then need about three
+    times the memory of one channel. The environment variable ``GMWM_MEMORY`` sets another limit.
+
     Raises
     ------
     InputError
@@ -159,23 +166,11 @@ def _read(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def part_of(
-    table: Table,
-    given: Given,
-    before: int = 0,
-    told: slice | None = None,
-    elapsed: float = 0.0,
-) -> Part:
-    """The recording of a table, and when it begins.
-
-    before: Rows of parts before this.
-    told: Rows of which notices of the clock tell: those on either side belong to other parts.
-    elapsed: From the start of the record to the first row, s.
-    """
+def part_of(table: Table, given: Given) -> Part:
+    """The recording of a table, and when it begins."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
-    if not before:
-        _check_one_sensor(table, roles)
+    _check_one_sensor(table, roles)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
@@ -184,8 +179,7 @@ def part_of(
     )
 
     arrays, auxiliary, unreadable = _load(table, roles)
-    if not before:  # later parts may hold no samples at all
-        _check_size(table, roles, arrays)
+    _check_size(table, roles, arrays)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
         if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
@@ -202,9 +196,7 @@ def part_of(
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    used_rate, timing, clock_notices = _timing(
-        table, roles.time, arrays, stated, before, told, elapsed
-    )
+    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -296,16 +288,16 @@ def _load(
     """Columns; an auxiliary one that cannot be read, or has another length, is left out."""
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     try:
-        return table.load(sorted(wanted)), list(roles.auxiliary), []
+        return load_columns(table, sorted(wanted)), list(roles.auxiliary), []
     except InputError:
         if not roles.auxiliary:
             raise
-    arrays = table.load(roles.columns)
+    arrays = load_columns(table, roles.columns)
     n = arrays[roles.columns[0]].size
     kept = []
     for column in roles.auxiliary:
         try:
-            values = table.load([column.index])[column.index]
+            values = load_columns(table, [column.index])[column.index]
         except InputError:
             continue
         if values.size == n:
@@ -343,14 +335,11 @@ def _timing(
     time: int | None,
     arrays: Mapping[int, FloatArray],
     stated: float | None,
-    before: int,
-    told: slice | None,
-    elapsed: float,
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return stated or 0.0, None, ()  # without one, it was asked for with the units
-    name, n = table.names[time], arrays[time].size
+    name = table.names[time]
     clock = Clock(
         source=table.source,
         column=column_of(table, time),
@@ -359,11 +348,7 @@ def _timing(
         own_unit=meaning(name).stated,
         where=table.where,
         same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
-        extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
-        elapsed=elapsed,
     )
-    if told is not None:
-        clock = replace(clock, told=(told.start, told.stop))
     timing = timing_of(clock, stated)
     if stated is None:
         return timing.rate, timing, timing.notices

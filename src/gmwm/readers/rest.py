@@ -1,4 +1,4 @@
-"""Sensors at rest: gravity, a small mean rate, and noise that sensors have; and what contradicts it."""
+"""Sensors at rest: units, columns and scales that their mean or noise contradicts."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _swapped(
 def _gravity(
     recording: Recording, force: _Sensor | None, given: Mapping[str, str], has_layout: bool
 ) -> tuple[Notice, ...]:
-    """A mean that is not gravity in the unit used, but in another one, or that has a wrong scale."""
+    """A mean that is gravity in another unit than the one used, or has a wrong scale."""
     if force is None or _is_gravity(force.size):
         return ()
     in_file = force.size / factor(force.unit, SI_UNIT["accel"])

@@ -38,7 +38,10 @@ def _triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
 
 
 def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
-    """Means of blocks of ``size`` samples, (n // size, axes); NaN where 3/4 of a block are missing."""
+    """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
+
+    Returns: (n // size, axes).
+    """
 
     def means(values: FloatArray) -> FloatArray:
         rows = values[: values.size // size * size].reshape(-1, size)

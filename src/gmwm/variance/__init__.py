@@ -12,9 +12,5 @@ from gmwm.variance.gaps import Runs as Runs
 from gmwm.variance.modwt import Modwt as Modwt, imodwt as imodwt, modwt as modwt
 from gmwm.variance.pilot import pilot_psd as pilot_psd
 from gmwm.variance.pooled import PooledVariance as PooledVariance
-from gmwm.variance.streaming import (
-    StreamedRecording as StreamedRecording,
-    StreamingVariance as StreamingVariance,
-    stream as stream,
-)
+from gmwm.variance.streaming import StreamingVariance as StreamingVariance
 from gmwm.variance.wavelet import WaveletVariance as WaveletVariance

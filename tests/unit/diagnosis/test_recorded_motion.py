@@ -9,10 +9,7 @@ import numpy as np
 
 import gmwm
 from gmwm import Recording
-from gmwm._core.notices import Notice
 from gmwm.diagnosis.check import _clock, _unusable
-from gmwm.diagnosis.gathered import gathered
-from gmwm.diagnosis.joined import _lasting, joined
 from gmwm.diagnosis.motion import find_motion, motion_notices
 from gmwm.diagnosis.motion.motion import (
     Motion,
@@ -27,7 +24,6 @@ from gmwm.diagnosis.motion.motion import (
     _white,
     is_moved_with,
 )
-from gmwm.diagnosis.result import ChannelHealth, Health, Repetition
 from gmwm.diagnosis.still import Still, find_still, rest_of, vibration_notice
 from gmwm.diagnosis.still.blocks import blocks_of
 from gmwm.diagnosis.still.loudness import _changes, _split, loudness
@@ -289,65 +285,4 @@ def test_whole_recordings():
     for n in (127, 128):
         rest = {name: channel.values[:n] for name, channel in record().items()}
         found[f"blocks {n}"] = blocks_of(Recording.from_arrays(rest, RATE, UNITS)) is None
-    other = gmwm.health(record())
-    found["joined"] = joined([one, other, one]).content()
-    found["quarters"] = [notice.code for notice in joined([other] * 4).notices]
     assert_as_recorded("diagnosis/whole", found)
-
-
-def part(n=1000, **channel):
-    return Health((), {"gyro_x": ChannelHealth(**channel)}, "log", 10.0, n)
-
-
-def test_parts_of_a_stream():
-    found = {}
-
-    def levels(*noise, lsb=0.0):
-        return joined([part(noise=each, lsb=lsb) for each in noise])
-
-    found["notices"] = [levels(1.0, 1.05, 1.3).notices, levels(1.0, 1.0, 2.0, 3.0).notices]
-    found["from"] = edge(lambda a: any(n.code == "variance" for n in levels(1.0, a).notices),
-                         1.01, 2.0)  # fmt: skip
-    found["bad from"] = edge(
-        lambda a: any(n.severity == "bad" for n in levels(1.0, a, a).notices), 1.01, 2.0
-    )
-    found["step"] = edge(
-        lambda a: any(n.code == "variance" for n in levels(1.0, 3.0, lsb=a).notices), 0.5, 9.0
-    )
-    facts = joined([
-        part(events=((3, 5),), lsb=0.5, outliers=0.1, held=0.2, noise=1.0,
-             lines=((5.0, 1.0), (9.0, 0.1)), repetition=Repetition(3, 1)),
-        part(998, events=((0, 2), (7, 9)), lsb=0.25, noise=2.0, lines=((5.05, 3.0),),
-             resonances=((2.0, 0.1),), repetition=Repetition(3, 0)),
-        part(noise=9.0, lines=((5.15, 2.0), (4.95, 7.0)), repetition=Repetition(3, 1)),
-    ])  # fmt: skip
-    found["facts"] = facts.content()
-    found["lasting"] = [list(_lasting([[(1.0, 1.0)]] * k + [[]] * (4 - k))) for k in (1, 2, 3)]
-    found["same"] = edge(lambda a: len(list(_lasting([[(1.0, 1.0)], [(a, 1.0)]]))) == 1, 1.001, 2.0)
-
-    def noticed(code, where, **values):
-        return Notice(code, "note", where, f"{code} of {where}", values, f"look at {where}")
-
-    many = [
-        noticed("line", "gyro_x", frequency=10.0, ratio=5.0),
-        noticed("line", "gyro_y", frequency=10.05, ratio=9.0),
-        noticed("line", "gyro_x", frequency=10.01, ratio=5.0),
-        noticed("line", "gyro_z", frequency=10.11, ratio=5.0),
-        noticed("line", "accel_x", frequency=10.0, count=3.0), noticed("drift", "gyro_y"),
-        noticed("resonance", "accel_x", frequency=10.0, ratio=5.0),
-    ]  # fmt: skip
-    found["gathered"] = gathered(many)
-    found["near"] = edge(
-        lambda f: len(gathered([many[0], noticed("line", "b", frequency=f, ratio=1.0)])) == 1,
-        10.001, 11.0,
-    )  # fmt: skip
-    twice = [
-        replace(part(), notices=(
-            noticed("event", "gyro_x", height=h, count=2.0, samples=5),
-            noticed("line", "gyro_x", frequency=f, amplitude=h),
-            replace(noticed("dead", "gyro_x"), text=f"{h}"), noticed("clean", "gyro_x"),
-        ))
-        for h, f in ((1.0, 10.0), (-3.0, 10.1), (2.0, 10.3))
-    ]  # fmt: skip
-    found["twice"] = joined(twice).content()
-    assert_as_recorded("diagnosis/stream", found)

@@ -11,7 +11,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
 from gmwm.calibration import tuning
-from gmwm.calibration.stationarity.departures import DEPARTURES, WIDE, Departure
+from gmwm.calibration.stationarity.departures import WIDE, Departure
 from gmwm.estimate import Fit
 from gmwm.variance import WaveletVariance
 
@@ -43,28 +43,6 @@ def with_departures(
         )
     ]
     return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
-
-
-def of_a_stream(fitted: Fit) -> Fit:
-    """A fit whose notices advise what can be done with a file that does not fit into memory.
-
-    No part of it can be chosen, and nothing be taken off: both need all samples.
-    """
-
-    def advised(notice: Notice) -> Notice:
-        values = notice.values
-        if notice.code not in DEPARTURES or not values["evident"] or not notice.hint:
-            return notice
-        first, last = values["time_lower"], values["time_upper"]
-        hint = {
-            "step": f"cut the file: use what is before {first:.6g} s or after {last:.6g} s",
-            "transient": f"cut the first {3.0 * last:.6g} s off the file",
-            "drift-at-start": f"cut the first {last:.6g} s off the file",
-            "slow-period": "find what varies so, such as the temperature",
-        }[notice.code]
-        return replace(notice, hint=hint, values={**values, "streamed": True})
-
-    return replace(fitted, notices=tuple(map(advised, fitted.notices)))
 
 
 def _taken_notices(
