@@ -19,7 +19,7 @@ _ROWS = 1 << 16  # at a time
 class TurningGravity:
     """Changes of the specific force against those that the angular rate explains.
 
-    factor: Of the changes that the rate predicts, by least squares: 1 for a sensor that is turned.
+    factor: Least-squares factor of the predicted changes: 1 for a sensor that is turned.
     explained: Share of the squared changes that the prediction explains: zero for noise.
     change: Root mean square of the predicted changes, m/s^2.
     """
@@ -29,8 +29,8 @@ class TurningGravity:
     change: float
 
 
-def triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
-    """Samples of three axes, if the recording has them all."""
+def _triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
+    """Samples of three axes; None if one is missing."""
     names = [f"{sensor}_{axis}" for axis in AXES]
     if not all(name in recording for name in names):
         return None
@@ -42,29 +42,29 @@ def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
 
     Returns: (n // size, axes).
     """
-    return np.stack([_means(values, size) for values in axes], axis=1)
 
+    def means(values: FloatArray) -> FloatArray:
+        rows = values[: values.size // size * size].reshape(-1, size)
+        known = ~np.isnan(rows)
+        count = np.count_nonzero(known, axis=1)
+        total = np.sum(rows, axis=1, where=known)
+        return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
 
-def _means(values: FloatArray, size: int) -> FloatArray:
-    rows = values[: values.size // size * size].reshape(-1, size)
-    known = ~np.isnan(rows)
-    count = np.count_nonzero(known, axis=1)
-    total = np.sum(rows, axis=1, where=known)
-    return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
+    return np.stack([means(values) for values in axes], axis=1)
 
 
 def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningGravity | None:
     """Compare the specific force with the angular rate.
 
     In the frame of a sensor that turns, gravity changes by da/dt = -w x a. The noises of gyros and
-    accelerometers are independent, so that they explain nothing of each other; a factor other than
-    one is that of a wrong unit. The mean of the rate, which is mostly bias, is left out.
+    accelerometers are independent, so that they explain nothing of each other. The mean of the
+    rate, which is mostly bias, is left out.
 
-    size: Samples of the blocks, between the means of which changes are compared.
-    parts: Of the record, of which each is compared for itself; the medians are returned.
+    size: Samples of the blocks, between whose means changes are compared.
+    parts: Parts of the record that are compared separately; the medians are returned.
     Returns: None if an axis is missing or nothing changes.
     """
-    rate, force = triad(recording, "gyro"), triad(recording, "accel")
+    rate, force = _triad(recording, "gyro"), _triad(recording, "accel")
     if rate is None or force is None or recording.n < 4 * size:
         return None
     # The same means of the integral as of the force: both changes are filtered alike.
@@ -87,7 +87,7 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
 def _integral_means(
     rate: Sequence[FloatArray], force: Sequence[FloatArray], size: int
 ) -> FloatArray:
-    """Means over blocks of the sum of w x a, some blocks at a time: memory is that of the means."""
+    """Block means of the sum of w x a, some blocks at a time to save memory."""
     middle = [median(known_of(column)) for column in rate]
     rows = size * max(_ROWS // size, 1)
     total, means = np.zeros(3), []
@@ -105,15 +105,14 @@ def _integral_means(
 
 
 def steady_turn(recording: Recording, size: int) -> float:
-    """Rate at which gravity turns in the frame of a sensor, if that is always the same turn.
+    """Constant rate at which gravity turns in the frame of a sensor, rad/s; 0 if there is none.
 
-    The constant rate w of da/dt = -w x a by least squares, from changes over several times. Noise
-    and drifts have none that explains most of the changes and turns by a radian in all.
+    The constant w of da/dt = -w x a by least squares, from changes over several times. It counts if
+    it explains most of the changes and turns by a radian in all, which noise and drifts do not.
 
     size: Samples of the blocks whose means are compared.
-    Returns: rad/s; 0 if there is none, or an axis is missing.
     """
-    force = triad(recording, "accel")
+    force = _triad(recording, "accel")
     if force is None:
         return 0.0
     means = block_means(force, size)
@@ -134,7 +133,7 @@ def steady_turn(recording: Recording, size: int) -> float:
         design, wanted = turned.reshape(3, -1).T, change[known].T.ravel()
         rate, *_ = np.linalg.lstsq(design, wanted, rcond=None)
         rest, total = wanted - design @ rate, float(wanted @ wanted)
-        rate = float(np.linalg.norm(rate)) / (lag * size * recording.dt)
-        if rest @ rest < 0.5 * total and rate * recording.duration > 1.0:
-            return rate
+        speed = float(np.linalg.norm(rate)) / (lag * size * recording.dt)
+        if rest @ rest < 0.5 * total and speed * recording.duration > 1.0:
+            return speed
     return 0.0
