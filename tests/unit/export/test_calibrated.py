@@ -13,8 +13,7 @@ import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.notices import Notice
-from gmwm.export import TARGETS
-from gmwm.export import axis_of
+from gmwm.export import TARGETS, axis_of
 from gmwm.process import as_model
 from imu_numbers import numbers
 
