@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core.files import writable_file
-from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
 from gmwm.report.text import model_text
 

@@ -11,8 +11,8 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo.filter_errors import FilterErrors
-from gmwm.ins.montecarlo.trials import MonteCarlo
+from gmwm.ins.simulation.filter_errors import FilterErrors
+from gmwm.ins.simulation.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
 """What is judged, with its unit."""

@@ -18,8 +18,8 @@ from gmwm.errors import InputError
 from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
-from gmwm.ins.montecarlo.filter_errors import PER_RUN, FilterErrors, judged
-from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
+from gmwm.ins.simulation.filter_errors import PER_RUN, FilterErrors, judged
+from gmwm.ins.simulation.scenario import ErrorSource, Scenario, Simulated
 from gmwm.ins.trajectory import NavState, Trajectory
 
 

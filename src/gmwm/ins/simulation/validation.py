@@ -16,7 +16,7 @@ from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.montecarlo.consistency import (
+from gmwm.ins.simulation.consistency import (
     LEVELS,
     Consistency,
     InnovationTest,
@@ -24,8 +24,8 @@ from gmwm.ins.montecarlo.consistency import (
     innovation_test,
     over_time,
 )
-from gmwm.ins.montecarlo.filter_errors import FilterErrors
-from gmwm.ins.montecarlo.outage_errors import (
+from gmwm.ins.simulation.filter_errors import FilterErrors
+from gmwm.ins.simulation.outage_errors import (
     QUANTITIES,
     Difference,
     Spread,
@@ -33,8 +33,8 @@ from gmwm.ins.montecarlo.outage_errors import (
     pooled_sizes,
     spread,
 )
-from gmwm.ins.montecarlo.scenario import Experiment
-from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
+from gmwm.ins.simulation.scenario import Experiment
+from gmwm.ins.simulation.trials import MonteCarlo, monte_carlo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ class Validation:
         earlier: Earlier = "resume",
         progress: Progress | None = None,
     ) -> Validation:
-        """Do the runs of an experiment; see `gmwm.ins.montecarlo.trials.monte_carlo`."""
+        """Do the runs of an experiment; see `gmwm.ins.simulation.trials.monte_carlo`."""
         study = monte_carlo(
             experiment.scenario, experiment.source, experiment.filters, experiment.runs,
             experiment.seed, jobs=jobs, cluster=cluster, folder=folder, earlier=earlier,

@@ -16,7 +16,7 @@ from gmwm._core.distributions import chi2, norm, student as t
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
+from gmwm.ins.simulation.filter_errors import GROUPS, FilterErrors
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
