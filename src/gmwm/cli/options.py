@@ -126,12 +126,9 @@ printing_options = together(
 
 memory_option = click.option(
     "--memory", type=float, metavar="GB",
-    help="For the samples; a longer text, NPY, Parquet or Feather file, bag or log of ArduPilot is "
-         "read a stretch at a time. By default a quarter of the machine's.",
+    help="For the samples: those of a longer file are kept on disk, in TMPDIR, and about three "
+         "times one channel is in memory. By default 1 GB.",
 )  # fmt: skip
-
-_OF_PARTS = ("start", "stop")
-"""Names of the options of `part_options`."""
 
 
 def read_recording(
@@ -145,16 +142,6 @@ def read_recording(
 
     recording = read(file, **arguments_of_read(**options))
     return recording.part(0.0 if start is None else start, stop)
-
-
-def needs_the_whole(options: Mapping[str, Any]) -> bool:
-    """Whether options ask for what is not done a block at a time."""
-    return any(options.get(name) for name in _OF_PARTS)
-
-
-def arguments_of_blocks(options: Mapping[str, Any]) -> dict[str, Any]:
-    """What `gmwm.readers.read_blocks` is given for the options."""
-    return arguments_of_read(**{k: v for k, v in options.items() if k not in _OF_PARTS})
 
 
 def arguments_of_read(

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
-from gmwm._core.typing import IntArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.ins.filter import (
     IS_GNSS,
     Events,

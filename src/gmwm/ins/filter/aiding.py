@@ -277,7 +277,8 @@ def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) ->
 def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
     """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
     fixes = _along("standstill", trajectory, interval, sd)
-    speed = np.linalg.norm(trajectory.velocity[np.rint(fixes.time / trajectory.dt).astype(int)], axis=1)
+    index = np.rint(fixes.time / trajectory.dt).astype(int)
+    speed = np.linalg.norm(trajectory.velocity[index], axis=1)
     return Aiding((fixes.part(speed < tuning.STANDSTILL),))
 
 

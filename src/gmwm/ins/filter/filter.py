@@ -161,14 +161,13 @@ class Filter:
         )
         sizes = ((6,), (3, 3), (9, 9), (6,), (6, 6))
         kept = Kept(outputs.epoch, outputs.before, *(np.zeros((count, *each)) for each in sizes))
-        whole = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
-        samples, progress = Samples(imu.rotation, imu.velocity, imu.dt), Progress(*whole, np.zeros(7))
+        samples = Samples(imu.rotation, imu.velocity, imu.dt)
+        place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
+        progress = Progress(place, rejected, np.zeros(7))
         stopped, settings = PAUSED, self.settings
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
-                stopped = run(
-                    samples, settings, estimate, events, found, kept, progress, part.stop
-                )
+                stopped = run(samples, settings, estimate, events, found, kept, progress, part.stop)
             release(imu.rotation)
             release(imu.velocity)
         done = count if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))

@@ -60,7 +60,6 @@ class Measurement:
         raise NotImplementedError
 
 
-
 @compiled()
 def observe_position(
     component: int, value: FloatArray, at: Kinematics, lever: FloatArray, h: FloatArray
@@ -107,7 +106,6 @@ class Position(Measurement):
         return offset(trajectory.lla[index], matrix_from_rpy(trajectory.rpy[index]) @ arm)
 
 
-
 @compiled()
 def observe_velocity(
     component: int,
@@ -151,7 +149,6 @@ class Velocity(Measurement):
         return np.asarray(velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm)))
 
 
-
 @compiled()
 def observe_height(value: FloatArray, at: Kinematics, h: FloatArray) -> float:
     """Height of the IMU; errors are counted downwards."""
@@ -182,7 +179,6 @@ class Height(Measurement):
     ) -> FloatArray:
         """Heights of the IMU."""
         return np.where(np.arange(3) == 0, trajectory.lla[index, 2:], 0.0)
-
 
 
 @compiled()

@@ -229,7 +229,10 @@ def new_kinematics() -> Kinematics:
 def new_workspace(n: int) -> Workspace:
     """Work space for n states, the nine of navigation included."""
     change, scratch, middle, there = (
-        new_transition(), new_scratch(n), new_kinematics(), new_kinematics()
+        new_transition(),
+        new_scratch(n),
+        new_kinematics(),
+        new_kinematics(),
     )
     three = (np.zeros(3), np.zeros(3), np.zeros(3))
     rows = (np.zeros(9), np.zeros(9), np.zeros(n), np.zeros(n))
