@@ -332,7 +332,7 @@ def _validate(
 ) -> None:
     """Do the runs of a study."""
     from gmwm._core.files import folder_to_fill, written
-    from gmwm.ins.montecarlo import Validation
+    from gmwm.ins.simulation import Validation
     from gmwm.ins.spec import experiment_from
 
     with _named_in_messages(place):

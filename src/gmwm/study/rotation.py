@@ -18,7 +18,7 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo import GROUPS, FilterErrors, Validation
+from gmwm.ins.simulation import GROUPS, FilterErrors, Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

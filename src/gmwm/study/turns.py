@@ -24,7 +24,7 @@ from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins.imu import AXES, Recorded, SensorModels
-from gmwm.ins.montecarlo import Experiment, Validation
+from gmwm.ins.simulation import Experiment, Validation
 from gmwm.readers import Recording
 from gmwm.study.figures import saved
 from gmwm.study.navigation import TEN, Calibrated, aligned, scenario_of, times
