@@ -423,9 +423,12 @@ _INS = (
     Issue("columns-unused", "columns not used: {columns}", topic="navigation"),
     Issue("consistent", "The innovations agree with the filter's model: they are as large as it "
           "expects, and white.", severity="good", topic="navigation"),
-    Issue("diverged", "The filter diverged: the sensor models or the initial state are far off, "
-          "or a fix is.", severity="bad", topic="navigation"),
-    Issue("fewer-runs", "{text}", severity="warning", topic="navigation"),
+    Issue("diverged", {
+        "": "The filter diverged: the sensor models or the initial state are far off, or a fix is.",
+        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
+    }, severity="bad", topic="navigation"),
+    Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
+          "this length that do not overlap", severity="warning", topic="navigation"),
     Issue("fixes-left-out", "{count} fixes before or after the IMU's record are left out",
           topic="navigation"),
     Issue("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma off "

@@ -29,21 +29,21 @@ from .logs.fix_log import read_fixes as read_fixes
 from .logs.imu_log import read_imu as read_imu
 from .logs.measured import Measured as Measured
 from .logs.navigated import Navigated as Navigated
-from .montecarlo.consistency import (
+from .simulation.consistency import (
     Consistency as Consistency,
     at_epoch as at_epoch,
     innovation_test as innovation_test,
     over_time as over_time,
 )
-from .montecarlo.filter_errors import FilterErrors as FilterErrors
-from .montecarlo.outage_errors import difference as difference, spread as spread
-from .montecarlo.scenario import (
+from .simulation.filter_errors import FilterErrors as FilterErrors
+from .simulation.outage_errors import difference as difference, spread as spread
+from .simulation.scenario import (
     Experiment as Experiment,
     Scenario as Scenario,
     Simulated as Simulated,
 )
-from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
-from .montecarlo.validation import Validation as Validation
+from .simulation.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
+from .simulation.validation import Validation as Validation
 from .spec.experiment import experiment_from as experiment_from
 from .trajectory.manoeuvres import (
     Accelerate as Accelerate,

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +16,12 @@ import pyarrow.parquet as pq
 from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frozen import freeze
+from gmwm._core.jobs import results
 from gmwm._core.pages import make
-from gmwm._core.runs import results
 from gmwm._core.tables import cell, frame, plain_table
 from gmwm._core.text import bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
-from gmwm.calibration import SCREENING, Calibration
+from gmwm.calibration import Calibration
 from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
@@ -32,8 +31,7 @@ from gmwm.population.store import Index, Listed, Store, opened_store, read_index
 from gmwm.population.task import Task
 from gmwm.population.tolerance import needed_units
 from gmwm.population.unit import DERIVED, SCHEMA, Row, Unit, rows_of
-from gmwm.process import Model, Process, as_model
-from gmwm.readers import read
+from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
     import pandas
@@ -132,22 +130,22 @@ class Fleet(Mapping[str, Calibration | Notice]):
                 f"filter: for outages up to {self.horizon:g} s; floor: bias instability. Limit: "
                 "95 % of units are below this (95 % confidence, log-normal)."
             )
+        apart: list[str] = []
         for axis in self.structures:
             if axis.different:
-                usual = next(iter(axis.counts))
-                lines += bullets([
-                    f"{axis.channel}: {axis.counts[usual]} of {sum(axis.counts.values())} units "
-                    f"are {usual}, {axis.different} have another structure"
-                ])  # fmt: skip
+                usual, units = next(iter(axis.counts)), sum(axis.counts.values())
+                number = f"{axis.counts[usual]} of {units}"
+                text = f"{number} units are {usual}, {axis.different} have another structure"
+                apart.append(f"{axis.channel}: {text}")
             if axis.invalid:
-                lines += bullets([f"{axis.channel}: not valid in {_some(axis.invalid)}"])
-        lines += bullets(
+                apart.append(f"{axis.channel}: not valid in {_some(axis.invalid)}")
+        apart += [
             f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
             f"{outlier.value / each.median:.3g} times the median"
             for each in self.spreads
             for outlier in each.outliers
-        )
-        return "\n".join(lines + bullets(self.notices))
+        ]
+        return "\n".join(lines + bullets([*apart, *self.notices]))
 
     def to_frame(self) -> pandas.DataFrame:
         """A row per unit, channel and parameter, in SI units; needs pandas."""
@@ -205,11 +203,12 @@ class Fleet(Mapping[str, Calibration | Notice]):
             self.report(new / page)
             listed = [
                 Listed(
-                    printable(each.path), each.name,
+                    printable(each.path),
+                    each.name,
                     each.result if isinstance(each.result, Notice) else None,
                 )
                 for each in self.units.values()
-            ]  # fmt: skip
+            ]
             found = Index(self.horizon, self.options, tuple(listed), self.notices)
             found.save(new / index)
 
@@ -223,17 +222,13 @@ def fleet(
     paths: Paths,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
-    screening: Collection[str] = SCREENING,
-    still: bool = True,
     horizon: float = 60.0,
-    start: float = 0.0,
-    stop: float | None = None,
     folder: str | os.PathLike[str] | None = None,
     resume: bool = False,
     jobs: int = 1,
     cluster: str | None = None,
     progress: Progress | None = None,
-    **reading: Any,
+    **options: Any,
 ) -> Fleet:
     """Calibrate many units of a sensor, one recording of each.
 
@@ -246,12 +241,8 @@ def fleet(
         The recordings; a pattern is as in ``"lot-7/**/*.csv"``.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel or sensor ("gyro", "accel"); selected by default.
-    screening, still
-        See `gmwm.calibrate`.
     horizon : float, optional
         Longest outage that N and K of a filter are for, s; see `gmwm.bound`.
-    start, stop : float, optional
-        Part of each recording, s.
     folder : path, optional
         Where each calibration is kept as soon as it is done, and the table (``fleet.parquet``) and
         the report (``fleet.html``) at the end; see `Fleet.load`.
@@ -263,8 +254,9 @@ def fleet(
         Address of a Dask scheduler that does the work instead. Its workers read the recordings.
     progress : callable, optional
         Called as ``progress(done, total, "")``.
-    **reading
-        Arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
+    **options
+        ``screening`` and ``still`` of `gmwm.calibrate`; ``start`` and ``stop``, the part of each
+        recording, s; and arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
 
     Raises
     ------
@@ -275,7 +267,7 @@ def fleet(
     """
     place = None if folder is None else Path(folder)
     items = recordings(paths, place)
-    task = _task(model, screening, still, horizon, (start, stop), reading)
+    task = Task.of(model, horizon, options)
     jobs = jobs if jobs == -1 else checks.whole("jobs", jobs, 1)
     if place is not None:
         for name in OUTPUTS[1:]:
@@ -313,37 +305,6 @@ def fleet(
     return made
 
 
-def _task(
-    model: Any, screening: Collection[str], still: bool, horizon: float,
-    part: tuple[float, float | None], reading: Mapping[str, Any],
-) -> Task:  # fmt: skip
-    """The options, checked before any work."""
-    from gmwm._core import __version__
-
-    _, *parameters = signature(read).parameters.values()
-    usual = {each.name: each.default for each in parameters}
-    for name in reading:
-        checks.choice("argument", name, tuple(usual))
-    models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
-    for name in screening:
-        checks.choice("screening", name, SCREENING)
-    start, stop = part
-    for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
-        if not checks.is_number(given):
-            raise InputError(f"{name} = {checks.shown(given)}: give seconds")
-    return Task(
-        # Options that are at their defaults do not tell one fleet from another.
-        reading={k: v for k, v in reading.items() if v != usual[k] and v not in (None, (), {})},
-        start=float(start),
-        stop=None if stop is None else float(stop),
-        models={str(name): as_model(each) for name, each in models.items()},
-        screening=tuple(screening),
-        still=checks.truth("still", still),
-        horizon=checks.positive("horizon", horizon, "give the longest outage in seconds"),
-        version=__version__,
-    )
-
-
 # -- notices --------------------------------------------------------------------------------------
 
 
@@ -354,11 +315,11 @@ def _notices(units: Collection[Unit]) -> list[Notice]:
     for unit in units:
         same.setdefault(unit.digest or unit.path, []).append(unit.name)
     hint = "each is counted; leave copies out"
-    notices += [
-        notice("same-recording", values={"units": len(names)}, variant="fleet", hint=hint,
-               names=_some(names))
-        for names in same.values() if len(names) > 1
-    ]  # fmt: skip
+    for names in (names for names in same.values() if len(names) > 1):
+        values, shown = {"units": len(names)}, _some(names)
+        notices.append(
+            notice("same-recording", "", values, variant="fleet", hint=hint, names=shown)
+        )
     done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
     return notices + (_differences(done) if done else [])
 
@@ -376,8 +337,9 @@ def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
     if other:
         values = {"units": len(other), "rate": median}
         hint = "make sure that they are of one kind"
-        notices.append(notice("rates-differ", values=values, variant="fleet", hint=hint,
-                              **about(other)))  # fmt: skip
+        notices.append(
+            notice("rates-differ", values=values, variant="fleet", hint=hint, **about(other))
+        )
     channels = {name: (*each, *each.skipped) for name, each in done.items()}
     lacking: dict[tuple[str, ...], list[str]] = {}
     for channel in dict.fromkeys(channel for own in channels.values() for channel in own):

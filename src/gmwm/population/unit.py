@@ -22,11 +22,25 @@ DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
 horizon (`gmwm.bound`), and the bias instability B."""
 
 _TEXT, _NUMBER, _TEXTS = pa.string(), pa.float64(), pa.list_(pa.string())
-SCHEMA = pa.schema({
-    "device": _TEXT, "path": _TEXT, "channel": _TEXT, "quantity": _TEXT, "model": _TEXT,
-    "parameter": _TEXT, "kind": _TEXT, "value": _NUMBER, "stderr": _NUMBER, "lower": _NUMBER,
-    "upper": _NUMBER, "unit": _TEXT, "valid": pa.bool_(), "reasons": _TEXTS, "notices": _TEXTS,
-})  # fmt: skip
+SCHEMA = pa.schema(
+    {
+        "device": _TEXT,
+        "path": _TEXT,
+        "channel": _TEXT,
+        "quantity": _TEXT,
+        "model": _TEXT,
+        "parameter": _TEXT,
+        "kind": _TEXT,
+        "value": _NUMBER,
+        "stderr": _NUMBER,
+        "lower": _NUMBER,
+        "upper": _NUMBER,
+        "unit": _TEXT,
+        "valid": pa.bool_(),
+        "reasons": _TEXTS,
+        "notices": _TEXTS,
+    }
+)
 """Columns of the table; null where one does not apply. ``kind`` is that of `gmwm.Estimate`, or
 "derived" for the numbers of `DERIVED`; of an upper limit ("bound") ``value`` is null. ``reasons``
 are the codes of why a fit, a channel or a unit is not valid."""
@@ -82,8 +96,10 @@ def rows_of(units: Iterable[Unit]) -> Iterator[Row]:
     """
     for unit in units:
         own = dict.fromkeys(SCHEMA.names) | {
-            "device": unit.name, "path": printable(unit.path), "valid": False
-        }  # fmt: skip
+            "device": unit.name,
+            "path": printable(unit.path),
+            "valid": False,
+        }
         if isinstance(unit.result, Notice):
             yield {**own, "reasons": [unit.result.code], "notices": [unit.result.code]}
             continue
@@ -122,5 +138,8 @@ def _parameters(
         if number.found:
             known = {"kind": "derived", "value": number.value, "stderr": number.stderr}
         yield {
-            **own, "parameter": key, **known, "unit": si_parameter_unit(DERIVED[key], quantity),
-        }  # fmt: skip
+            **own,
+            "parameter": key,
+            **known,
+            "unit": si_parameter_unit(DERIVED[key], quantity),
+        }

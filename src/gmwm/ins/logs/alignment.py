@@ -162,10 +162,14 @@ def align(
         tilt_sd, yaw_sd = float(np.max(sd[:2])), float(sd[2])
         roll, pitch, yaw = np.degrees(rpy_from_matrix(C))
         how = notice(
-            "aligned-in-motion", values={"tilt": tilt_sd, "heading": yaw_sd}, roll=roll,
-            pitch=pitch, yaw=yaw % 360.0, tilt_deg=np.degrees(tilt_sd),
+            "aligned-in-motion",
+            values={"tilt": tilt_sd, "heading": yaw_sd},
+            roll=roll,
+            pitch=pitch,
+            yaw=yaw % 360.0,
+            tilt_deg=np.degrees(tilt_sd),
             heading_deg=np.degrees(yaw_sd),
-        )  # fmt: skip
+        )
     return Alignment(start.epoch, *start.state(C, tilt_sd, yaw_sd), np.zeros(3), None, (how,))
 
 

@@ -24,7 +24,7 @@ from gmwm.ins.logs import tuning
 from gmwm.ins.logs.measured import LogSpec, Measured
 from gmwm.ins.logs.replay import Replay, alignment_of
 from gmwm.ins.logs.smoother import Smoothed, smooth
-from gmwm.ins.montecarlo import InnovationTest, Ratio, mean_ratio
+from gmwm.ins.simulation import InnovationTest, Ratio, mean_ratio
 from gmwm.ins.spec import read_models
 from gmwm.issues import Notice, notice
 
@@ -266,20 +266,32 @@ class Comparison:
             "outages": [[each.start, each.duration] for each in self.outages],
             "models": {
                 name: {
-                    "rms": each.rms, "predicted": each.predicted, "nees": each.nees.value,
-                    "nees_p_value": each.nees.p_value, "score": float(np.mean(each.score)),
-                    "nis": each.nis.nis.value, "whiteness": each.nis.whiteness,
+                    "rms": each.rms,
+                    "predicted": each.predicted,
+                    "nees": each.nees.value,
+                    "nees_p_value": each.nees.p_value,
+                    "score": float(np.mean(each.score)),
+                    "nis": each.nis.nis.value,
+                    "whiteness": each.nis.whiteness,
                 }
                 for name, each in self.outcomes.items()
             },
             "pairs": [
-                {"first": a, "second": b, "ratio": p.ratio, "lower": p.lower, "upper": p.upper,
-                 "p_value": p.p_value, "score": p.score, "score_p_value": p.score_p_value}
+                {
+                    "first": a,
+                    "second": b,
+                    "ratio": p.ratio,
+                    "lower": p.lower,
+                    "upper": p.upper,
+                    "p_value": p.p_value,
+                    "score": p.score,
+                    "score_p_value": p.score_p_value,
+                }
                 for (a, b), p in self.pairs.items()
             ],
             "verdict": self.verdict.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
-        }  # fmt: skip
+        }
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_comparison_report`."""
@@ -325,10 +337,15 @@ class Comparison:
         lines += ["", f"Errors over those of {first}, paired"]
         pairs = {name: self.pairs[name, first] for name in others}
         cells = [
-            (name, f"{p.ratio:.3f}", f"({p.lower:.3f} .. {p.upper:.3f})", f"{p.score:+.2f}",
-             f"{p.score_p_value:.2g}")
+            (
+                name,
+                f"{p.ratio:.3f}",
+                f"({p.lower:.3f} .. {p.upper:.3f})",
+                f"{p.score:+.2f}",
+                f"{p.score_p_value:.2g}",
+            )
             for name, p in pairs.items()
-        ]  # fmt: skip
+        ]
         lines += plain_table(("", "ratio", "95 %", "score", "p"), cells).splitlines()
         return "\n".join([*lines, "", *wrapped(self.verdict.text)])
 
@@ -398,11 +415,14 @@ def compare(
     scale = np.mean([each.squares for each in outcomes.values()], axis=(0, 1))
     pairs = {
         (a, b): paired(outcomes[a], outcomes[b], scale)
-        for a in outcomes for b in outcomes if a != b
-    }  # fmt: skip
+        for a in outcomes
+        for b in outcomes
+        if a != b
+    }
     notices = [replace(each, source=name) for name, own in models.items() for each in own.notices]
-    return Comparison(measured.title, every, outcomes, pairs, duration,
-                      (*notices, *measured.notices))  # fmt: skip
+    return Comparison(
+        measured.title, every, outcomes, pairs, duration, (*notices, *measured.notices)
+    )
 
 
 def _passes(duration: float, length: float, dt: float) -> tuple[tuple[Outage, ...], ...]:

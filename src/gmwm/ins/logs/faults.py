@@ -117,15 +117,24 @@ class Faults:
         by = offset + sum(each.values["time offset"] for each in left)
         error = left[0].errors if left else {"time offset": self.resolution["time offset"]}
         stamps = Fault(
-            "time-offset", "", lambda log: log.later(lambda time: np.full_like(time, -by)),
-            self.replay, np.inf, cost(1), {"time offset": by}, error,
-        )  # fmt: skip
+            "time-offset",
+            "",
+            lambda log: log.later(lambda time: np.full_like(time, -by)),
+            self.replay,
+            np.inf,
+            cost(1),
+            {"time offset": by},
+            error,
+        )
         others = [
-            replace(each, values=each.values | {
-                name: each.values[name] + later for name in {"time"} & each.values.keys()
-            })
-            for each in self.found if each not in near
-        ]  # fmt: skip
+            replace(
+                each,
+                values=each.values
+                | {name: each.values[name] + later for name in {"time"} & each.values.keys()},
+            )
+            for each in self.found
+            if each not in near
+        ]
         alternatives = () if near else self.alternatives
         return replace(self, found=(stamps, *others), alternatives=alternatives)
 
@@ -218,7 +227,7 @@ def _size(measured: Measured, offset: float) -> float:
     except InputError:
         return np.inf
     replay = replay.within(0.0, tuning.DIAGNOSED)
-    fixes = sum(each.time.size for each in measured.aiding.fixes)
+    fixes = sum(e.time.size for e in measured.aiding.fixes if e.kind != "standstill")
     if replay.standard.shape[0] < tuning.FAR_LEFT * fixes:
         return np.inf
     if not np.isfinite(replay.log_likelihood):

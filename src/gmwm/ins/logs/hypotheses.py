@@ -193,16 +193,23 @@ class Constant:
 
 
 _CLOCK = Constant(
-    "time-offset", ("time offset",), lambda r, x: r.later(lambda time: np.full_like(time, -x[0])),
-    0.05, tuning.LARGEST_OFFSET, lambda r, x: r.along(lambda time: np.full_like(time, -x[0])),
-)  # fmt: skip
+    "time-offset",
+    ("time offset",),
+    lambda r, x: r.later(lambda time: np.full_like(time, -x[0])),
+    0.05,
+    tuning.LARGEST_OFFSET,
+    lambda r, x: r.along(lambda time: np.full_like(time, -x[0])),
+)
 _ARM = Constant(
-    "lever-arm", ("forward", "right", "down"), lambda r, x: r.with_arm_longer(x), 0.5,
+    "lever-arm",
+    ("forward", "right", "down"),
+    lambda r, x: r.with_arm_longer(x),
+    0.5,
     tuning.LARGEST_ARM,
-)  # fmt: skip
+)
 _HEADING = Constant(
     "heading", ("heading",), lambda r, x: r.turned_by(float(x[0])), 0.01, 0.5 * np.pi
-)  # fmt: skip
+)
 _TOGETHER = ((_CLOCK,), (_ARM,), (_HEADING,), (_CLOCK, _ARM))
 """Errors that are tried. Along a straight track at constant speed a time offset is a lever arm, so
 that one of the two alone takes up the other; both together are right."""
@@ -229,9 +236,9 @@ def fitted(
     """Constant errors by Gauss-Newton, one fault each; ``start`` is in ``here`` already."""
     origin, parts = here, _parts(errors)
     # Stamps that are farther off leave no fix near.
-    most = np.concatenate([
-        np.full(len(each.names), each.usual if each.smooth else np.inf) for each in errors
-    ])  # fmt: skip
+    most = np.concatenate(
+        [np.full(len(each.names), each.usual if each.smooth else np.inf) for each in errors]
+    )
     theta, covariance = np.zeros(parts[-1].stop), np.eye(parts[-1].stop)
 
     def changed(x: FloatArray) -> Replay:

@@ -179,8 +179,10 @@ class Measured:
             aiding, noticed = _with_standstills(aiding, log.imu, spec.zero_velocity)
             notices += noticed
         notices += assumed
-        for kind, own, usual in (("position", found.position_sd, spec.position_sd),
-                                 ("velocity", found.velocity_sd, spec.velocity_sd)):  # fmt: skip
+        for kind, own, usual in (
+            ("position", found.position_sd, spec.position_sd),
+            ("velocity", found.velocity_sd, spec.velocity_sd),
+        ):
             name = f"{kind}_sd"
             if own is not None and name in spec.given:
                 notices.append(notice("sd-not-used", kind))

@@ -24,20 +24,33 @@ from gmwm.ins.logs.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.logs.hypotheses import LEVEL
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay, alignment_of, innovation_sizes
-from gmwm.ins.montecarlo import InnovationTest
+from gmwm.ins.simulation import InnovationTest
 from gmwm.issues import Notice, notice, worst_first
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = (
-    "time_s", "latitude_deg", "longitude_deg", "height_m",
-    "velocity_north_mps", "velocity_east_mps", "velocity_down_mps",
-    "roll_deg", "pitch_deg", "yaw_deg",
-    "sd_north_m", "sd_east_m", "sd_down_m",
-    "sd_velocity_north_mps", "sd_velocity_east_mps", "sd_velocity_down_mps",
-    "sd_tilt_north_deg", "sd_tilt_east_deg", "sd_heading_deg",
-)  # fmt: skip
+    "time_s",
+    "latitude_deg",
+    "longitude_deg",
+    "height_m",
+    "velocity_north_mps",
+    "velocity_east_mps",
+    "velocity_down_mps",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+    "sd_north_m",
+    "sd_east_m",
+    "sd_down_m",
+    "sd_velocity_north_mps",
+    "sd_velocity_east_mps",
+    "sd_velocity_down_mps",
+    "sd_tilt_north_deg",
+    "sd_tilt_east_deg",
+    "sd_heading_deg",
+)
 
 
 @dataclass(frozen=True)
@@ -218,8 +231,9 @@ class Navigated:
         is_mild = all(1.0 / tuning.MILD < size < tuning.MILD for size in sizes.values())
         if sizes.keys() <= assumed and is_mild:
             code = "too-large" if largest > 1.0 else "too-small"
-            return notice(code, values=sizes, severity="note", variant="assumed", sizes=shown,
-                          hint=hint)  # fmt: skip
+            return notice(
+                code, values=sizes, severity="note", variant="assumed", sizes=shown, hint=hint
+            )
         if min(sizes.values()) < 1.0 < largest:
             code = "mixed-sizes"
         elif largest < 1.0:
@@ -277,9 +291,11 @@ class Navigated:
         """Notices of the sensor models, the files, the start, and of rejected fixes."""
         measured = self.measured
         return (
-            *measured.sensors.notices, *measured.notices, *self.alignment.notices,
+            *measured.sensors.notices,
+            *measured.notices,
+            *self.alignment.notices,
             *self.rejections,
-        )  # fmt: skip
+        )
 
     @property
     def accuracy(self) -> list[str]:
@@ -321,15 +337,16 @@ class Navigated:
             "verdict": self.verdict.to_dict(),
             "faults": [each.to_dict() for each in self.fault_notices],
             "resolution": self.resolution.to_dict(),
-            "notices": [
-                each.to_dict() for each in self.notices
-            ],
+            "notices": [each.to_dict() for each in self.notices],
             "innovations": {
-                kind: {"nis": test.nis.value, "nis_p_value": test.nis.p_value,
-                       "whiteness": None if np.isnan(test.whiteness) else test.whiteness}
+                kind: {
+                    "nis": test.nis.value,
+                    "nis_p_value": test.nis.p_value,
+                    "whiteness": None if np.isnan(test.whiteness) else test.whiteness,
+                }
                 for kind, test in ((kind, self.test(kind)) for kind in self.kinds)
             },
-        }  # fmt: skip
+        }
 
     def write_solution(self, path: Path) -> Path:
         """Write the solution as a CSV file.
@@ -344,14 +361,22 @@ class Navigated:
         angles = np.degrees(solution.lla[kept, :2])
         angles[:, 1] = (angles[:, 1] + 180.0) % 360.0 - 180.0
         rpy = np.degrees(solution.rpy[kept])
-        columns = np.column_stack([
-            self.clock(solution.time[kept]), angles, solution.lla[kept, 2], solution.velocity[kept],
-            rpy, sd[:, :6], np.degrees(sd[:, 6:]),
-        ])  # fmt: skip
+        columns = np.column_stack(
+            [
+                self.clock(solution.time[kept]),
+                angles,
+                solution.lla[kept, 2],
+                solution.velocity[kept],
+                rpy,
+                sd[:, :6],
+                np.degrees(sd[:, 6:]),
+            ]
+        )
         digits = ["%.6f", "%.10f", "%.10f", "%.4f", *["%.5f"] * 3, *["%.5f"] * 3, *["%.4g"] * 9]
         with written(path) as stream:
-            np.savetxt(stream, columns, digits, delimiter=",", header=",".join(_COLUMNS),
-                       comments="")  # fmt: skip
+            np.savetxt(
+                stream, columns, digits, delimiter=",", header=",".join(_COLUMNS), comments=""
+            )
         return path
 
     # -- figures ----------------------------------------------------------------------------------
@@ -438,9 +463,14 @@ class Navigated:
             begin = self.clock(np.array([start]))[0]
             title = f"{end - start:.4g} s without position fixes, from {begin:.10g} s"
             figure = plotting.measured_outage(
-                track=track, without=without, fixes=around, time=solution.time[shown] - start,
-                sd=solution.sd[shown, :3], fix_time=fix_time[seen] - start, error=error[seen],
-            )  # fmt: skip
+                track=track,
+                without=without,
+                fixes=around,
+                time=solution.time[shown] - start,
+                sd=solution.sd[shown, :3],
+                fix_time=fix_time[seen] - start,
+                error=error[seen],
+            )
             pictures.append((title, figure))
         return pictures
 

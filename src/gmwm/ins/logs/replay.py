@@ -16,7 +16,7 @@ from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs import tuning
 from gmwm.ins.logs.alignment import Alignment, align, started
 from gmwm.ins.logs.measured import Measured
-from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio, lag_one
+from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory import NavState
 
 Shift = Callable[[FloatArray], FloatArray]
@@ -56,9 +56,14 @@ class Replay:
     def solution(self, interval: float, before: tuple[float, ...] = ()) -> Solution:
         """The filter's solution every ``interval`` (s), and ``before`` the fixes of some times."""
         return navigate(
-            self.imu, self.state, self.models, self.aiding, initial_sd=self.sd, interval=interval,
+            self.imu,
+            self.state,
+            self.models,
+            self.aiding,
+            initial_sd=self.sd,
+            interval=interval,
             before=before,
-        )  # fmt: skip
+        )
 
     @cached_property
     def innovations(self) -> FilterInnovations:
@@ -70,10 +75,15 @@ class Replay:
         """The solution along which fixes are moved."""
         return self.solution(tuning.TRACK_STEP)
 
+    @property
+    def _is_fix(self) -> BoolArray:
+        """Innovations that are compared: a standstill may be none, and is gated all the time."""
+        return np.asarray(self.innovations.kind != KINDS["standstill"])
+
     @cached_property
     def standard(self) -> FloatArray:
-        """Innovations in their expected standard deviations, (E, 3)."""
-        return self.innovations.standard
+        """Innovations of the fixes in their expected standard deviations, (E, 3)."""
+        return self.innovations.standard[self._is_fix]
 
     @cached_property
     def log_likelihood(self) -> float:
@@ -85,7 +95,8 @@ class Replay:
         standard = self.standard
         if np.any(np.all(np.isnan(standard), axis=1)):
             return -np.inf
-        return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(self.innovations.sd)))
+        sd = self.innovations.sd[self._is_fix]
+        return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(sd)))
 
     @property
     def is_lost(self) -> bool:
@@ -96,9 +107,13 @@ class Replay:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of fixes, but standstills."""
-        return tuple(dict.fromkeys(
-            each.kind for each in self.aiding.fixes if each.time.size and each.kind != "standstill"
-        ))  # fmt: skip
+        return tuple(
+            dict.fromkeys(
+                each.kind
+                for each in self.aiding.fixes
+                if each.time.size and each.kind != "standstill"
+            )
+        )
 
     def test(self, kind: str | None = None) -> InnovationTest:
         """Size and whiteness of the innovations of a kind, or of all."""
@@ -221,9 +236,14 @@ class Replay:
 def alignment_of(measured: Measured) -> Alignment:
     """The start of a filter of real data; `align` with all that is known."""
     return align(
-        measured.imu, measured.aiding, measured.sensors, measured.heading, measured.heading_sd,
-        measured.attitude, measured.attitude_sd,
-    )  # fmt: skip
+        measured.imu,
+        measured.aiding,
+        measured.sensors,
+        measured.heading,
+        measured.heading_sd,
+        measured.attitude,
+        measured.attitude_sd,
+    )
 
 
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:

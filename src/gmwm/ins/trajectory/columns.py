@@ -20,22 +20,26 @@ def by_word(words: Mapping[str, str]) -> dict[str, str]:
     return {word: meant for meant, each in words.items() for word in each.split()}
 
 
-POSITION_WORDS = by_word({
-    "latitude": "latitude lat",
-    "longitude": "longitude lon long lng",
-    "height": "height altitude alt h hgt",
-})  # fmt: skip
+POSITION_WORDS = by_word(
+    {
+        "latitude": "latitude lat",
+        "longitude": "longitude lon long lng",
+        "height": "height altitude alt h hgt",
+    }
+)
 """Meaning of the last word of a column's name, if it is a position."""
 
 FACTORS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "ft": 0.3048}
 """Units of angles and lengths in SI."""
 
-_UNITS = by_word({
-    "rad": "rad rads radian radians",
-    "deg": "deg degs degree degrees °",
-    "m": "m meter meters metre metres",
-    "ft": "ft feet",
-})  # fmt: skip
+_UNITS = by_word(
+    {
+        "rad": "rad rads radian radians",
+        "deg": "deg degs degree degrees °",
+        "m": "m meter meters metre metres",
+        "ft": "ft feet",
+    }
+)
 _WORD = re.compile(r"°|[A-Z]?[a-z]+|[A-Z]+")
 
 
@@ -66,9 +70,12 @@ class LogColumns:
 
     @classmethod
     def find(
-        cls, path: Path, quantities: Callable[[str], Sequence[str]], needed: Sequence[str],
+        cls,
+        path: Path,
+        quantities: Callable[[str], Sequence[str]],
+        needed: Sequence[str],
         header: str,
-    ) -> LogColumns:  # fmt: skip
+    ) -> LogColumns:
         """Look at the header of a file.
 
         quantities: Quantities that a column of a name holds; empty if it is something else.

@@ -258,7 +258,7 @@ def test_the_command_without_a_file(run, no_pages):
                      "--velocity-sd", "0.1,0.1,0.15", "--position-sd", "2")  # fmt: skip
     assert by_options[0] == 0
     assert "heading as given: 57.30 deg" in by_options[1]
-    assert "are assumed" not in by_options[1]
+    assert "have no standard deviations" not in by_options[1]
     assert "position: the fixes have standard deviations of their own" in by_options[1]
     assert run("run.yaml", "--velocity-sd", "0.1,1")[2].startswith(
         "gmwm: --velocity-sd 0.1,1: write one number, or NORTH,EAST,DOWN"
@@ -275,7 +275,7 @@ def test_models_that_are_not_valid_are_named_wherever_they_are_used(run):
         fits[axis] = replace(fits[axis], notices=(bad,) if axis in ("gyro_x", "accel_z") else ())
     Calibration(fits, {}, "test", 100.0, 2000).save("cal.json")
     Path("run.yaml").write_text(yaml.safe_dump(content(sensors="cal.json")))
-    told = "gyro_x, accel_z: the fits are not valid, nor is a filter that believes them"
+    told = "gyro_x, accel_z: the fits are not valid: do not use these numbers in a filter"
     printed = " ".join(run("run.yaml", "-o", "out")[1].split())
     assert told in printed
     assert "to the north, east and down are assumed (give --velocity-sd)" in printed
