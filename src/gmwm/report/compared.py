@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.files import writable_file
-from gmwm._core.notices import worst_first
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief
 from gmwm.estimate import Estimate, Fit
+from gmwm.issues import worst_first
 from gmwm.population import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.report.datasheet import Datasheet, read_datasheet
+from gmwm.report.multiples import COLOURS, multiple
 from gmwm.report.page import origin, write_page
-from gmwm.report.several.multiples import COLOURS, multiple
 from gmwm.report.text import duration_text
 
 _SIDE_BY_SIDE = 6
