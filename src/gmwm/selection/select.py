@@ -216,7 +216,7 @@ def select(
     Parameters
     ----------
     data : WaveletVariance, Channel or (n,) array_like, or a list of them
-        Several recordings have one model; see `gmwm.estimate.result.joint.JointFit`.
+        Several recordings have one model; see `gmwm.JointFit`.
     dt : float, optional
         Sampling interval, s; needed for an array.
     max_gauss_markov : int, optional
@@ -242,7 +242,7 @@ def select(
     -----
     All candidates are compared under the same weights, those of a rich mixture fitted to the
     wavelet variances, with the discrepancy that this mixture shows. The criterion is the chi-square
-    on cube roots (see `gmwm.estimate.problem.whitening.chi_square`) with the penalty ``2 c p ln ln
+    on cube roots (see `gmwm.estimate.problem.chi_square`) with the penalty ``2 c p ln ln
     n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
     (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
     without one pays the squared slope over its variance; it must win by a margin of 6, and its

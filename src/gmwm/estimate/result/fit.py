@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -18,15 +18,13 @@ from gmwm._core.notices import Notice
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.errors import MissingNameError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
-from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
+from gmwm.estimate.result.estimate import HEAD, Estimate, Region, estimates_of, slope_name
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.interval import confidence_interval
-from gmwm.estimate.result.region import Region, slope_name
+from gmwm.estimate.result.intervals import confidence_interval
 from gmwm.estimate.result.remarks import REASONS
-from gmwm.estimate.result.serialization import fields_of, fit_content, plain
-from gmwm.process import Model
+from gmwm.process import Model, model_from_list
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
@@ -43,7 +41,9 @@ METHOD_NAMES = {
     "mle": "exact maximum likelihood",
     "whittle": "debiased Whittle likelihood",
 }
-"""Methods as they are named in tables."""
+"""Names of the methods in tables."""
+
+_PER_OCTAVE = 12  # points of a curve: with one, a line and a resonance look broken
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,28 +67,28 @@ class Fit(Document, Printed):
     objective : float
         Weighted sum of squares (nu_hat - nu)' Sigma^-1 (nu_hat - nu) at the estimate.
     chi_square : float
-        The same on the cube roots of the wavelet variances, which are close to normal at coarse
-        levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN where
-        there are none, or the method does not minimise it.
+        Sum of squares on the cube roots of the wavelet variances, which are close to normal at
+        coarse levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN
+        where there are none, or the method does not minimise it.
     chi_square_allowed : float
-        The same with the discrepancy in the errors; equal where there is none.
+        ``chi_square`` with the discrepancy in the errors.
     dof : int
         Levels less estimated parameters.
     discrepancy : float
         Relative error allowed for at each level, as a fraction of the variance; zero where the
         model describes the data to within their statistical errors.
     method, weights : str
-        How it was estimated; ``weights`` is empty but for the method of moments.
+        How it was estimated; only the method of moments has ``weights``.
     notices : tuple of Notice
-        What makes it invalid ("bad"), and what else there is to know.
+        Severity "bad" makes the fit not valid.
     log_likelihood : float
-        At the estimate, of the methods that maximise it; NaN for the others.
+        At the estimate; NaN for methods that do not maximise it.
     trace : tuple of float
         Log-likelihood after each iteration of EM.
     slope_dof : float
         Degrees of freedom of the variance of a ramp's slope.
     regions : tuple of Region
-        What ``method="allan"`` read the parameters from.
+        Parts of the Allan plot that ``method="allan"`` read the parameters from.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.fit"
@@ -115,16 +115,16 @@ class Fit(Document, Printed):
         checks.choice("method", self.method, tuple(METHOD_NAMES))
         freeze(self, "covariance", "upper_bounds")
 
-    # -- can it be trusted ------------------------------------------------------------------------
+    # -- validity ---------------------------------------------------------------------------------
 
     @property
     def valid(self) -> bool:
-        """Whether every parameter is supported by the data and the model describes them."""
+        """Whether the data support every parameter and the model describes them."""
         return not any(notice.severity == "bad" for notice in self.notices)
 
     @property
     def reasons(self) -> Mapping[str, bool]:
-        """What a valid fit has, by name, and whether this one has it."""
+        """Conditions of a valid fit by name, and whether this one meets them."""
         lacking = {REASONS[notice.code] for notice in self.notices if notice.severity == "bad"}
         result: Mapping[str, bool] = frozen(
             {name: name not in lacking for name in REASONS.values()}
@@ -138,18 +138,13 @@ class Fit(Document, Printed):
 
     @property
     def p_value(self) -> float:
-        """Of the chi-square test under statistical errors alone; NaN where there is none."""
-        return self._p_of(self.chi_square)
+        """p-value of the chi-square test under statistical errors alone; NaN without a test."""
+        return _p_value(self.chi_square, self.dof)
 
     @property
     def p_value_allowed(self) -> float:
-        """The same with the discrepancy allowed for, which is made so that it is about 0.5."""
-        return self._p_of(self.chi_square_allowed)
-
-    def _p_of(self, statistic: float) -> float:
-        if np.isnan(statistic) or self.dof <= 0:
-            return float("nan")
-        return float(chi2.sf(statistic, self.dof))
+        """p-value with the discrepancy allowed for, which is chosen to make it about 0.5."""
+        return _p_value(self.chi_square_allowed, self.dof)
 
     # -- numbers ----------------------------------------------------------------------------------
 
@@ -166,10 +161,9 @@ class Fit(Document, Printed):
 
     @cached_property
     def error_growth(self) -> Mapping[str, float]:
-        """How the relative standard error of a positive parameter goes with its value.
+        """Exponents with which relative standard errors grow with the parameters, by key.
 
-        The exponent of a power law, by key. Only intervals need it, and of the many fits among
-        which one is selected few are asked for theirs.
+        Only intervals need it, and a selection asks few of its many fits for theirs.
         """
         if self.method == "allan":
             return {}
@@ -178,10 +172,10 @@ class Fit(Document, Printed):
         return result
 
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Confidence intervals that keep to the parameters' ranges.
+        """Confidence intervals that stay in the parameters' ranges.
 
-        See `gmwm.estimate.result.interval.confidence_interval`. The interval of an amplitude that
-        is not significantly above zero goes from zero to its upper bound (which is one of 95 %).
+        See `gmwm.estimate.result.intervals.confidence_interval`. An amplitude that is not
+        significantly above zero has the interval from zero to its 95 % upper limit.
 
         Parameters
         ----------
@@ -206,16 +200,20 @@ class Fit(Document, Printed):
                 result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
                 result[key] = confidence_interval(
-                    item.parameter, value, errors[key], level,
-                    growth=self.error_growth.get(key, 0.0), slope_dof=self.slope_dof,
-                )  # fmt: skip
+                    item.parameter,
+                    value,
+                    errors[key],
+                    level,
+                    growth=self.error_growth.get(key, 0.0),
+                    slope_dof=self.slope_dof,
+                )
         return result
 
     def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:
         """Length of record that would give each parameter a relative standard error.
 
-        Errors go with the root of the length. That is too hopeful where a discrepancy was allowed
-        for, which no length removes.
+        Errors fall as 1/sqrt(length). That is optimistic where a discrepancy was allowed for, which
+        no length removes.
 
         Parameters
         ----------
@@ -276,8 +274,8 @@ class Fit(Document, Printed):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Allan deviation of the fitted model with its interval, at any averaging times.
 
-        It holds if the model is the right one. Where others describe the data as well, which is
-        frequent beyond a tenth of the record, give them: the interval then reaches over all.
+        The interval holds if the model is the right one. Often others fit equally well beyond a
+        tenth of the record: give them as ``rivals``, and the interval covers all of them.
 
         Parameters
         ----------
@@ -319,7 +317,7 @@ class Fit(Document, Printed):
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every parameter with its uncertainty, in SI and field units, in the model's order."""
+        """Every parameter with its uncertainty, in SI and data-sheet units."""
         return tuple(
             estimates_of(
                 self.model, self.wv.quantity or "", self.stderr, self.interval(), self.upper_bounds
@@ -338,7 +336,12 @@ class Fit(Document, Printed):
 
     def __str__(self) -> str:
         lines = wrapped(f"{self.wv.name or 'series'}: {self.model.title()}", indent=2)
-        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {self._how()}", indent=2)
+        how = METHOD_NAMES[self.method]
+        if self.weights:
+            how += f", {self.weights} weights"
+        elif self.trace:
+            how += f", {len(self.trace)} iterations"
+        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {how}", indent=2)
         lines += ["", HEAD, *map(str, self.estimates), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
@@ -360,21 +363,13 @@ class Fit(Document, Printed):
     def _size(self) -> str:
         return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
 
-    def _how(self) -> str:
-        name = METHOD_NAMES[self.method]
-        if self.weights:
-            return f"{name}, {self.weights} weights"
-        return f"{name}, {len(self.trace)} iterations" if self.trace else name
-
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars, fitted curve and components; returns the axes.
 
-        In the units of the field (deg/h, ug), or in SI if ``units`` is "si". For
-        ``method="allan"`` the lines and the regions that they were read from take the place of the
-        components.
+        In data-sheet units (deg/h, ug), or in SI if ``units`` is "si". For ``method="allan"`` the
+        lines and their regions take the place of the components.
         """
         from gmwm import plotting
-        from gmwm.estimate.result.curves import dense_curves
 
         factor = shown_unit(self.wv.quantity, self.wv.unit, units)[1]
         axes = self.wv.plot(ax, units=units)
@@ -384,20 +379,14 @@ class Fit(Document, Printed):
         shown = {} if self.regions else components
         plotting.curves(axes, tau, total, shown, factor * self.wv.allan_deviation)
         if self.regions:
-            plotting.straight_lines(axes, self._lines(factor))
+            lines = {}
+            for region in self.regions:
+                found, slope = self[region.key], slope_name(region.slope)
+                label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
+                height = factor * region.coefficient
+                lines[label] = (region.slope, height, region.tau_min, region.tau_max)
+            plotting.straight_lines(axes, lines)
         return axes
-
-    def _lines(self, factor: float) -> dict[str, tuple[float, float, float, float]]:
-        """Lines of the Allan plot as `gmwm.plotting.straight_lines` takes them."""
-        lines = {}
-        for region in self.regions:
-            found = self[region.key]
-            slope = slope_name(region.slope)
-            label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
-            lines[label] = (
-                region.slope, factor * region.coefficient, region.tau_min, region.tau_max
-            )  # fmt: skip
-        return lines
 
     # -- tables and files -------------------------------------------------------------------------
 
@@ -406,8 +395,25 @@ class Fit(Document, Printed):
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
     def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, and what readers of the file want, in JSON types."""
-        return fit_content(self) | {
+        """All fields, and the numbers that readers of the file want, in JSON types."""
+        return {
+            "model": [term.to_dict() for term in self.model.terms],
+            "keys": list(self.keys),
+            "covariance": self.covariance.tolist(),
+            "upper_bounds": {key: plain(bound) for key, bound in self.upper_bounds.items()},
+            "objective": self.objective,
+            "chi_square": plain(self.chi_square),
+            "chi_square_allowed": plain(self.chi_square_allowed),
+            "dof": self.dof,
+            "discrepancy": self.discrepancy,
+            "method": self.method,
+            "weights": self.weights,
+            "notices": [notice.to_dict() for notice in self.notices],
+            "log_likelihood": plain(self.log_likelihood),
+            "trace": list(self.trace),
+            "slope_dof": plain(self.slope_dof),
+            "regions": [asdict(region) for region in self.regions],
+            "wavelet_variance": self.wv.to_dict(),
             "params": self.params,
             "stderr": self.stderr,
             "p_value": plain(self.p_value),
@@ -425,4 +431,72 @@ class Fit(Document, Printed):
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`."""
-        return cls(**fields_of(content))
+        return cls(
+            **cls._fields(content), wv=WaveletVariance.from_dict(content["wavelet_variance"])
+        )
+
+    @classmethod
+    def _fields(cls, content: Mapping[str, Any]) -> dict[str, Any]:
+        """The fields of a fit but the data, from checked content.
+
+        Raises InputError if the model and the parameters do not belong together.
+        """
+        model = model_from_list(content["model"])
+        params = {key: value or 0.0 for key, value in model.params.items()}
+        unknown = set(content["keys"]) - set(params)
+        if model.is_open or unknown or content["params"] != params:
+            raise InputError(f"its model {model!r} and its parameters do not belong together")
+        p, infinity = len(content["keys"]), float("inf")
+        kept = ("dof", "discrepancy", "method", "weights")
+        return {name: content[name] for name in kept} | {
+            "model": model,
+            "keys": tuple(content["keys"]),
+            "covariance": np.array(content["covariance"], dtype=float).reshape(p, p),
+            "upper_bounds": {
+                key: or_nan(bound, infinity) for key, bound in content["upper_bounds"].items()
+            },
+            "objective": or_nan(content["objective"]),
+            "chi_square": or_nan(content["chi_square"]),
+            "chi_square_allowed": or_nan(content["chi_square_allowed"]),
+            "notices": tuple(map(Notice.from_dict, content["notices"])),
+            "log_likelihood": or_nan(content["log_likelihood"]),
+            "trace": tuple(content["trace"]),
+            "slope_dof": or_nan(content["slope_dof"], infinity),
+            "regions": tuple(Region(**region) for region in content["regions"]),
+        }
+
+
+def _p_value(statistic: float, dof: int) -> float:
+    if np.isnan(statistic) or dof <= 0:
+        return float("nan")
+    return float(chi2.sf(statistic, dof))
+
+
+def plain(value: float) -> float | None:
+    """A number for JSON, which has no infinity and no NaN."""
+    return value if np.isfinite(value) else None
+
+
+def or_nan(value: float | None, missing: float = float("nan")) -> float:
+    """A stored number, or its replacement where there is none."""
+    return missing if value is None else value
+
+
+def dense_curves(
+    fitted: Fit, model: Model | None = None
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Allan deviation of each term of a model at closely spaced whole numbers of samples.
+
+    model: The fitted one by default.
+    Returns: tau (k,), averaging times from the first to the last of the data, s, and only those of
+        the data where a term is simulated or the wavelet is not Haar's; deviations by the term's
+        label, u, the root of whose sum of squares is that of the model.
+    """
+    wv, shown = fitted.wv, fitted.model if model is None else model
+    scales = Scales.of(wv)
+    if wv.wavelet == "haar" and not any(map(scales.is_simulated, shown.terms)):
+        octaves = np.log2(wv.tau[-1] / wv.tau[0])
+        steps = 2.0 ** np.linspace(0.0, octaves, int(_PER_OCTAVE * octaves) + 1)
+        scales = replace(scales, tau=wv.dt * np.unique(np.rint(steps * wv.tau[0] / wv.dt)))
+    curves = [np.sqrt(2.0 * scales.curve(term)) for term in shown.terms]
+    return scales.tau, dict(zip(shown.term_labels(), curves, strict=True))

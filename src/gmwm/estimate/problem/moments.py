@@ -1,4 +1,8 @@
-"""The moments that a model is fitted to: wavelet variances, and the slope of a ramp."""
+"""The moments that a model is fitted to: wavelet variances, the slope of a ramp, their covariance.
+
+They depend on the model through the ramp (its slope is removed from the data) and through the
+noise (which implies the covariance).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ from gmwm.variance import WaveletVariance
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What is known of a series before and while its noise is fitted.
+    """The moments of a series, given what is known of its ramp.
 
     slope: Drift removed from the wavelet variances, ``None`` where the model has no ramp.
     slope_is_free: Whether it is estimated (rather than given).
@@ -37,23 +41,24 @@ class Moments:
 
     @classmethod
     def of(cls, wv: WaveletVariance, model: Model, scales: Scales | None = None) -> Moments:
+        """Moments before a first fit, with a least-squares slope where the model has a ramp."""
         scales = scales or Scales.of(wv)
-        ramps = [term for term in model.terms if term.is_drift]
-        if not ramps:
+        ramp = next((term for term in model.terms if term.is_drift), None)
+        if ramp is None:
             return cls(wv, None, False, scales)
-        if not ramps[0].is_open:
-            return cls(wv, Slope(ramps[0].drift_rate(), 0.0), False, scales)
+        if not ramp.is_open:
+            return cls(wv, Slope(ramp.drift_rate(), 0.0), False, scales)
         return cls(wv, ols_slope(wv), True, scales)
 
     @property
     def target(self) -> FloatArray:
-        """Wavelet variances without the drift, and without what removing it took, u^2, (J,)."""
+        """Wavelet variances of the noise alone, u^2, (J,): the drift is removed, the loss added."""
         if self.slope is None:
             return self.wv.variance
         return self.wv.detrended(self.slope.value) + bias_of_detrending(self.wv, self.slope)
 
     def under(self, noise: Model, part: float = 1.0) -> Moments:
-        """The same with the slope moved by ``part`` of the way to its estimate under this noise."""
+        """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
         if self.slope is None or not self.slope_is_free:
             return self
         psd = self.scales.spectrum(noise)
@@ -67,7 +72,7 @@ class Moments:
         return replace(self, slope=moved)
 
     def covariance(self, noise: Model) -> FloatArray:
-        """Covariance of `target` that the fitted noise implies, u^4, (J, J)."""
+        """Covariance of `target` that a noise implies, u^4, (J, J)."""
         wv = self.wv
         psd = self.scales.spectrum(noise)
         if not _has_power(psd, wv.dt):
@@ -106,7 +111,7 @@ class FittedMoments:
         slope_error: float,
         discrepancy: float,
     ) -> FittedMoments:
-        """From a model with values and the data.
+        """Moments of the data at a model with values.
 
         keys: The parameters that were estimated.
         slope_error: Standard error of the slope of a rate ramp, u/s; 0 if it was not estimated.
@@ -132,3 +137,30 @@ class FittedMoments:
 
 def _has_power(psd: PSD, dt: float) -> bool:
     return bool(np.any(psd(np.array([1e-6, 0.01, 0.25]) / dt, dt) > 0.0))
+
+
+def weight_root(covariance: FloatArray) -> FloatArray:
+    """L with L'L the inverse of a covariance matrix, computed on its correlations."""
+    scale = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlation)
+    # Rounding errors must not decide the weights of levels that are nearly copies of each other.
+    values = np.maximum(values, 1e-8 * values[-1])
+    return np.asarray((vectors / np.sqrt(values)).T / scale)
+
+
+def chi_square(
+    target: FloatArray, implied: FloatArray, covariance: FloatArray, basis: FloatArray
+) -> tuple[FloatArray, float]:
+    """Standardised residuals per level and their chi-square, on the cube-root scale.
+
+    ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs. A wavelet variance of
+    few degrees of freedom is far from normal, its cube root is not (Wilson & Hilferty 1931, *PNAS*
+    17, 684-688).
+    """
+    scale = np.sqrt(np.diag(covariance))
+    share = (scale / basis) ** 2 / 9.0  # 2/(9 dof)
+    root, expected = np.cbrt(target / basis), np.cbrt(implied / basis) * (1.0 - share)
+    standard = (root - expected) / np.sqrt(share)
+    whitened = weight_root(covariance / np.outer(scale, scale)) @ standard
+    return standard, float(whitened @ whitened)

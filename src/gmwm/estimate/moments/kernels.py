@@ -1,27 +1,133 @@
-"""The search for shapes, compiled: least squares of the profiled problem by damped Gauss-Newton.
+"""Hot loops of a fit: the profiled problem, and the search for its shapes.
 
-Levenberg's and Marquardt's method with a region of trust, as Moré (1978, *Numerical Analysis*,
-Lecture Notes in Mathematics 630, 105-116) has it and MINPACK's ``lmder`` does it. A step takes some
-20 microseconds, of which Python would make a fifth of a millisecond. Loops stand in place of
-expressions of whole arrays and of slices, which take numba seconds to compile.
+The search is Levenberg's and Marquardt's method with a region of trust, as Moré (1978, *Numerical
+Analysis*, Lecture Notes in Mathematics 630, 105-116) has it and MINPACK's ``lmder`` does it. A step
+takes some 20 microseconds, a tenth of what Python would take. Loops stand in place of expressions
+of whole arrays and of slices, which take numba seconds to compile.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments.profile_kernels import profiled, projected
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm.estimate.problem import orthogonal_to, solve_columns
 from gmwm.process import shaped_curve, shaped_slope
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
 _FACTOR = 100.0  # of the first region, which is that of the first step in the end
 _NEAR = 0.1  # of its radius: how closely a step keeps to it
 _TINY = np.finfo(np.float64).tiny
+
+XTOL, FTOL, GTOL = 1e-7, 1e-9, 1e-9
+"""Tolerances at which a search ends, as of MINPACK."""
+
+Bounds = tuple[FloatArray, FloatArray]
+
+
+class Shaped(NamedTuple):
+    """The S terms of a design with free shapes.
+
+    kinds: (S,), `Process.compiled_kind`.
+    places: (S,), terms of the design.
+    first: (S,), first coordinate of each.
+    free: (S, 3), which shape parameters are free.
+    lower, upper: (S, 3), limits of the shape parameters.
+    """
+
+    kinds: IntArray
+    places: IntArray
+    first: IntArray
+    free: BoolArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+class Weighted(NamedTuple):
+    """A weighted least-squares problem for given shapes.
+
+    root: (J, J), L with L'L the weight matrix.
+    linear, given: (L,), (G,), terms of free and of fixed amplitude.
+    target: (J,), observed wavelet variances, u^2.
+    """
+
+    root: FloatArray
+    linear: IntArray
+    given: IntArray
+    target: FloatArray
+
+
+class Curves(NamedTuple):
+    """The curves of a design, as functions of the free shapes.
+
+    shapes: (S, 3), shapes of the shaped terms, of which the fixed parameters count.
+    fixed: (J, terms), curves of the other terms.
+    levels: As `gmwm.process.shaped_curve` takes them.
+    owners: (z,), for each coordinate the place of its term's amplitude among the free ones.
+    """
+
+    shapes: FloatArray
+    fixed: FloatArray
+    levels: Any
+    owners: IntArray
+
+
+@compiled()
+def profiled(problem: Weighted, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals.
+
+    curves: (J, terms).
+    """
+    root, linear, given, target = problem
+    rows = target.size
+    rest = target.copy()
+    for i in range(rows):
+        for k in given:
+            rest[i] -= curves[i, k]
+    columns, y = np.zeros((rows, linear.size)), np.zeros(rows)
+    for i in range(rows):
+        for j in range(rows):
+            weight = root[i, j]
+            y[i] += weight * rest[j]
+            for k in range(linear.size):
+                columns[i, k] += weight * curves[j, linear[k]]
+    x, residual = solve_columns(columns, y)
+    return columns, x, residual
+
+
+@compiled()
+def projected(
+    root: FloatArray, columns: FloatArray, x: FloatArray, slopes: FloatArray, factor: FloatArray
+) -> FloatArray:
+    """Weighted slopes of the curves times factors, orthogonal to columns of positive amplitude.
+
+    root: (J, J).
+    columns, x: (J, L), (L,), weighted columns and their amplitudes.
+    slopes, factor: (J, z), (z,), derivatives of the curves by the shapes, and the amplitudes of the
+        terms they belong to.
+    """
+    rows, count = slopes.shape
+    weighted = np.zeros((rows, count))
+    for i in range(rows):
+        for j in range(rows):
+            for k in range(count):
+                weighted[i, k] += root[i, j] * slopes[j, k] * factor[k]
+    size = 0
+    for k in range(x.size):
+        if x[k] > 0.0:
+            size += 1
+    present = np.empty((rows, size))
+    at = 0
+    for k in range(x.size):
+        if x[k] > 0.0:
+            for i in range(rows):
+                present[i, at] = columns[i, k]
+            at += 1
+    return orthogonal_to(weighted, present)
 
 
 @compiled()
@@ -33,57 +139,52 @@ def _value(z: float, lower: float, upper: float) -> float:
 
 
 @compiled()
-def _shape(z: FloatArray, s: int, terms: Any, shapes: FloatArray) -> FloatArray:
+def _shape(z: FloatArray, s: int, terms: Shaped, shapes: FloatArray) -> FloatArray:
     """The shape of shaped term ``s`` at coordinates z of all of them."""
-    _, _, first, free, lower, upper = terms
     shape = shapes[s].copy()
-    at = first[s]
+    at = terms.first[s]
     for k in range(shape.size):
-        if free[s, k]:
-            shape[k] = _value(z[at], lower[s, k], upper[s, k])
+        if terms.free[s, k]:
+            shape[k] = _value(z[at], terms.lower[s, k], terms.upper[s, k])
             at += 1
     return shape
 
 
 @compiled()
-def _curves(
-    z: FloatArray, terms: Any, shapes: FloatArray, fixed: FloatArray, levels: Any
-) -> tuple[bool, FloatArray]:
+def _curves(z: FloatArray, terms: Shaped, at: Curves) -> tuple[bool, FloatArray]:
     """Curves of all terms, and whether they are known."""
-    kinds, places = terms[0], terms[1]
-    curves = fixed.copy()
-    for s in range(kinds.size):
-        found = shaped_curve(kinds[s], _shape(z, s, terms, shapes), levels)
+    curves = at.fixed.copy()
+    for s in range(terms.kinds.size):
+        found = shaped_curve(terms.kinds[s], _shape(z, s, terms, at.shapes), at.levels)
         if found.size == 0:
             return False, curves
         for j in range(found.size):
-            curves[j, places[s]] = found[j]
+            curves[j, terms.places[s]] = found[j]
     return True, curves
 
 
 @compiled()
-def _slopes(
-    z: FloatArray, terms: Any, shapes: FloatArray, rows: int, levels: Any
-) -> tuple[bool, FloatArray]:
+def _slopes(z: FloatArray, terms: Shaped, curves: Curves) -> tuple[bool, FloatArray]:
     """Derivatives of the curves by the coordinates of their own terms, (J, z)."""
-    kinds, _, first, free, _, _ = terms
+    rows, shapes, levels = curves.fixed.shape[0], curves.shapes, curves.levels
     slopes = np.empty((rows, z.size))
     moved = z.copy()
-    for s in range(kinds.size):
-        closed = shaped_slope(kinds[s], _shape(z, s, terms, shapes), levels)
+    for s in range(terms.kinds.size):
+        kind = terms.kinds[s]
+        closed = shaped_slope(kind, _shape(z, s, terms, shapes), levels)
         if closed.size:
             for j in range(rows):
-                slopes[j, first[s]] = closed[j]
+                slopes[j, terms.first[s]] = closed[j]
             continue
-        at = first[s] - 1
-        for k in range(free.shape[1]):
-            if not free[s, k]:
+        at = terms.first[s] - 1
+        for k in range(terms.free.shape[1]):
+            if not terms.free[s, k]:
                 continue
             at += 1
             moved[at] = z[at] + _STEP
-            above = shaped_curve(kinds[s], _shape(moved, s, terms, shapes), levels)
+            above = shaped_curve(kind, _shape(moved, s, terms, shapes), levels)
             moved[at] = z[at] - _STEP
-            below = shaped_curve(kinds[s], _shape(moved, s, terms, shapes), levels)
+            below = shaped_curve(kind, _shape(moved, s, terms, shapes), levels)
             moved[at] = z[at]
             if above.size == 0 or below.size == 0:
                 return False, slopes
@@ -252,47 +353,42 @@ def damped_step(
 
 @compiled()
 def refined(
-    z: FloatArray, bounds: Any, terms: Any, shapes: FloatArray, fixed: FloatArray, levels: Any,
-    weighted: Any, tolerances: Any,
-) -> tuple[bool, FloatArray, FloatArray, float]:  # fmt: skip
+    z: FloatArray,
+    bounds: Bounds,
+    terms: Shaped,
+    curves: Curves,
+    problem: Weighted,
+    most: int,
+) -> tuple[bool, FloatArray, FloatArray, float]:
     """Local minimum of the profiled problem.
 
     z: (z,), coordinates of the free shapes to start from.
-    bounds: (low, high), how far each may go.
-    terms: Of the S shaped terms: kinds, columns, first coordinates; (S, 3): which shape parameters
-        are free, their lower and upper limits.
-    shapes: (S, 3), their shapes, of which the fixed ones count.
-    fixed: (J, terms), curves of the other terms.
-    levels: As `gmwm.process.shaped_curve` has them.
-    weighted: (root, linear, given, owners, target), as `profiled` has them; for each coordinate,
-        the place of its term's amplitude in x.
-    tolerances: (xtol, ftol, gtol, evaluations), as of MINPACK.
+    bounds: Lowest and highest coordinates.
+    most: Largest number of evaluations of the curves.
     Returns: found, false where a curve is not known in compiled form; z, x, coordinates, within the
         bounds, and free amplitudes; objective.
     """
     low, high = bounds
-    root, linear, given, owners, target = weighted
-    xtol, ftol, gtol, most = tolerances
-    rows, count = target.size, z.size
+    rows, count = problem.target.size, z.size
     z = z.copy()
     nothing = np.zeros(0)
-    known, curves = _curves(_inside(z, low, high), terms, shapes, fixed, levels)
+    known, matrix = _curves(_inside(z, low, high), terms, curves)
     if not known:
         return False, z, nothing, 0.0
-    columns, x, residual = profiled(root, curves, linear, given, target)
+    columns, x, residual = profiled(problem, matrix)
     norm = _norm(residual)
     damping, radius, length, evaluations = 0.0, 0.0, 0.0, 1
     scale = np.zeros(count)
     is_first, is_over = True, False
     while not is_over:
         inside = _inside(z, low, high)
-        known, slopes = _slopes(inside, terms, shapes, rows, levels)
+        known, slopes = _slopes(inside, terms, curves)
         if not known:
             return False, z, nothing, 0.0
         lengths, along, factor = np.zeros(count), np.zeros(count), np.zeros(count)
         for k in range(count):
-            factor[k] = x[owners[k]]
-        jacobian = projected(root, columns, x, slopes, factor)
+            factor[k] = x[curves.owners[k]]
+        jacobian = projected(problem.root, columns, x, slopes, factor)
         for k in range(count):
             for j in range(rows):
                 lengths[k] += jacobian[j, k] * jacobian[j, k]
@@ -308,7 +404,7 @@ def refined(
             for k in range(count):
                 if lengths[k] > 0.0:
                     steepest = max(steepest, abs(along[k]) / (norm * lengths[k]))
-        if steepest <= gtol:
+        if steepest <= GTOL:
             break
         # Coordinates that change nothing stay where they are.
         size = 0
@@ -334,10 +430,10 @@ def refined(
             if is_first:
                 radius = min(radius, step_length)
             inside = _inside(moved, low, high)
-            known, curves = _curves(inside, terms, shapes, fixed, levels)
+            known, matrix = _curves(inside, terms, curves)
             if not known:
                 return False, z, nothing, 0.0
-            new_columns, new_x, new_residual = profiled(root, curves, linear, given, target)
+            new_columns, new_x, new_residual = profiled(problem, matrix)
             evaluations += 1
             new_norm = _norm(new_residual)
             gained = 1.0 - (new_norm / norm) ** 2 if _NEAR * new_norm < norm else -1.0
@@ -358,8 +454,9 @@ def refined(
                 z, columns, x, residual, norm = moved, new_columns, new_x, new_residual, new_norm
                 length = _length(scale, z)
                 is_first = False
-            is_small = abs(gained) <= ftol and expected <= ftol and 0.5 * ratio <= 1.0
-            is_over = is_small or radius <= xtol * length or evaluations >= most or norm == 0.0
+            is_small = max(abs(gained), expected) <= FTOL and 0.5 * ratio <= 1.0
+            is_over = is_small or radius <= XTOL * length or norm == 0.0
+            is_over = is_over or evaluations >= most
             if is_over or ratio >= 1e-4:
                 break
     return True, _inside(z, low, high), x, norm**2
