@@ -7,17 +7,14 @@ from .budget import (
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
-    calibrate_stream as calibrate_stream,
     load as load,
     without_departures as without_departures,
 )
-from .comparison import SensorComparison as SensorComparison, compare as compare
 from .diagnosis import (
     Health as Health,
     Still as Still,
     find_still as find_still,
     health as health,
-    health_stream as health_stream,
 )
 from .errors import (
     FitWarning as FitWarning,
@@ -52,7 +49,12 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
-from .fleet import Fleet as Fleet, fleet as fleet
+from .population import (
+    Fleet as Fleet,
+    SensorComparison as SensorComparison,
+    compare as compare,
+    fleet as fleet,
+)
 from .process import (
     AR as AR,
     ARIMA as ARIMA,
@@ -80,14 +82,12 @@ from .selection import Selection as Selection, select as select
 from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
-    StreamedRecording as StreamedRecording,
     StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
     deviations as deviations,
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
-    stream as stream,
     wavelet_variance as wavelet_variance,
 )
 

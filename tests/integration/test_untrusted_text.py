@@ -125,15 +125,6 @@ def test_a_terminal_that_lacks_letters(run, tmp_path, encoding, no_pages):
     assert "\\u03a9" in done.stdout.decode(encoding)
 
 
-def test_no_memory_is_a_sentence(run, tmp_path):
-    recording(tmp_path / "static.csv")
-    # A part is not read a stretch at a time.
-    done = run("health", "static.csv", *OPTIONS[:6], "--start", "1", GMWM_MEMORY="1e-6")
-    assert done.returncode == 2
-    assert b"may be used" in done.stderr
-    assert done.stderr.count(b"\n") == 1
-
-
 def test_a_pipe_is_refused(run, tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
     done = run("calibrate", "pipe.csv", *OPTIONS)

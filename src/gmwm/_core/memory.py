@@ -1,4 +1,4 @@
-"""How much memory may be used, and a refusal of what needs more before it is begun."""
+"""How much memory may be used; what needs more is rejected before it is begun."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OUT_OF_MEMORY = (
 )
 
 _SHARE = 0.5  # of what is available: other programs need some, and estimates are rough
-_SHARE_OF_MACHINE = 0.25  # for the samples of a recording: what is made of them takes as much
+_HELD = 1 << 30  # for the columns of a file, with what is made of them: eleven hours at 200 Hz
 _WHERE_UNKNOWN = 4 << 30
 _LIMIT: ContextVar[int | None] = ContextVar("limit", default=None)
 _CGROUP = Path("/sys/fs/cgroup")
@@ -44,24 +44,30 @@ def budget() -> int:
 
 @contextmanager
 def limited(gigabytes: float | None) -> Iterator[None]:
-    """Allow so much, or a quarter of the machine, unless `VARIABLE` says how much.
+    """Allow this much within the block; None changes nothing.
 
     Raises InputError if it is not positive.
     """
-    if gigabytes is not None and not 0.0 < gigabytes < 1e9:
+    if gigabytes is None:
+        yield
+        return
+    if not 0.0 < gigabytes < 1e9:
         raise InputError(f"memory = {gigabytes!r}: give a positive number of gigabytes, e.g. 8")
-    allowed = None if gigabytes is None else int(gigabytes * (1 << 30))
-    if allowed is None and VARIABLE not in os.environ:
-        allowed = min(budget(), int(_SHARE_OF_MACHINE * _installed()))
-    token = _LIMIT.set(allowed)
+    token = _LIMIT.set(int(gigabytes * (1 << 30)))
     try:
         yield
     finally:
         _LIMIT.reset(token)
 
 
+def held() -> float:
+    """Gigabytes that a file may need to be read into memory; a longer one is kept on disk."""
+    is_given = _LIMIT.get() is not None or VARIABLE in os.environ
+    return (budget() if is_given else min(budget(), _HELD)) / (1 << 30)
+
+
 def require(needed: float, what: str) -> None:
-    """Refuse what needs more than the budget.
+    """Reject what needs more than the budget.
 
     needed: Bytes.
     what: For the message: the file.

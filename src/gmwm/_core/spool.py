@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import mmap
+import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
 
 ROWS = 1 << 16
 """Of a window: half a MB a column."""
+
+_LEFT_FREE = 64 << 20  # bytes of the disk: other programs need some
 
 
 class Spool:
@@ -26,7 +31,11 @@ class Spool:
         self._width, self.n = width, 0
 
     def append(self, rows: FloatArray) -> None:
-        """Add rows, (n, width)."""
+        """Add rows, (n, width).
+
+        Raises InputError if the disk is full.
+        """
+        _check_room(8 * rows.size)
         self._file.write(np.ascontiguousarray(rows, dtype=float).data)
         self.n += len(rows)
 
@@ -39,6 +48,43 @@ class Spool:
     def __del__(self) -> None:
         # A map holds the file itself.
         self._file.close()
+
+
+def _check_room(size: int) -> None:
+    """Raise InputError unless the disk has room for so many bytes."""
+    folder = tempfile.gettempdir()
+    if shutil.disk_usage(folder).free < size + _LEFT_FREE:
+        raise InputError(
+            f"there is no room for the samples of a long file in {folder}: set TMPDIR to a folder "
+            "with more, or read fewer channels",
+            "disk-full",
+        )
+
+
+def alike(array: FloatArray, n: int) -> FloatArray:
+    """An array for ``n`` numbers, on disk if another one is.
+
+    Raises InputError if the disk is full.
+    """
+    if not is_spooled(array):
+        return np.empty(n)
+    _check_room(8 * n)
+    with tempfile.TemporaryFile() as file:  # a map holds the file itself
+        if hasattr(os, "posix_fallocate"):  # a full disk would end the process where it is mapped
+            os.posix_fallocate(file.fileno(), 0, 8 * n)
+        return np.asarray(np.memmap(file, float, "r+" if n else "w+", shape=(n,)))
+
+
+def scaled(array: FloatArray, factor: float, offset: float = 0.0) -> FloatArray:
+    """A new array, ``array * factor + offset``, on disk if ``array`` is."""
+    result = alike(array, array.size)
+    for part in windows(array.size) if is_spooled(array) else (slice(None),):
+        np.multiply(array[part], factor, out=result[part])
+        if offset:
+            result[part] += offset
+        release(array)
+        release(result)
+    return result
 
 
 def windows(n: int) -> Iterator[slice]:

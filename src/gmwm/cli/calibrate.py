@@ -17,11 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
-    arguments_of_blocks,
+    PATH,
     estimating_options,
     memory_option,
     models_of_channels,
-    needs_the_whole,
+    option,
     output_folder,
     part_options,
     printing_options,
@@ -45,24 +45,29 @@ NONE_VALID = 1
 _LARGE, _CHANNELS = 4 << 20, 6
 """Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
+_ON_DISK = 2 << 30
+"""Bytes of a file whose samples are too many to be in several processes."""
+
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", "counts", "gravity", "swapped",
-)  # fmt: skip
+    "not-static",
+    "tilt",
+    "rate-changes",
+    "rounding",
+    "saturation",
+    "abrupt-end",
+    "stuck",
+    "held",
+    "filled",
+    "value-repeated",
+    "variance",
+    "counts",
+    "gravity",
+    "swapped",
+)
 """Codes of notices of a fit that are those of the recording."""
-
-
-_EXPORTED = {
-    "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
-    "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
-    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
-    "state-space": "state-space.json",
-}  # fmt: skip
-"""Names of the files of programs that want something else than NAME.yaml."""
 
 
 _FILES = ("calibration.json", "report.html", "imu.yaml")
@@ -73,27 +78,34 @@ def output_option(default: str) -> Callable[[Any], Any]:
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @output_option("gmwm-out")
 @reading_options
 @part_options
 @estimating_options
-@click.option("--remove-departures", is_flag=True,
-              help="Subtract steps, transients at the start and slow periods that are found, and "
-                   "calibrate what is left.")  # fmt: skip
-@click.option(
-    "--export",
-    "target",
-    metavar="NAME",
-    help="Also write the file of this program into the folder; see gmwm export --list.",
+@option(
+    "--remove-departures",
+    "Subtract steps, transients at the start and slow periods that are found, and "
+    "calibrate what is left.",
 )
-@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
-              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
-                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Processes at most; short recordings take one.")  # fmt: skip
-@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
+@option(
+    "--export NAME",
+    "Also write the file of this program into the folder; see gmwm export --list.",
+    name="target",
+)
+@option(
+    "--datasheet YAML",
+    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
+    "of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
+    type=PATH,
+)
+@option(
+    "--jobs N",
+    "Processes at most; short recordings take one.",
+    type=click.IntRange(min=1),
+    default=2,
+)
+@option("--timings", "Print where the time went, stage by stage.")
 @memory_option
 @printing_options
 def calibrate(
@@ -131,14 +143,15 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
-    if any(file.is_file() and file.stat().st_size > _LARGE for file in files):
-        from gmwm._core.runs import beside, spare
+    if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
+        from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
-    from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, calibrate_stream, stage
+    from gmwm._core.memory import limited
+    from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, stage
     from gmwm.report import read_datasheet
 
     given = written_models(models)
@@ -147,15 +160,10 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
-        replaceable(output / _EXPORTED.get(target, f"{target}.yaml"))
+        replaceable(output / TARGETS[target].file_name)
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
-        with stage("read"):
-            recordings, in_blocks = _recordings(files, memory, reading)
-        if in_blocks and remove_departures:
-            raise InputError(
-                "--remove-departures needs all samples, and the file does not fit into memory: "
-                "take a part with --start and --stop, or leave it out"
-            )
+        with stage("read"), limited(memory):
+            recordings = [read_recording(file, **reading) for file in files]
         names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
         model = models_of_channels(given, tuple(names))
         if datasheet is not None:  # what is wrong with it is known before the work
@@ -165,20 +173,18 @@ def calibrate(
             if bar is not None:
                 bar(0, len(names), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = (
-                calibrate_stream(
-                    files[0], model, screening=chosen, still=not everything, progress=bar,
-                    **arguments_of_blocks(reading),
-                )
-                if in_blocks
-                else run(
-                    recordings, model, screening=chosen, still=not everything,
-                    remove_departures=remove_departures, jobs=jobs, progress=bar,
-                )
-            )  # fmt: skip
+            result = run(
+                recordings,
+                model,
+                screening=chosen,
+                still=not everything,
+                remove_departures=remove_departures,
+                jobs=jobs,
+                progress=bar,
+            )
         # The files first: who pipes the table into head must not lose them.
         origin = {"command": _command()} | _hashes(files)
-        own = recordings[0] if len(recordings) == 1 and not in_blocks else None
+        own = recordings[0] if len(recordings) == 1 else None
         written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
@@ -203,26 +209,6 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
     console.print(table)
     if jobs > 1:
         console.print("stages of channels run side by side: their seconds are added up")
-
-
-def _recordings(
-    files: tuple[Path, ...], memory: float | None, reading: Mapping[str, Any]
-) -> tuple[list[Recording], bool]:
-    """The recordings, or the first block of the only one, which is to be read by blocks."""
-    from gmwm._core.memory import limited
-    from gmwm.readers import read_blocks
-
-    with limited(memory):
-        try:
-            return [read_recording(file, **reading) for file in files], False
-        except InputError as error:
-            if error.code != "memory" or len(files) > 1 or needs_the_whole(reading):
-                raise
-            too_large = error
-    try:
-        return [next(read_blocks(files[0], **arguments_of_blocks(reading)))], True
-    except InputError as error:
-        raise (too_large if error.code == "not-divisible" else error) from None
 
 
 def show(result: Calibration) -> None:
@@ -264,7 +250,7 @@ def _is_shown(notice: Notice) -> bool:
     """How the file was read, and what may spoil the estimates; the report has the rest."""
     from gmwm.readers import READING
 
-    if notice.code in (*READING, "events-left-out", "streamed"):
+    if notice.code in (*READING, "events-left-out"):
         return True
     if notice.code == "length":
         return notice.severity != "good"
@@ -351,7 +337,7 @@ def write_files(
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
     if target is not None and not (target == "kalibr" and "imu.yaml" in names):
-        path = folder / _EXPORTED.get(target, f"{target}.yaml")
+        path = folder / TARGETS[target].file_name
         with stage("exports"):
             export(result, target, path=path)
         lines.append(f"wrote {path} for {target}")

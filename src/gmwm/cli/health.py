@@ -9,20 +9,18 @@ from typing import Any
 import click
 
 from gmwm.cli.options import (
-    arguments_of_blocks,
+    PATH,
     memory_option,
-    needs_the_whole,
     output_file,
     part_options,
     printing_options,
     read_recording,
     reading_options,
 )
-from gmwm.errors import InputError
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @output_file("Write all findings with their numbers, in SI units, to this file.")
 @reading_options
 @part_options
@@ -40,25 +38,18 @@ def health(
 
     Motion, gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
     resonances, drift, changes of the noise, dependence between channels; worst first, with what
-    to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate; one that
-    needs more memory than there may be is examined a stretch at a time.
+    to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate.
 
     \b
     Example:
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm._core.memory import limited
-    from gmwm.diagnosis import health as examine, health_stream
+    from gmwm.diagnosis import health as examine
 
-    try:
-        with limited(memory):
-            recording = read_recording(file, **reading)
-    except InputError as error:
-        if error.code != "memory" or needs_the_whole(reading):
-            raise
-        found = health_stream(file, **arguments_of_blocks(reading))
-    else:
-        found = examine(recording)
+    with limited(memory):
+        recording = read_recording(file, **reading)
+    found = examine(recording)
     # The file first: who pipes the table into head must not lose it.
     if output is not None:
         found.save(output)

@@ -96,8 +96,5 @@ def with_option(notice: Notice) -> Notice:
         "slow-period": "",
     }[notice.code]
     options = [each for each in (cut, "--remove-departures" * values["removable"]) if each]
-    if values.get("streamed"):  # read as a whole, they are taken
-        advice = f"{notice.hint}; if there is more memory, --memory GB with {', or '.join(options)}"
-        return replace(notice, hint=advice)
     advice = ": ".join([notice.hint.partition(",")[0], *filter(None, [", or ".join(options)])])
     return replace(notice, hint=advice)

@@ -13,7 +13,7 @@ from io import StringIO, TextIOWrapper
 
 import click
 
-from gmwm import __version__
+from gmwm._core import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify
@@ -41,9 +41,19 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    calibrate, fleet, compare, demo, budget, health, bound, reduce, certify, export, navigate,
+    calibrate,
+    fleet,
+    compare,
+    demo,
+    budget,
+    health,
+    bound,
+    reduce,
+    certify,
+    export,
+    navigate,
     reproduce,
-):  # fmt: skip
+):
     cli.add_command(_command)
 
 

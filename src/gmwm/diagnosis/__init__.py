@@ -2,7 +2,6 @@
 
 from gmwm.diagnosis.check import health as health
 from gmwm.diagnosis.gathered import gathered as gathered
-from gmwm.diagnosis.joined import health_stream as health_stream, joined as joined
 from gmwm.diagnosis.result import (
     ChannelHealth as ChannelHealth,
     Health as Health,

@@ -12,6 +12,7 @@ from gmwm._core.documents import Document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import SEVERITIES, Notice, Severity
+from gmwm._core.spool import scaled
 from gmwm._core.text import Printed, wrapped
 from gmwm.diagnosis.gathered import gathered
 from gmwm.errors import InputError, MissingNameError
@@ -87,8 +88,8 @@ class Health(Document, Printed):
         "rows-copied", "infinite", "size", "stuck", "held", "saturation", "abrupt-end",
         "value-repeated",
         "repeated-samples", "interpolated", "filled", "event",
-        "outliers", "heavy-tails", "light-tails", "rounding", "line", "resonance",
-        "drift", "resets", "variance", "temperature", "crosstalk" and "clean".
+        "outliers", "heavy-tails", "rounding", "line", "resonance",
+        "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str
@@ -180,7 +181,7 @@ class Health(Document, Printed):
             events = () if channel.is_auxiliary else self.events(name)
             held = not channel.is_auxiliary and self._channel(name).held > 0.0
             if (events or held) and name not in but:
-                values = np.array(channel.values, dtype=float)
+                values = scaled(channel.values, 1.0)
                 if held:
                     values[1:][np.diff(values) == 0.0] = np.nan
                 for start, stop in events:

@@ -42,10 +42,6 @@ specifies better: rad/s, m/s^2."""
 LONGEST_FILLED = 0.1
 """s of missing IMU samples that are filled along a straight line: short against a manoeuvre."""
 
-READ_AT_ONCE = 48e6
-"""Bytes of text beyond which an IMU's record is read a block at a time and kept on disk: two hours
-at 100 Hz, which need 150 MB when read as a whole."""
-
 SPECIFIC_FORCE = (0.5, 2.0)
 """Of standard gravity: mean specific force of a record, beyond which its unit is wrong."""
 

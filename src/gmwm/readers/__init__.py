@@ -6,20 +6,8 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY as AUXILIARY
-from gmwm.readers.at_rest import (
-    block_means as block_means,
-    steady_turn as steady_turn,
-    turning_gravity as turning_gravity,
-)
-from gmwm.readers.blocks import (
-    MIXED as MIXED,
-    RowKeys as RowKeys,
-    notices_of_blocks as notices_of_blocks,
-    read_blocks as read_blocks,
-    row_keys as row_keys,
-)
 from gmwm.readers.cells import DATE as DATE, seconds_of as seconds_of
-from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES, jumps_of_all as jumps_of_all
+from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES
 from gmwm.readers.csv_table import CsvTable as CsvTable
 from gmwm.readers.formats import is_frame as is_frame, is_text as is_text
 from gmwm.readers.missing import Missing as Missing
@@ -39,3 +27,8 @@ from gmwm.readers.recording import (
 )
 from gmwm.readers.table import label as label
 from gmwm.readers.text_file import content_size as content_size
+from gmwm.readers.turning import (
+    block_means as block_means,
+    steady_turn as steady_turn,
+    turning_gravity as turning_gravity,
+)

@@ -168,11 +168,14 @@ class BinaryTable:
         return {column: self._scaled(column, found.pop(column), interval, 0) for column in columns}
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, ``rows`` at a time; the interval of increments is that of the first."""
-        interval = 0.0
-        for start in range(0, self.count, rows):
+        """The same, ``rows`` at a time."""
+        starts = range(0, self.count, rows)
+        interval = 1.0
+        if self.layout.increments:
+            times = [self._columns(start, rows, (0,))[0] for start in starts]
+            interval = self._interval(np.concatenate(times))
+        for start in starts:
             found = self._columns(start, rows, tuple({0, *columns}))
-            interval = interval or self._interval(found[0])
             yield {c: self._scaled(c, found[c], interval, start) for c in columns}
 
     def _columns(self, start: int, rows: int, columns: Sequence[int]) -> dict[int, FloatArray]:

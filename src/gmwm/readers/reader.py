@@ -17,7 +17,6 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.at_rest import rest_notices, turn_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import (
@@ -43,7 +42,9 @@ from gmwm.readers.formats import (
 from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
+from gmwm.readers.rest import rest_notices
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
+from gmwm.readers.spool import load_columns
 from gmwm.readers.table import Table, column_of
 
 
@@ -114,6 +115,12 @@ def read(
         of temperatures, voltages and further clocks are its auxiliary channels. Its
         ``notices`` report what was assumed, which columns were not used and what is missing.
 
+    Notes
+    -----
+    Columns that would need more than 1 GB, with what is made of them, are kept in temporary files
+    (in ``TMPDIR``) and mapped: reading, `gmwm.health` and `gmwm.calibrate` then need about three
+    times the memory of one channel. The environment variable ``GMWM_MEMORY`` sets another limit.
+
     Raises
     ------
     InputError
@@ -159,23 +166,11 @@ def _read(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def part_of(
-    table: Table,
-    given: Given,
-    before: int = 0,
-    told: slice | None = None,
-    elapsed: float = 0.0,
-) -> Part:
-    """The recording of a table, and when it begins.
-
-    before: Rows of parts before this.
-    told: Rows of which notices of the clock tell: those on either side belong to other parts.
-    elapsed: From the start of the record to the first row, s.
-    """
+def part_of(table: Table, given: Given) -> Part:
+    """The recording of a table, and when it begins."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
-    if not before:
-        _check_one_sensor(table, roles)
+    _check_one_sensor(table, roles)
     # Complain before a long file is read, not after.
     if roles.time is not None and stated is None:
         stated_seconds(table.source, table.names[roles.time])
@@ -184,8 +179,7 @@ def part_of(
     )
 
     arrays, auxiliary, unreadable = _load(table, roles)
-    if not before:  # later parts may hold no samples at all
-        _check_size(table, roles, arrays)
+    _check_size(table, roles, arrays)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
         if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
@@ -202,12 +196,7 @@ def part_of(
         largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    used_rate, timing, clock_notices = _timing(
-        table, roles.time, arrays, stated, before, told, elapsed
-    )
-    sharing = next((n.values["rows"] for n in clock_notices if n.code == "stamps-in-bursts"), 0)
-    may_turn = roles.time is not None and 1 < sharing <= tuning.MOST_IN_TURNS
-    is_even = may_turn and _are_groups(arrays[roles.time or 0], sharing)
+    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -230,12 +219,9 @@ def part_of(
         recording,
         unit_of,
         given.units,
-        isinstance(given.channels, Mapping),
+        are_columns_given=isinstance(given.channels, Mapping),
         has_layout=isinstance(table, BinaryTable),
     )
-    if may_turn:
-        telling = _telling(table, roles, sharing)
-        at_rest = (*turn_notices(recording, sharing, telling, is_even=is_even), *at_rest)
     recording = replace(
         recording,
         channels=(*recording.channels, *further),
@@ -264,26 +250,6 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
                 "turns: keep those of one",
                 "several-sensors",
             )
-
-
-def _are_groups(stamps: FloatArray, rows: int) -> bool:
-    """Whether so many rows in turn have one stamp all through."""
-    sizes = np.diff(np.flatnonzero(np.diff(stamps, prepend=np.nan, append=np.nan) != 0.0))
-    return bool(np.mean(sizes == rows) > tuning.TURNS_ALIKE)
-
-
-def _telling(table: Table, roles: Roles, rows: int) -> list[str]:
-    """Columns without a role whose numbers come in turns, one to each row of a stamp."""
-    used, found = {*roles.columns, *(column.index for column in roles.auxiliary)}, []
-    for index in range(len(table.names)):
-        try:
-            values = table.load([index])[index] if index not in used else np.zeros(0)
-        except (InputError, KeyError):  # of words, or not among the columns of a block
-            continue
-        turn = values[:-rows] == values[rows:]
-        if np.unique(values[:rows]).size == rows and np.mean(turn) > tuning.TURNS_ALIKE:
-            found.append(column_of(table, index))
-    return found
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:
@@ -322,16 +288,16 @@ def _load(
     """Columns; an auxiliary one that cannot be read, or has another length, is left out."""
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     try:
-        return table.load(sorted(wanted)), list(roles.auxiliary), []
+        return load_columns(table, sorted(wanted)), list(roles.auxiliary), []
     except InputError:
         if not roles.auxiliary:
             raise
-    arrays = table.load(roles.columns)
+    arrays = load_columns(table, roles.columns)
     n = arrays[roles.columns[0]].size
     kept = []
     for column in roles.auxiliary:
         try:
-            values = table.load([column.index])[column.index]
+            values = load_columns(table, [column.index])[column.index]
         except InputError:
             continue
         if values.size == n:
@@ -369,14 +335,11 @@ def _timing(
     time: int | None,
     arrays: Mapping[int, FloatArray],
     stated: float | None,
-    before: int,
-    told: slice | None,
-    elapsed: float,
 ) -> tuple[float, Timing | None, tuple[Notice, ...]]:
     """The stated rate if there is one, checked against the time stamps if there are any."""
     if time is None:
         return stated or 0.0, None, ()  # without one, it was asked for with the units
-    name, n = table.names[time], arrays[time].size
+    name = table.names[time]
     clock = Clock(
         source=table.source,
         column=column_of(table, time),
@@ -385,11 +348,7 @@ def _timing(
         own_unit=meaning(name).stated,
         where=table.where,
         same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
-        extent=max(n, min(before + n, tuning.LONGEST_GAP_OF_BLOCK)),
-        elapsed=elapsed,
     )
-    if told is not None:
-        clock = replace(clock, told=(told.start, told.stop))
     timing = timing_of(clock, stated)
     if stated is None:
         return timing.rate, timing, timing.notices

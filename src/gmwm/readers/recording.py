@@ -11,6 +11,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.notices import Notice
+from gmwm._core.spool import scaled
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
@@ -185,7 +186,8 @@ class Recording(Mapping[str, Channel], Printed):
                 continue
             quantity = quantity_of(unit)
             si = SI_UNIT[quantity]
-            channels.append(Channel(name, series * factor(unit, si), 1.0 / rate, quantity, si))
+            values = scaled(series, factor(unit, si))
+            channels.append(Channel(name, values, 1.0 / rate, quantity, si))
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
@@ -336,7 +338,7 @@ class Recording(Mapping[str, Channel], Printed):
 
 def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryUnit) -> Channel:
     """A channel of an auxiliary quantity in its usual unit."""
-    return Channel(name, values * unit.scale + unit.offset, dt, unit.quantity, unit.unit)
+    return Channel(name, scaled(values, unit.scale, unit.offset), dt, unit.quantity, unit.unit)
 
 
 def _series(name: str, values: FloatArray) -> FloatArray:

@@ -239,22 +239,13 @@ RECORDS_AT_ONCE = 1 << 16
 LONGEST_OF_WRAP = 100.0
 """Steps within which a counter that ran over goes on."""
 
-# -- recordings that are read a block at a time ---------------------------------------------------
+# -- files beyond memory ---------------------------------------------------------------------------
 
-ROWS_OF_BLOCK = 1 << 18
-"""Of a block: 2 MB a column."""
+ROWS_OF_BLOCK = 1 << 16
+"""Rows that are read at a time from a file that is kept on disk: half a MB a column."""
+
+GIGABYTES_OF_BLOCK = 1 / 16
+"""Memory that such a block may need at least, however little is allowed: that of 48 columns."""
 
 FEWEST_OF_BLOCK = 4096
-"""Rows of which a clock is seen as well as of a long recording."""
-
-LONGEST_GAP_OF_BLOCK = 1 << 24
-"""Rows that may be missing in a gap of a block, 46 h at 100 Hz and 134 MB a channel, if as many
-were read before it."""
-
-ROWS_KNOWN_AGAIN = 1 << 21
-"""Rows, the latest ones, that are known again where a block has them once more: 6 h at 100 Hz, in
-16 MB."""
-
-ROWS_BESIDE = 2 * MOST_OF_ONE_STAMP
-"""Rows on either side of a block from which its clock is followed: the longest burst, of which the
-last row has the stamp, and rows after it that decide."""
+"""Rows at the start of a file that show whether its rows are of several sensors in turns."""

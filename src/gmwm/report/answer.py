@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration, floor
@@ -71,11 +72,13 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
         "trusted": [row["name"] for row in rows if row["valid"]],
         "causes": [(", ".join(names), why) for why, names in _causes(calibration).items()],
         "rows": rows,
-        "bounds": {"B": any(map(_is_bound, (row["B"] for row in rows))),
-                   "N or K": any(map(_is_bound, values))},
+        "bounds": {
+            "B": any(map(_is_bound, (row["B"] for row in rows))),
+            "N or K": any(map(_is_bound, values)),
+        },
         "parameters": parameters_sentence(calibration),
         "boxes": boxes,
-    }  # fmt: skip
+    }
 
 
 def _causes(calibration: Calibration) -> dict[str, list[str]]:
@@ -87,6 +90,7 @@ def _causes(calibration: Calibration) -> dict[str, list[str]]:
     return causes
 
 
+@page_of(Calibration, "verdict")
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line, and what of it no channel's validity says."""
     found = findings(calibration)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.readers import read, read_blocks
+from gmwm.readers import read
 from gmwm.readers.clock import is_time_of_day
 from gmwm.readers.names import CANONICAL
 
@@ -270,18 +270,13 @@ def test_the_change_of_summer_time_is_no_gap(tmp_path, hour, step):
     assert "line 4002" in notice.text
 
 
-@pytest.mark.parametrize("rows", [None, 700])
-def test_times_of_day_as_one_number_have_no_gap_at_the_minute(tmp_path, rows):
+def test_times_of_day_as_one_number_have_no_gap_at_the_minute(tmp_path):
     moments = [FIRST + timedelta(milliseconds=100 * i) for i in range(2000)]
     kept = moments[:1000] + moments[1003:]  # passes midnight and three minutes
     stamps = [each.strftime("%H%M%S.%f")[:-4] for each in kept]
     recording = dated(tmp_path, stamps)
     assert "time-of-day" in [notice.code for notice in recording.notices]
-    if rows:
-        parts = list(read_blocks(tmp_path / "log.csv", rows=rows))
-        values = np.concatenate([part["gyro_x"].values for part in parts])
-    else:
-        values = recording["gyro_x"].values
+    values = recording["gyro_x"].values
     assert recording.dt == pytest.approx(0.1, rel=1e-6)
     assert np.flatnonzero(np.isnan(values)).tolist() == [1000, 1001, 1002]
 

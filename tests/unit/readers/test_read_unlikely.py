@@ -238,8 +238,6 @@ def test_rows_of_two_sensors_in_turns_are_refused():
     found = frame(0.01 * (np.arange(N) // 2)).assign(imu_id=np.arange(N) % 2)
     with pytest.raises(InputError, match=r"'imu_id': rows of 2 sensors come in turns"):
         gmwm.read(found)
-    with pytest.raises(InputError, match="in turns"):
-        gmwm.stream(found, rows=1000)
 
 
 @pytest.mark.parametrize("number", [0.0 * np.arange(N), np.arange(N), 1.0 * (np.arange(N) > 2000)])

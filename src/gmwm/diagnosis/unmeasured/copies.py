@@ -10,7 +10,8 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm._core.typing import IntArray
 from gmwm.diagnosis import tuning
-from gmwm.readers import MIXED, Recording, RowKeys, row_keys
+from gmwm.diagnosis.unmeasured.row_keys import MIXED, RowKeys, row_keys
+from gmwm.readers import Recording
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.spool import ROWS, Spool, is_spooled, release, windows
+from gmwm._core.spool import ROWS, alike, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -19,14 +19,10 @@ from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.logs import is_time, open_log
 from gmwm.readers import (
-    Missing,
     Recording,
     bare,
-    content_size,
     is_text,
-    notices_of_blocks,
     read,
-    read_blocks,
 )
 
 Columns = Mapping[str, str | int] | None
@@ -108,13 +104,8 @@ def read_imu_log(
     """Read an IMU record with its clock; see `read_imu`."""
     columns, turned = _signs(channels)
     is_log = layout is None and (is_text(Path(path)) if format is None else format == "text")
-    parts: Iterator[Recording]
-    if is_log and content_size(Path(path)) > tuning.READ_AT_ONCE:
-        parts = read_blocks(path, rate, units, columns, time, damaged=damaged, rows=ROWS)
-    else:
-        found = read(path, rate, units, columns, time, layout, format=format, damaged=damaged)
-        parts = iter((found,))
-    record = _Record.of(parts, turned)
+    found = read(path, rate, units, columns, time, layout, format=format, damaged=damaged)
+    record = _Record.of(found, turned)
     clock = _clock(Path(path), record, time if is_log else False, start)
     filled = _fill(record)
     mean = record.mean()
@@ -152,28 +143,22 @@ class _Record:
     n = property(lambda self: len(self.rate))
 
     @classmethod
-    def of(cls, parts: Iterator[Recording], turned: frozenset[str]) -> _Record:
-        """All parts, one after the other; ``turned`` channels with the opposite sign."""
-        sign = np.array([-1.0 if axis in turned else 1.0 for axis in AXES])
-        first = _checked(next(parts))
-        samples = _samples(first, sign)
-        missing = {name: Missing().and_then(first[name].values) for name in AXES}
-        noticed = [*first.notices]
-        spools: tuple[Spool, Spool] | None = None
-        for part in parts:
-            if spools is None:
-                spools = Spool(3), Spool(3)
-                _append(spools, samples)
-            _append(spools, _samples(_checked(part), sign))
-            missing = {name: e.and_then(part[name].values) for name, e in missing.items()}
-            noticed += part.notices
-        if spools is None:
-            return cls(
-                np.ascontiguousarray(samples[:, :3]), np.ascontiguousarray(samples[:, 3:]),
-                first.dt, first.source, first.notices,
-            )  # fmt: skip
-        notices = notices_of_blocks(noticed, missing)
-        return cls(spools[0].array(), spools[1].array(), first.dt, first.source, notices)
+    def of(cls, recording: Recording, turned: frozenset[str]) -> _Record:
+        """Samples of a recording; ``turned`` channels with the opposite sign."""
+        recording = _checked(recording)
+        triads = list[FloatArray]()
+        for axes in (AXES[:3], AXES[3:]):
+            first = recording[axes[0]].values
+            triad = alike(first, 3 * first.size).reshape(-1, 3)
+            for column, axis in enumerate(axes):
+                values = recording[axis].values
+                sign = -1.0 if axis in turned else 1.0
+                for part in windows(values.size):
+                    np.multiply(values[part], sign, out=triad[part, column])
+                    release(values)
+                    release(triad)
+            triads.append(triad)
+        return cls(triads[0], triads[1], recording.dt, recording.source, recording.notices)
 
     def column(self, name: str) -> FloatArray:
         """Samples of an axis, to be changed in place."""
@@ -206,15 +191,6 @@ def _checked(recording: Recording) -> Recording:
             f"{recording.source}: there is no channel {missing[0]}: an IMU has {', '.join(AXES)}"
         )
     return recording
-
-
-def _samples(recording: Recording, sign: FloatArray) -> FloatArray:
-    return np.column_stack([recording[axis].values for axis in AXES]) * sign
-
-
-def _append(spools: tuple[Spool, Spool], samples: FloatArray) -> None:
-    spools[0].append(samples[:, :3])
-    spools[1].append(samples[:, 3:])
 
 
 def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:

@@ -8,7 +8,6 @@ from gmwm.readers.clock.civil_time import (
 from gmwm.readers.clock.clock_notices import (
     CLOCK_CODES as CLOCK_CODES,
     change_notice as change_notice,
-    jumps_of_all as jumps_of_all,
 )
 from gmwm.readers.clock.jumps import Jumps as Jumps
 from gmwm.readers.clock.stamps import Clock as Clock, repeated_notice as repeated_notice

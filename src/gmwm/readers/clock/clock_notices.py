@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -51,7 +50,6 @@ def change_notice(
 
 def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     """When the clock jumps, how far, and how many samples that costs."""
-    jumps = jumps.among_rows(clock.tells)
     if not jumps.rows.size:
         return []
     count, i = jumps.rows.size, jumps.longest
@@ -75,14 +73,6 @@ def jump_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     return notices
 
 
-def jumps_of_all(alike: Sequence[Notice]) -> Notice:
-    """One notice of the jumps of which those of several stretches tell."""
-    count = sum(int(each.values["count"]) for each in alike)
-    missing = sum(float(each.values["missing"]) for each in alike)
-    farthest = max(alike, key=lambda each: float(each.values["longest"])).values
-    return _jump_notice(count, missing, farthest["longest"], farthest["time"])
-
-
 def _jump_notice(count: int, missing: float, length: float, when: float) -> Notice:
     """How often the clock jumps, and where it does so farthest, s."""
     total = f"{missing:,.0f} sample{'s' if missing > 1.0 else ''} missing"
@@ -98,7 +88,6 @@ def _jump_notice(count: int, missing: float, length: float, when: float) -> Noti
 def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) -> list[Notice]:
     """Bursts, rows that come twice, stamps far from the clock, and a clock that was set."""
     notices = []
-    jumps = jumps.among_rows(clock.tells)
     if found.burst > 1:
         text = (
             f"{found.burst} rows come with one stamp, usually: it is taken as that of the last "
@@ -108,7 +97,6 @@ def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) 
     if count := jumps.repeated.size:
         notices.append(repeated_notice(count))
     astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
-    astray = astray[clock.tells(astray)]
     if astray.size:
         worst = astray[np.argmax(np.abs(found.late[astray]))]
         by = float(found.late[worst]) * jumps.interval * seconds
@@ -136,7 +124,7 @@ def uneven_notices(clock: Clock, found: Followed, jumps: Jumps, seconds: float) 
 
 def shift_notices(clock: Clock, jumps: Jumps, seconds: float) -> list[Notice]:
     """Where the clock was set by less than what is followed, or while the host stalled."""
-    found = [each for each in find_shifts(clock.stamps, jumps) if clock.tells(np.array(each[0]))]
+    found = find_shifts(clock.stamps, jumps)
     if not found:
         return []
     row, by = max(found, key=lambda each: abs(each[1]))

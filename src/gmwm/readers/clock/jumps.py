@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.spool import alike, release
 from gmwm._core.typing import FloatArray, median
 from gmwm.readers import tuning
 from gmwm.readers.clock.line import interval_of
@@ -94,35 +94,25 @@ class Jumps:
         repeated = np.sort(np.concatenate([kept[self.repeated], copies]))
         return replace(self, rows=kept[self.rows], repeated=repeated, set_at=kept[self.set_at])
 
-    def among_rows(self, told: Callable[[_Rows], npt.NDArray[np.bool_]]) -> Jumps:
-        """Those at some rows only."""
-        some = told(self.rows)
-        return replace(
-            self,
-            rows=self.rows[some],
-            steps=self.steps[some],
-            missing=self.missing[some],
-            repeated=self.repeated[told(self.repeated)],
-            set_at=self.set_at[told(self.set_at)],
-        )
-
     def spread(self, values: FloatArray) -> FloatArray:
         """Put samples on the regular grid.
 
         values: (n,).
         Returns: NaN where a row is missing; without those that repeat another.
         """
+        if not (self.repeated.size or self.rows.size):
+            return values
+        result = alike(values, values.size - self.repeated.size + int(self.total))
+        result.fill(np.nan)
         if self.repeated.size:
             values = np.delete(values, self.repeated)
-        if not self.rows.size:
-            return values
         rows = self.rows - np.searchsorted(self.repeated, self.rows)
         ends = np.append(rows, values.size)
-        result = np.full(values.size + int(self.total), np.nan)
         result[: ends[0]] = values[: ends[0]]
         shift = np.cumsum(self.missing).astype(np.int64)
         for first, last, ahead in zip(ends[:-1], ends[1:], shift, strict=True):
             result[first + ahead : last + ahead] = values[first:last]
+        release(result)
         return result
 
 

@@ -28,9 +28,6 @@ class Clock:
     own_unit: The unit as the header states it.
     where: Row -> where that is in the file.
     same: Which rows, in an order, have the samples of the row before; asked where stamps repeat.
-    extent: Samples up to which a gap is one.
-    told: Rows from and up to which notices tell; those on either side belong to other blocks.
-    elapsed: From the start of the record to the first stamp, s.
     """
 
     source: str
@@ -40,17 +37,10 @@ class Clock:
     own_unit: str
     where: Callable[[int], str]
     same: Callable[[IntArray], BoolArray]
-    extent: int
-    told: tuple[int, int] = (0, 1 << 62)
-    elapsed: float = 0.0
-
-    def tells(self, rows: IntArray) -> BoolArray:
-        """Of which of some rows notices tell."""
-        return np.asarray((rows >= self.told[0]) & (rows < self.told[1]))
 
     def when(self, row: int, seconds: float) -> float:
         """Time of a row from the start of the record, s, with stamps in a unit of seconds."""
-        return self.elapsed + float(self.stamps[row] - self.stamps[0]) * seconds
+        return float(self.stamps[row] - self.stamps[0]) * seconds
 
     @property
     def place(self) -> str:
@@ -95,10 +85,8 @@ class Clock:
             stamps=self.stamps[kept],
             where=lambda row: self.where(int(kept[row])),
             same=lambda order: self.same(kept[order]),
-            told=tuple(np.searchsorted(kept, self.told).tolist()),
         )
-        told = int(np.count_nonzero(self.tells(copies)))
-        return Mended(clock, repeated_notice(told) if told else None, kept, copies)
+        return Mended(clock, repeated_notice(copies.size), kept, copies)
 
     def _copies(self) -> IntArray:
         """Rows, alone or in pieces, that were written again: they are as an earlier one."""

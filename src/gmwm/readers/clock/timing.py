@@ -124,7 +124,7 @@ def _steps(clock: Clock) -> _Steps:
             jumps = find_jumps(clock.stamps)
             # What is longer than the recording is no gap, nor are steps of 40 orders in one clock.
             if jumps.interval > 0.0 and (
-                change is not None or not np.any(jumps.missing > clock.extent)
+                change is not None or not np.any(jumps.missing > clock.stamps.size)
             ):
                 jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
                 return _Steps(jumps, jitter, change, None)
@@ -206,7 +206,7 @@ def _check_jumps(clock: Clock, jumps: Jumps) -> None:
             "clock",
             WAY_OUT,
         )
-    if jumps.total > clock.extent:
+    if jumps.total > clock.stamps.size:
         row = int(jumps.rows[jumps.longest])
         raise InputError(
             f"{clock.place}, {clock.where(row)}: the clock jumps by "
@@ -230,7 +230,7 @@ def _followed(clock: Clock) -> Followed:
     is_fine = not np.all(repeats) and finest < 0.1 * median(np.abs(steps[~repeats]))
     del steps
     if is_fine:
-        found = followed(clock.stamps, same, clock.extent)
+        found = followed(clock.stamps, same, clock.stamps.size)
     if found is None or not found.is_a_clock:
         raise _no_clock(clock, np.diff(clock.stamps))
     return found

@@ -8,7 +8,6 @@ rate.
 
 from __future__ import annotations
 
-import mmap
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,6 +20,7 @@ import numpy.typing as npt
 
 from gmwm._core import memory
 from gmwm._core.notices import Notice
+from gmwm._core.spool import is_spooled, release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers import tuning
@@ -130,13 +130,18 @@ class ArrayTable:
         return found
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, ``rows`` at a time; only what is mapped is not read as a whole."""
-        longest = max(self.arrays[column].like.shape[0] for column in columns)
+        """The same, ``rows`` at a time; of what is not mapped, a column at a time."""
+        shown = [self.arrays[column].like for column in columns]
+        if not all(map(is_spooled, shown)) and len({each.shape for each in shown}) == 1:
+            for column in columns:
+                yield self.load([column])
+            return
+        longest = max(each.shape[0] for each in shown)
         for begin in range(0, longest, rows):
             arrays = tuple(array[begin : begin + rows] for array in self.arrays)
             yield replace(self, arrays=arrays, before=begin).load(columns)
             for column in columns:
-                _release(self.arrays[column].like)
+                release(self.arrays[column].like)
 
     def where(self, row: int) -> str:
         """Say which row."""
@@ -291,12 +296,3 @@ def _axes_or_itself(name: str, array: Array) -> list[_Column]:
     if _is_triad(name, array):
         return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]
-
-
-def _release(like: AnyArray) -> None:
-    """Let the memory go in which the pages of a file are mapped that were read."""
-    base: Any = like
-    while isinstance(base, np.ndarray):
-        base = base.base
-    if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):  # not on Windows
-        base.madvise(mmap.MADV_DONTNEED)

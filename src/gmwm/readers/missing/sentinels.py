@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gmwm._core.notices import Notice, Severity
+from gmwm._core.spool import scaled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.readers import tuning
 
@@ -63,7 +64,7 @@ def without_sentinels(
     if not gone.size:
         return values, []
     severity: Severity = "bad" if gone.size > tuning.MOST_SENTINELS * values.size else "warning"
-    clean = np.array(values)
+    clean = scaled(values, 1.0)
     clean[gone] = np.nan
     notices = []
     beyond = [i for i in np.flatnonzero(chosen).tolist() if abs(numbers[i]) > largest]

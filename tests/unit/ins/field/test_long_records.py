@@ -7,7 +7,7 @@ import pytest
 
 from gmwm._core import spool
 from gmwm._core.spool import Spool, is_spooled
-from gmwm.ins import Imu, Navigated, read_imu, tuning
+from gmwm.ins import Imu, Navigated, read_imu
 from gmwm.ins.field.start.standing import standstills
 from gmwm.study.emulated_logs import emulated_log
 
@@ -63,7 +63,7 @@ def test_a_long_file_is_read_as_a_short_one(tmp_path, monkeypatch):
     once = read_imu(tmp_path / "imu.csv", units=units, channels={"gyro_x": "-gyro_x"} | {
         each: each for each in names[1:]
     })  # fmt: skip
-    monkeypatch.setattr(tuning, "READ_AT_ONCE", 0.0)
+    monkeypatch.setenv("GMWM_MEMORY", "1e-4")
     monkeypatch.setattr("gmwm.ins.field.imu_file.ROWS", 5000)
     long = read_imu(tmp_path / "imu.csv", units=units, channels={"gyro_x": "-gyro_x"} | {
         each: each for each in names[1:]

@@ -22,7 +22,6 @@ from flight_logs import (
     write_dataflash,
     write_ulog,
 )
-from gmwm.readers import read_blocks
 from gmwm.readers.formats.messages import dataflash
 from gmwm.readers.names import CANONICAL
 
@@ -263,13 +262,3 @@ def test_messages_are_those_that_pymavlink_finds(tmp_path, monkeypatch):
     parts = list(dataflash.messages(path, ("IMU", "GYR")))
     ours = [tuple(row) for part in parts for row in part.rows[["TimeUS", "I", "GyrX", "AccZ"]]]
     assert len(parts) > 10 and len(ours) > 390 and ours == found
-
-
-def test_a_block_at_a_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(dataflash, "_BLOCK", 1 << 17)
-    path = write_dataflash(tmp_path / "a.bin", [IMU], imu_messages(np.tile(X, (50, 1))))
-    whole = gmwm.read(path)
-    blocks = list(read_blocks(path, rows=4096, topic="IMU[0]"))
-    assert len(blocks) > 1
-    for name in whole:
-        assert np.array_equal(whole[name].values, np.concatenate([b[name].values for b in blocks]))

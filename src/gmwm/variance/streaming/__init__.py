@@ -1,7 +1,0 @@
-"""Wavelet variance of streams: one pass over blocks of samples, at constant memory."""
-
-from gmwm.variance.streaming.recording import (
-    StreamedRecording as StreamedRecording,
-    stream as stream,
-)
-from gmwm.variance.streaming.streaming import StreamingVariance as StreamingVariance
