@@ -226,9 +226,14 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
     shown = []
     for letter, value, unit in zip("NK", numbers, ("u/sqrt(Hz)", "u/s/sqrt(Hz)"), strict=True):
         text = quantity_text(1.0, unit, fit)
-        shown.append({"letter": letter, "value": f"{value:.6e}", **{
-            key: each.split(" ", 1)[1] for key, each in text.items()
-        }, "per_si": f"{per_si(unit, fit):.9e}"})  # fmt: skip
+        shown.append(
+            {
+                "letter": letter,
+                "value": f"{value:.6e}",
+                **{key: each.split(" ", 1)[1] for key, each in text.items()},
+                "per_si": f"{per_si(unit, fit):.9e}",
+            }
+        )
     return shown
 
 

@@ -212,8 +212,9 @@ def _troubled(fleet: Fleet) -> list[dict[str, str]]:
     """Units without a calibration, and axes without a valid model, with the reasons."""
     rows = [
         {"device": unit.name, "where": "", "text": fleet.failed[path].text}
-        for path, unit in fleet.units.items() if path in fleet.failed
-    ]  # fmt: skip
+        for path, unit in fleet.units.items()
+        if path in fleet.failed
+    ]
     for path, calibration in fleet.done.items():
         name = fleet.units[path].name
         for channel, fit in calibration.items():

@@ -13,13 +13,16 @@ import numpy as np
 from scipy.special import betaincinv
 
 from gmwm._core.distributions import chi2, norm, student as t
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
+from gmwm.ins.simulation.filter_errors import GROUPS, FilterErrors
 
 LEVELS = (0.5, 0.68, 0.95, 0.997)
 """Levels at which coverage is counted."""
+
+_UPPER = 0.5 + 0.5 * tuning.CONFIDENCE
+_UNKNOWN = (float("nan"),) * 3
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Ratio:
 
 @dataclass(frozen=True)
 class Coverage:
-    """How many errors lay within the predicted interval of a level.
+    """Fraction of the errors within the predicted interval of a level.
 
     lower, upper: Interval of 95 % of the fraction: binomial at one epoch (Clopper & Pearson 1934,
         *Biometrika* 26, 404-413), and over a time with as many draws as the scatter between the
@@ -86,10 +89,9 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether no group's NEES is out of question."""
-        return all(
-            ratio.p_value > tuning.CONTRADICTED / len(self.nees) for ratio in self.nees.values()
-        )
+        """Whether no group's NEES contradicts the filter."""
+        level = tuning.CONTRADICTED / len(self.nees)
+        return all(ratio.p_value > level for ratio in self.nees.values())
 
 
 def at_epoch(runs: FilterErrors, index: int) -> Consistency:
@@ -102,9 +104,7 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
         Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
-    return _judged(
-        runs, alive, np.array([index]), chi_square_ratio, lambda standard: covered(standard[:, 0])
-    )
+    return _consistency(runs, alive, np.array([index]), chi_square_ratio, _coverage_at_epoch)
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
@@ -130,34 +130,42 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
             f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
         )
     alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
-    return _judged(
-        runs, alive, epochs, lambda squares, size: mean_ratio(np.mean(squares, axis=1) / size),
-        _covered_by_run,
-    )  # fmt: skip
+
+    def mean_of_runs(squares: FloatArray, size: int) -> Ratio:
+        return mean_ratio(np.mean(squares, axis=1) / size)
+
+    return _consistency(runs, alive, epochs, mean_of_runs, _coverage_over_time)
 
 
-def _judged(
-    runs: FilterErrors, alive: np.typing.NDArray[np.bool_], epochs: np.typing.NDArray[np.intp],
-    sized: Callable[[FloatArray, int], Ratio],
-    counted: Callable[[FloatArray], tuple[Coverage, ...]],
-) -> Consistency:  # fmt: skip
-    """Of runs and epochs: ``sized`` makes the NEES of squares (R, K), ``counted`` the coverage."""
+def _consistency(
+    runs: FilterErrors,
+    alive: BoolArray,
+    epochs: IntArray,
+    nees_of: Callable[[FloatArray, int], Ratio],
+    coverage_of: Callable[[FloatArray], tuple[Coverage, ...]],
+) -> Consistency:
+    """Consistency of some runs at some epochs.
+
+    nees_of: Makes the NEES from squares (R, K) of a number of degrees of freedom.
+    coverage_of: Makes the coverage from standardised errors (R, K, d).
+    """
     nees, coverage, rms, score = {}, {}, {}, {}
     for i, (name, part) in enumerate(GROUPS.items()):
         size = part.stop - part.start
         squares = runs.nees[alive][:, epochs, i]
-        nees[name] = sized(squares, size)
+        nees[name] = nees_of(squares, size)
         standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
-        coverage[name], rms[name] = counted(standard), _rms(standard)
-        score[name] = _score(squares, runs.log_det[alive][:, epochs, i], size)
+        coverage[name], rms[name] = coverage_of(standard), _rms(standard)
+        densities = squares + runs.log_det[alive][:, epochs, i] + size * np.log(2.0 * np.pi)
+        score[name] = float(0.5 * np.mean(densities)) if squares.size else float("nan")
     settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
     if np.any(alive) and settled.size:
-        # Of the sensors that have states.
+        # Only sensors that have states.
         error, sd = runs.sensor_error[alive][:, settled], runs.sensor_sd[alive][:, settled]
         known = np.all(sd > 0.0, axis=(0, 1))
         standard = np.asarray(error[..., known] / sd[..., known])
-        nees["sensors"] = sized(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
-        coverage["sensors"], rms["sensors"] = counted(standard), _rms(standard)
+        nees["sensors"] = nees_of(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
+        coverage["sensors"], rms["sensors"] = coverage_of(standard), _rms(standard)
     return Consistency(nees, coverage, rms, score)
 
 
@@ -193,84 +201,63 @@ def chi_square_ratio(squares: FloatArray, size: int) -> Ratio:
     return _ratio(float(np.sum(squares)), float(size * squares.size))
 
 
+def _ratio(total: float, dof: float) -> Ratio:
+    if not dof > 0.0 or not np.isfinite(total):
+        return Ratio(float("nan"), *_UNKNOWN)
+    lower, upper = chi2.ppf([1.0 - _UPPER, _UPPER], dof) / dof
+    p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
+    return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
+
+
 def mean_ratio(values: FloatArray) -> Ratio:
     """Mean of independent values whose expectation is 1, of a distribution that is not known."""
     runs = values.size
     mean = float(np.mean(values)) if runs else float("nan")
     if runs < 2:
-        return Ratio(mean, float("nan"), float("nan"), float("nan"))
+        return Ratio(mean, *_UNKNOWN)
     error = float(np.std(values, ddof=1) / np.sqrt(runs))
-    width = float(t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, runs - 1)) * error
+    width = float(t.ppf(_UPPER, runs - 1)) * error
     p_value = float(2.0 * t.sf(abs(mean - 1.0) / error, runs - 1)) if error > 0.0 else float("nan")
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
 
-def covered(standard: FloatArray) -> tuple[Coverage, ...]:
-    """Coverage of standardised errors (R, d).
-
-    The components of a run are correlated, so that a run counts as one draw.
-    """
-    size = standard.shape[0]
-    fractions = _fractions(standard[:, None])
+def _coverage_at_epoch(standard: FloatArray) -> tuple[Coverage, ...]:
+    """Coverage of standardised errors (R, 1, d); components are correlated: one draw a run."""
+    fractions = _fractions(standard)
     return tuple(
-        _coverage(level, fraction, size)
-        for level, fraction in zip(LEVELS, _means(fractions), strict=True)
+        _binomial(level, float(np.mean(each)) if each.size else float("nan"), each.size)
+        for level, each in zip(LEVELS, fractions, strict=True)
     )
 
 
-def _fractions(standard: FloatArray) -> FloatArray:
-    """Of the standardised errors (R, K, d) of each run in each of `LEVELS`, (R, levels)."""
-    bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
-    return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds], axis=1)
-
-
-def _means(fractions: FloatArray) -> list[float]:
-    return (
-        [float(each) for each in np.mean(fractions, axis=0)]
-        if len(fractions)
-        else [np.nan] * len(LEVELS)
-    )
-
-
-def _covered_by_run(standard: FloatArray) -> tuple[Coverage, ...]:
+def _coverage_over_time(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
-    runs, fractions = len(standard), _fractions(standard)
-    result = []
-    for level, mean, each in zip(LEVELS, _means(fractions), fractions.T, strict=True):
-        draws = float(runs)
+    runs, result = len(standard), []
+    for level, each in zip(LEVELS, _fractions(standard), strict=True):
+        mean, draws = float(np.mean(each)) if runs else float("nan"), float(runs)
         error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
         if error > 0.0:
-            few, many = t.ppf(0.5 + 0.5 * tuning.CONFIDENCE, [max(runs - 1, 1), standard.size - 1])
+            few, many = t.ppf(_UPPER, [max(runs - 1, 1), standard.size - 1])
             draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
-        result.append(_coverage(level, mean, draws))
+        result.append(_binomial(level, mean, draws))
     return tuple(result)
 
 
-def _coverage(level: float, fraction: float, size: float) -> Coverage:
-    """With its binomial interval."""
-    if not size > 0.0:
+def _fractions(standard: FloatArray) -> FloatArray:
+    """Fraction of standardised errors (R, K, d) of each run in each of `LEVELS`, (levels, R)."""
+    bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
+    return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds])
+
+
+def _binomial(level: float, fraction: float, draws: float) -> Coverage:
+    """Coverage with its binomial interval."""
+    if not draws > 0.0:
         return Coverage(level, float("nan"), float("nan"), float("nan"))
-    hits, tail = fraction * size, 0.5 * (1.0 - tuning.CONFIDENCE)
-    lower = float(betaincinv(hits, size - hits + 1.0, tail)) if hits > 0.0 else 0.0
-    upper = float(betaincinv(hits + 1.0, size - hits, 1.0 - tail)) if hits < size else 1.0
+    hits, tail = fraction * draws, 1.0 - _UPPER
+    lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
+    upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if hits < draws else 1.0
     return Coverage(level, fraction, lower, upper)
-
-
-def _ratio(total: float, dof: float) -> Ratio:
-    if not dof > 0.0 or not np.isfinite(total):
-        return Ratio(float("nan"), float("nan"), float("nan"), float("nan"))
-    lower, upper = (
-        chi2.ppf([0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE], dof) / dof
-    )
-    p_value = 2.0 * min(chi2.sf(total, dof), chi2.cdf(total, dof))
-    return Ratio(float(total / dof), float(lower), float(upper), float(min(p_value, 1.0)))
 
 
 def _rms(standard: FloatArray) -> float:
     return float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")
-
-
-def _score(squares: FloatArray, log_det: FloatArray, size: int) -> float:
-    if not squares.size:
-        return float("nan")
-    return float(0.5 * np.mean(squares + log_det + size * np.log(2.0 * np.pi)))

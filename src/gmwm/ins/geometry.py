@@ -1,39 +1,142 @@
-"""Rotations: roll, pitch and yaw, rotation vectors, and 3x3 matrices changed in place."""
+"""The Earth (WGS-84 ellipsoid, rotation, normal gravity) and rotations."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
+RATE = 7.292115e-5
+"""Rotation rate, rad/s."""
+
+SEMI_MAJOR_AXIS = 6_378_137.0
+"""Equatorial radius, m."""
+
+FLATTENING = 1.0 / 298.257223563
+"""Flattening of the ellipsoid."""
+
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+"""Square of the ellipsoid's first eccentricity."""
+
+GRAVITATIONAL_CONSTANT = 3.986004418e14
+"""Of the Earth with its atmosphere, m^3/s^2."""
+
+STANDARD_GRAVITY = 9.80665
+"""m/s^2, the unit g."""
+
+_SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1.0 - FLATTENING)
+_EQUATORIAL_GRAVITY = 9.7803253359  # m/s^2
+_POLAR_GRAVITY = 9.8321849379  # m/s^2
+_SOMIGLIANA = _SEMI_MINOR_AXIS * _POLAR_GRAVITY / (SEMI_MAJOR_AXIS * _EQUATORIAL_GRAVITY) - 1.0
+_CENTRIFUGAL_RATIO = (
+    RATE * RATE * SEMI_MAJOR_AXIS * SEMI_MAJOR_AXIS * _SEMI_MINOR_AXIS / GRAVITATIONAL_CONSTANT
+)
+
+
+@compiled()
+def radii_at(sin_lat: float) -> tuple[float, float]:
+    """Radii of curvature of the meridian and of the prime vertical, from the latitude's sine.
+
+    Returns: meridian, transverse, m, on the ellipsoid. Groves (2013), eqs. 2.105 and 2.106.
+    """
+    shrink = 1.0 - ECCENTRICITY_SQUARED * (sin_lat * sin_lat)
+    transverse = SEMI_MAJOR_AXIS / np.sqrt(shrink)
+    return transverse * (1.0 - ECCENTRICITY_SQUARED) / shrink, transverse
+
+
+@compiled()
+def radii(lat: float) -> tuple[float, float]:
+    """Radii of curvature of the meridian and of the prime vertical, m, at a latitude in rad."""
+    return radii_at(np.sin(lat))
+
+
+@compiled()
+def gravity_at(sin_lat: float, h: float) -> float:
+    """Normal gravity, from the latitude's sine.
+
+    h: Height above the ellipsoid, m.
+    Returns: magnitude, m/s^2, taken to point down: Somigliana's formula (Groves 2013, eq. 2.134),
+        continued to the height by the second-order free-air formula (eq. 2.139).
+    """
+    square = sin_lat * sin_lat
+    at_ellipsoid = (
+        _EQUATORIAL_GRAVITY
+        * (1.0 + _SOMIGLIANA * square)
+        / np.sqrt(1.0 - ECCENTRICITY_SQUARED * square)
+    )
+    x = h / SEMI_MAJOR_AXIS
+    slope = 1.0 + FLATTENING * (1.0 - 2.0 * square) + _CENTRIFUGAL_RATIO
+    return at_ellipsoid * (1.0 - 2.0 * slope * x + 3.0 * x * x)
+
+
+@compiled()
+def gravity(lat: float, h: float) -> float:
+    """Normal gravity, m/s^2, at a latitude in rad and a height in m; see `gravity_at`."""
+    return gravity_at(np.sin(lat), h)
+
+
+def radii_along(lat: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Radii of curvature of the meridian and of the prime vertical, m, at many latitudes, rad."""
+    formula: Any = radii_at.py_func
+    return formula(np.sin(lat))
+
+
+def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
+    """Points minus reference points in metres to the north, east and down.
+
+    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
+    reference: (n, 3) or (3,), the points to be subtracted.
+    Returns: (n, 3) or (3,), m, the shorter way across the date line. Radii of curvature are those
+        half-way, so that the error is of third order in the distance: about 1 mm over 10 km at
+        middle latitudes.
+    """
+    lla, reference = np.asarray(lla, dtype=float), np.asarray(reference, dtype=float)
+    half_way = 0.5 * (lla + reference)
+    difference = lla - reference
+    east = difference[..., 1] - 2.0 * np.pi * np.round(difference[..., 1] / (2.0 * np.pi))
+    meridian, transverse = radii_along(half_way[..., 0])
+    h = half_way[..., 2]
+    return np.stack(
+        [
+            (meridian + h) * difference[..., 0],
+            (transverse + h) * np.cos(half_way[..., 0]) * east,
+            -difference[..., 2],
+        ],
+        axis=-1,
+    )
+
+
+def offset(lla: FloatArray, ned: FloatArray) -> FloatArray:
+    """Points moved by some metres to the north, east and down: `ned_difference` turned round.
+
+    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
+    ned: (n, 3) or (3,), m.
+    Returns: (n, 3) or (3,), latitude, longitude and height; the longitude may pass 180 deg.
+    """
+    lla, ned = np.asarray(lla, dtype=float), np.asarray(ned, dtype=float)
+    h = lla[..., 2] - 0.5 * ned[..., 2]
+    lat = lla[..., 0]
+    # Radii change by less than 1 % of the distance in radians: one correction settles them.
+    for _ in range(3):
+        half_way = 0.5 * (lla[..., 0] + lat)
+        meridian, transverse = radii_along(half_way)
+        lat = lla[..., 0] + ned[..., 0] / (meridian + h)
+    half_way = 0.5 * (lla[..., 0] + lat)
+    lon = lla[..., 1] + ned[..., 1] / ((transverse + h) * np.cos(half_way))
+    return np.stack(np.broadcast_arrays(lat, lon, lla[..., 2] - ned[..., 2]), axis=-1)
+
+
+# -- rotations ------------------------------------------------------------------------------------
+
 _SERIES_BELOW = 0.01  # rad^2: the terms left out of the series are below 1e-17
 
 # Taylor coefficients of sin(a)/a and (1 - cos(a))/a^2 in a^2.
 _S1, _S2, _S3, _S4, _S5 = ((-1.0) ** k / math.factorial(2 * k + 1) for k in (1, 2, 3, 4, 5))
 _C1, _C2, _C3, _C4 = ((-1.0) ** k / math.factorial(2 * k + 2) for k in (1, 2, 3, 4))
-
-
-@compiled()
-def set_from_angles(C: FloatArray, roll: float, pitch: float, yaw: float) -> None:
-    """Fill C_bn from roll, pitch and yaw (turns about z, then y, then x), rad.
-
-    Groves (2013), eq. 2.22, transposed.
-    """
-    sr, cr = math.sin(roll), math.cos(roll)
-    sp, cp = math.sin(pitch), math.cos(pitch)
-    sy, cy = math.sin(yaw), math.cos(yaw)
-    C[0, 0] = cp * cy
-    C[0, 1] = sr * sp * cy - cr * sy
-    C[0, 2] = cr * sp * cy + sr * sy
-    C[1, 0] = cp * sy
-    C[1, 1] = sr * sp * sy + cr * cy
-    C[1, 2] = cr * sp * sy - sr * cy
-    C[2, 0] = -sp
-    C[2, 1] = sr * cp
-    C[2, 2] = cr * cp
 
 
 @compiled()
@@ -128,12 +231,6 @@ def orthonormalise(C: FloatArray) -> None:
 
 
 @compiled()
-def _matrices(rpy: FloatArray, result: FloatArray) -> None:
-    for i in range(rpy.shape[0]):
-        set_from_angles(result[i], rpy[i, 0], rpy[i, 1], rpy[i, 2])
-
-
-@compiled()
 def _all_angles(matrices: FloatArray, result: FloatArray) -> None:
     for i in range(matrices.shape[0]):
         result[i, 0], result[i, 1], result[i, 2] = angles(matrices[i])
@@ -149,15 +246,18 @@ def _exponentials(vectors: FloatArray, result: FloatArray) -> None:
 
 
 def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
-    """Matrices C_bn (v_n = C_bn v_b) of roll, pitch and yaw.
+    """Matrices C_bn (v_n = C_bn v_b), (..., 3, 3), of roll, pitch and yaw, (..., 3), rad.
 
-    rpy: (..., 3), rad.
-    Returns: (..., 3, 3).
+    Turns about z, then y, then x: Groves (2013), eq. 2.22, transposed.
     """
-    flat = np.ascontiguousarray(rpy, dtype=float).reshape(-1, 3)
-    result = np.empty((len(flat), 3, 3))
-    _matrices(flat, result)
-    return result.reshape(*np.shape(rpy), 3)
+    sr, sp, sy = np.moveaxis(np.sin(np.asarray(rpy, dtype=float)), -1, 0)
+    cr, cp, cy = np.moveaxis(np.cos(np.asarray(rpy, dtype=float)), -1, 0)
+    elements = [
+        *(cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy),
+        *(cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy),
+        *(-sp, sr * cp, cr * cp),
+    ]
+    return np.stack(elements, axis=-1).reshape(*np.shape(rpy), 3)
 
 
 def rpy_from_matrix(matrices: FloatArray) -> FloatArray:

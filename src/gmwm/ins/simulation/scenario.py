@@ -21,7 +21,7 @@ class ErrorSource(Protocol):
 
     @property
     def available(self) -> int | None:
-        """Independent runs that there are; ``None`` for any number."""
+        """Number of independent runs; ``None`` for any number."""
 
     def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Errors of one run."""
@@ -65,7 +65,7 @@ class Scenario:
     interval : float
         At which errors are kept, s; zero for some 300 epochs.
     second_order : bool
-        Whether filters allow for the square of the tilt error; see `gmwm.ins.filter.filter.Filter`.
+        Whether filters allow for the square of the tilt error; see `gmwm.ins.filter.Filter`.
     """
 
     trajectory: Trajectory
@@ -98,9 +98,8 @@ class Scenario:
         return self.interval or float(max(np.ceil(least), self.trajectory.dt))
 
     def outputs(self) -> Outputs:
-        """Epochs that are kept.
-
-        Evenly spaced, every second of an outage, and its end before the first fix.
+        """Epochs that are kept: evenly spaced, every second of an outage, and its end before the
+        first fix.
         """
         dt, n = self.trajectory.dt, self.trajectory.n
         within = [np.arange(o.start, o.end, max(tuning.OUTAGE_EPOCHS, dt)) for o in self.outages]

@@ -6,21 +6,21 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier, do_runs
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
-from gmwm.ins.montecarlo.filter_errors import PER_RUN, FilterErrors, judged
-from gmwm.ins.montecarlo.scenario import ErrorSource, Scenario, Simulated
+from gmwm.ins.simulation.filter_errors import PER_RUN, FilterErrors, errors_of_run
+from gmwm.ins.simulation.scenario import ErrorSource, Scenario, Simulated
 from gmwm.ins.trajectory import NavState, Trajectory
+from gmwm.issues import Notice, notice
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +50,35 @@ class MonteCarlo:
         return self.filters[name]
 
 
+class Work(TypedDict, total=False):
+    """How runs are done, and where they are kept.
+
+    jobs : int
+        Processes; -1 for one a core.
+    cluster : str
+        Address of a Dask scheduler that does the work instead.
+    folder : Path
+        Where finished runs are kept every few seconds, also when the work is interrupted.
+    earlier : {"resume", "replace", "refuse"}
+        What to do with runs that the folder holds already.
+    progress : callable
+        Called as ``progress(done, runs, "")``.
+    """
+
+    jobs: int
+    cluster: str | None
+    folder: Path | None
+    earlier: Earlier
+    progress: Progress | None
+
+
 def monte_carlo(
     scenario: Scenario,
     source: ErrorSource,
     filters: Mapping[str, SensorModels],
     runs: int = 100,
     seed: int = 0,
-    *,
-    jobs: int = 1,
-    cluster: str | None = None,
-    folder: Path | None = None,
-    earlier: Earlier = "resume",
-    progress: Progress | None = None,
+    **work: Unpack[Work],
 ) -> MonteCarlo:
     """Run filters with different sensor models on the same simulated flights.
 
@@ -72,20 +89,12 @@ def monte_carlo(
     ----------
     scenario : Scenario
     source : ErrorSource
-        `Simulated`, or `gmwm.ins.imu.recorded.Recorded`, whose independent stretches are limited.
+        `Simulated`, or `gmwm.ins.Recorded`, whose independent stretches are limited.
     filters : mapping of str to SensorModels
-        Name -> what a filter believes.
+        Name -> models of a filter.
     runs, seed : int, optional
-    jobs : int, optional
-        Processes; -1 for one a core.
-    cluster : str, optional
-        Address of a Dask scheduler that does the work instead.
-    folder : Path, optional
-        Where finished runs are kept every few seconds, also when the work is interrupted.
-    earlier : {"resume", "replace", "refuse"}, optional
-        What to do with runs that the folder holds already.
-    progress : callable, optional
-        Called as ``progress(done, runs, "")``.
+    **work
+        jobs, cluster, folder, earlier, progress: see `gmwm.ins.simulation.trials.Work`.
 
     Raises
     ------
@@ -95,33 +104,19 @@ def monte_carlo(
     if not filters:
         raise InputError("there is no filter: give one at least")
     runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
-    imu = emulate(scenario.trajectory)
     notices: tuple[Notice, ...] = ()
     if source.available is not None and source.available < runs:
-        text = (
-            f"{source.available} runs in place of {runs}: the recording has no more stretches "
-            "of this length that do not overlap"
-        )
-        values = {"runs": source.available, "asked": runs}
-        notices = (Notice("fewer-runs", "warning", "", text, values),)
+        notices = (notice("fewer-runs", "", {"runs": source.available, "asked": runs}),)
         runs = source.available
-    task = _Task(scenario, source, dict(filters), imu, seed)
-    found = do_runs(
-        task, runs, task.study(), folder=folder, earlier=earlier, jobs=jobs, cluster=cluster,
-        progress=progress,
-    )  # fmt: skip
+    task = _Task(scenario, source, dict(filters), emulate(scenario.trajectory), seed)
+    found = do_runs(task, runs, task.study(), **work)
     outputs = scenario.outputs()
-    time, before = outputs.time(imu.dt), outputs.before == 1
-    return MonteCarlo(
-        filters={
-            name: FilterErrors(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
-            for name in filters
-        },
-        outages=scenario.outages,
-        example=task.example(),
-        truth=scenario.trajectory,
-        notices=notices,
-    )
+    time, before = outputs.time(scenario.trajectory.dt), outputs.before == 1
+    errors = {
+        name: FilterErrors(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
+        for name in filters
+    }
+    return MonteCarlo(errors, scenario.outages, task.example(), scenario.trajectory, notices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +131,12 @@ class _Task:
 
     def __call__(self, run: int) -> dict[str, FloatArray]:
         """What is kept of a run, by filter and name."""
-        outputs = self.scenario.outputs()
+        outputs, truth = self.scenario.outputs(), self.scenario.trajectory
         found, errors = self.solutions(run, outputs)
         return {
             f"{name}/{key}": values
             for name, solution in found.items()
-            for key, values in judged(solution, self.scenario.trajectory, errors, outputs).items()
+            for key, values in errors_of_run(solution, truth, errors, outputs).items()
         }
 
     def solutions(self, run: int, outputs: Outputs) -> tuple[dict[str, Solution], SensorErrors]:
@@ -169,20 +164,19 @@ class _Task:
         """Everything that the runs depend on."""
         scenario, source, aiding = self.scenario, self.source, self.scenario.aiding
         truth = scenario.trajectory
-        fixes = [(each.kind, each.time, each.value, each.sd) for each in aiding.fixes]
-        arms = (aiding.lever_arm, aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd,
-                aiding.barometer_tau, aiding.gate)  # fmt: skip
+        fixes = [part for f in aiding.fixes for part in (f.kind, f.time, f.value, f.sd)]
+        slow = (aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd, aiding.barometer_tau)
         drawn = _exactly(source.models) if isinstance(source, Simulated) else source
+        start = (scenario.initial_sd, scenario.step, scenario.second_order, scenario.interval)
         return {
             "seed": self.seed,
             "filters": {name: _digest(_exactly(each)) for name, each in self.filters.items()},
             "sensor errors": _digest(drawn),
             "trajectory": _digest(truth.dt, truth.lla, truth.velocity, truth.rpy),
-            "fixes": _digest(*arms, *(part for each in fixes for part in each)),
+            "fixes": _digest(aiding.lever_arm, *slow, aiding.gate, *fixes),
             "outages": _digest(scenario.outages),
-            "settings": _digest(scenario.initial_sd, scenario.step, scenario.second_order,
-                                scenario.interval),
-        }  # fmt: skip
+            "settings": _digest(*start),
+        }
 
 
 def disturbed(state: NavState, sd: InitialSd, rng: np.random.Generator) -> NavState:
@@ -197,7 +191,7 @@ def disturbed(state: NavState, sd: InitialSd, rng: np.random.Generator) -> NavSt
 
 
 def _digest(*parts: Any) -> str:
-    """Of arrays and of what has all its digits in its text."""
+    """Digest of arrays and of objects whose text has all digits."""
     digest = hashlib.sha256()
     for part in parts:
         array = isinstance(part, np.ndarray)

@@ -13,7 +13,7 @@ from scipy.stats import binom, chi2, multivariate_normal, norm, t as stats_t
 from statsmodels.stats.proportion import proportion_confint
 
 from gmwm.errors import InputError
-from gmwm.ins.montecarlo.consistency import (
+from gmwm.ins.simulation.consistency import (
     LEVELS,
     Consistency,
     at_epoch,
@@ -23,7 +23,7 @@ from gmwm.ins.montecarlo.consistency import (
     mean_ratio,
     over_time,
 )
-from gmwm.ins.montecarlo.filter_errors import GROUPS, FilterErrors
+from gmwm.ins.simulation.filter_errors import GROUPS, FilterErrors
 from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}

@@ -1,4 +1,4 @@
-"""Errors of a filter over many runs: what is kept of each, and how it is judged."""
+"""Errors of a filter over many runs: what is kept of each run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.filter import Outputs, Solution
 from gmwm.ins.imu import SensorErrors
@@ -21,12 +21,8 @@ GROUPS = {
     "horizontal": slice(0, 2),
     "vertical": slice(2, 3),
 }
-"""Navigation errors that are judged together, and the position by its two parts: what is right of
-both apart can be wrong of them together, where the filter misjudges how they go together."""
-
-PER_RUN = ("error", "sd", "nees", "log_det", "sensor_error", "sensor_sd", "sensor_nees", "nis",
-            "whiteness")  # fmt: skip
-"""Arrays of `FilterErrors` whose first axis is the run."""
+"""Navigation errors that are judged together, and the two parts of the position: both can be right
+where their correlation is wrong."""
 
 _SAME_TIME = 1e-6  # s
 
@@ -61,7 +57,7 @@ class FilterErrors:
     """
 
     time: FloatArray
-    before: np.typing.NDArray[np.bool_]
+    before: BoolArray
     error: FloatArray
     sd: FloatArray
     nees: FloatArray
@@ -96,28 +92,29 @@ class FilterErrors:
         return int(found[0])
 
 
-def judged(
+PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("time", "before"))
+"""Arrays of `FilterErrors` whose first axis is the run."""
+
+
+def errors_of_run(
     solution: Solution, truth: Trajectory, errors: SensorErrors, outputs: Outputs
 ) -> dict[str, FloatArray]:
     """What is kept of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
 
     outputs: The K epochs that were asked for.
     """
-    done, total = solution.time.size, outputs.epoch.size
+    done = solution.time.size
     error = solution.errors(truth)
     nees, log_det = np.empty((2, done, len(GROUPS)))
     for i, part in enumerate(GROUPS.values()):
         nees[:, i], log_det[:, i] = _normalised(error[:, part], solution.covariance[:, part, part])
-    sensor_error = np.full((done, 6), np.nan)
-    sensor_nees = np.full(done, np.nan)
+    sensor_error, sensor_nees = np.full((done, 6), np.nan), np.full(done, np.nan)
     if errors.slow is not None:
         # The states of an epoch are those of the sample that follows it; the last one has none.
         at = outputs.epoch[:done]
         known = at < len(errors.slow)
         sensor_error[known] = solution.sensor_errors[known] - errors.slow[at[known]]
         sensor_nees = _normalised(sensor_error, solution.sensor_covariance)[0]
-    standard = solution.innovations.standard
-    seen = standard[np.isfinite(standard)]
     result = {
         "error": error,
         "sd": solution.sd,
@@ -128,11 +125,11 @@ def judged(
         "sensor_nees": sensor_nees,
     }
     for key, values in result.items():
-        full = np.full((total, *values.shape[1:]), np.nan)
-        full[:done] = values
-        result[key] = full
+        result[key] = np.full((outputs.epoch.size, *values.shape[1:]), np.nan)
+        result[key][:done] = values
+    standard, kinds = solution.innovations.standard, solution.innovations.kind
+    seen = standard[np.isfinite(standard)]
     result["nis"] = np.array([np.sum(seen**2), float(seen.size)])
-    kinds = solution.innovations.kind
     result["whiteness"] = np.array(lag_one([standard[kinds == each] for each in np.unique(kinds)]))
     return result
 

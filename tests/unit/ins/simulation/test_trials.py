@@ -14,9 +14,9 @@ from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.filter.solution import Solution
 from gmwm.ins.imu.recorded import Recorded
 from gmwm.ins.imu.sensors import AXES, SensorErrors, SensorModels
-from gmwm.ins.montecarlo.filter_errors import GROUPS, PER_RUN, FilterErrors
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import disturbed, monte_carlo
+from gmwm.ins.simulation.filter_errors import GROUPS, PER_RUN, FilterErrors
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import disturbed, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 from gmwm.ins.trajectory.trajectory import NavState
 from gmwm.readers.recording import Recording
@@ -226,7 +226,7 @@ def error_of(estimate, truth):
         velocity=np.tile(truth.velocity, (2, 1)),
         rpy=np.tile(truth.rpy, (2, 1)),
     )
-    from gmwm.ins.geometry.rotation import matrix_from_rpy
+    from gmwm.ins.geometry import matrix_from_rpy
 
     solution = Solution(
         time=np.zeros(1), before=np.zeros(1, dtype=bool), lla=estimate.lla[None],

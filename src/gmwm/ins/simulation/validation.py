@@ -5,19 +5,19 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.pages import make
-from gmwm._core.runs import Earlier
+from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets, wrapped
-from gmwm._core.typing import FloatArray, Progress
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
+from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.montecarlo.consistency import (
+from gmwm.ins.simulation.consistency import (
     LEVELS,
     Consistency,
     InnovationTest,
@@ -25,8 +25,8 @@ from gmwm.ins.montecarlo.consistency import (
     innovation_test,
     over_time,
 )
-from gmwm.ins.montecarlo.filter_errors import FilterErrors
-from gmwm.ins.montecarlo.outage_errors import (
+from gmwm.ins.simulation.filter_errors import FilterErrors
+from gmwm.ins.simulation.outage_errors import (
     QUANTITIES,
     Difference,
     Spread,
@@ -34,8 +34,9 @@ from gmwm.ins.montecarlo.outage_errors import (
     pooled_sizes,
     spread,
 )
-from gmwm.ins.montecarlo.scenario import Experiment
-from gmwm.ins.montecarlo.trials import MonteCarlo, monte_carlo
+from gmwm.ins.simulation.scenario import Experiment
+from gmwm.ins.simulation.trials import MonteCarlo, Work, monte_carlo
+from gmwm.issues import Notice, notice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 _MARGIN = 30.0  # s shown before and after an outage
 _GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensors")
 _SHORT = {"horizontal": "hor.", "vertical": "vert."}
-_COVERED = ("horizontal", "vertical")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,34 +60,24 @@ class Validation:
     study: MonteCarlo
 
     @classmethod
-    def of(
-        cls,
-        experiment: Experiment,
-        *,
-        jobs: int = 1,
-        cluster: str | None = None,
-        folder: Path | None = None,
-        earlier: Earlier = "resume",
-        progress: Progress | None = None,
-    ) -> Validation:
-        """Do the runs of an experiment; see `gmwm.ins.montecarlo.trials.monte_carlo`."""
-        study = monte_carlo(
-            experiment.scenario, experiment.source, experiment.filters, experiment.runs,
-            experiment.seed, jobs=jobs, cluster=cluster, folder=folder, earlier=earlier,
-            progress=progress,
-        )  # fmt: skip
-        return cls(experiment, study)
+    def of(cls, experiment: Experiment, **work: Unpack[Work]) -> Validation:
+        """Do the runs of an experiment; see `gmwm.ins.monte_carlo`."""
+        filters, runs, seed = experiment.filters, experiment.runs, experiment.seed
+        return cls(
+            experiment,
+            monte_carlo(experiment.scenario, experiment.source, filters, runs, seed, **work),
+        )
 
     # -- numbers ----------------------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the filters; the others are compared with the first."""
+        """Names of the filters; the others are compared with the first."""
         return tuple(self.study.filters)
 
     @property
     def reached(self) -> tuple[str, ...]:
-        """Filters of which at least one run reached the end of each outage."""
+        """Filters that reached the end of each outage in at least one run."""
         found = []
         for name in self.names:
             runs = self.study[name]
@@ -104,15 +94,11 @@ class Validation:
             for name, own in self.experiment.filters.items()
             for each in own.notices
         )
-        found = {name: self.study[name] for name in self.names if self.study[name].diverged}
         diverged = (
-            Notice(
-                "diverged", "bad", name,
-                f"diverged in {runs.diverged} of {runs.runs} runs; figures are of the others",
-                {"diverged": runs.diverged, "runs": runs.runs},
-            )
-            for name, runs in found.items()
-        )  # fmt: skip
+            notice("diverged", name, {"diverged": runs.diverged, "runs": runs.runs}, variant="runs")
+            for name, runs in self.study.filters.items()
+            if runs.diverged
+        )
         return (*models, *self.study.notices, *diverged)
 
     def spreads(self, name: str) -> list[dict[str, Spread]]:
@@ -143,54 +129,51 @@ class Validation:
     # -- words ------------------------------------------------------------------------------------
 
     def __str__(self) -> str:
-        width = max(len("filter"), *(len(name) for name in self.names))
-        blocks = [self._head()]
+        truth, runs = self.study.truth, self.study[self.names[0]].runs
+        head = (
+            f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
+            f"{'run' if runs == 1 else 'runs'}, seed {self.experiment.seed}"
+        )
+        blocks = ["\n".join([*wrapped(head, indent=2), *bullets(self.notices)])]
         for i, outage in enumerate(self.study.outages):
             blocks.append(
-                [
-                    f"Errors after {outage.duration:g} s without GNSS, at {outage.end:g} s, before "
-                    "the first fix",
-                    *self._error_rows(i, width),
-                ]
+                f"Errors after {outage.duration:g} s without GNSS, at {outage.end:g} s, before the "
+                f"first fix\n{self._errors(i)}"
             )
-        blocks.append(["NEES per degree of freedom: 1 if the filter is consistent, * out of "
-                       "band", *self._nees_rows(width)])  # fmt: skip
+        blocks.append(
+            "NEES per degree of freedom: 1 if the filter is consistent, * out of band\n"
+            + plain_table(
+                ["filter", "", *(_SHORT.get(group, group) for group in _GROUPS)],
+                [
+                    [name, label, *(_starred(found, group) for group in _GROUPS)]
+                    for name in self.names
+                    for label, found in self._judgements(name)
+                ],
+            )
+        )
         if self.study.outages:
-            blocks.append(["Position errors within predicted intervals, %, horizontal and vertical",
-                           *self._coverage_rows(width)])  # fmt: skip
-        blocks.append(["Innovations: NIS per degree of freedom, p-value of whiteness",
-                       *self._innovation_rows(width)])  # fmt: skip
+            for group in ("horizontal", "vertical"):
+                blocks.append(
+                    f"{group.capitalize()} errors within predicted intervals, %\n"
+                    + plain_table(
+                        ["filter", "", *(f"{100.0 * level:g} %" for level in LEVELS)],
+                        [
+                            [name, label, *map(_percent, found.coverage[group])]
+                            for name in self.names
+                            for label, found in self._judgements(name)
+                        ],
+                    )
+                )
+        rows = [[name, str(self.innovations(name)).strip()] for name in self.names]
+        blocks.append(
+            "Innovations: NIS per degree of freedom, p-value of whiteness\n"
+            + plain_table(["filter", ""], rows)
+        )
         if self.study.outages and len(self.names) > 1:
             blocks.append(
-                [
-                    f"Horizontal error against {self.names[0]}, over all outages",
-                    *self._difference_rows(width),
-                ]
+                f"Horizontal error against {self.names[0]}, over all outages\n{self._differences()}"
             )
-        return "\n\n".join("\n".join(block) for block in blocks)
-
-    def _head(self) -> list[str]:
-        truth, runs = self.study.truth, self.study[self.names[0]].runs
-        word = "run" if runs == 1 else "runs"
-        first = (
-            f"{self.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, {runs} "
-            f"{word}, seed {self.experiment.seed}"
-        )
-        return [*wrapped(first, indent=2), *bullets(self.notices)]
-
-    def _error_rows(self, outage: int, width: int) -> list[str]:
-        rows = [f"{'':{width}} {'':16} {'mean':>9} {'RMS':>9} {'median':>9} {'95 %':>9} "
-                f"{'predicted':>10}"]  # fmt: skip
-        found = {name: self.spreads(name)[outage] for name in self.reached}
-        for quantity, unit in QUANTITIES.items():
-            for i, name in enumerate(found):
-                s = found[name][quantity]
-                label = f"{quantity} [{unit}]" if i == 0 else ""
-                rows.append(
-                    f"{name:{width}} {label:16} {s.mean:>9.4g} {s.rms:>9.4g} {s.median:>9.4g} "
-                    f"{s.p95:>9.4g} {s.predicted:>10.4g}"
-                )
-        return rows
+        return "\n\n".join(blocks)
 
     def _judgements(self, name: str) -> list[tuple[str, Consistency]]:
         """Consistency of a filter with GNSS and at the ends of the outages."""
@@ -200,56 +183,36 @@ class Validation:
             *((f"at {outage.end:g} s", each) for outage, each in ends),
         ]
 
-    def _nees_rows(self, width: int) -> list[str]:
-        heads = [_SHORT.get(group, group) for group in _GROUPS]
-        rows = [f"{'filter':{width}} {'':10}" + "".join(f"{head:>9}" for head in heads)]
-        for name in self.names:
-            for label, consistency in self._judgements(name):
-                cells = [_starred(consistency, group) for group in _GROUPS]
-                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>9}" for c in cells))
-        return rows
+    def _errors(self, outage: int) -> str:
+        """Table of the errors at the end of an outage."""
+        found = {name: self.spreads(name)[outage] for name in self.reached}
+        rows = []
+        for quantity, unit in QUANTITIES.items():
+            for i, (name, spreads) in enumerate(found.items()):
+                s = spreads[quantity]
+                values = (s.mean, s.rms, s.median, s.p95, s.predicted)
+                label = f"{quantity} [{unit}]" if i == 0 else ""
+                rows.append([name, label, *(f"{value:.4g}" for value in values)])
+        return plain_table(["filter", "", "mean", "RMS", "median", "95 %", "predicted"], rows)
 
-    def _coverage_rows(self, width: int) -> list[str]:
-        heads = [f"{100.0 * level:g} % " for level in LEVELS] * len(_COVERED)
-        parts = "".join(f"{part:>{7 * len(LEVELS)}}" for part in _COVERED)
-        rows = [
-            f"{'':{width}} {'':10}{parts}",
-            f"{'filter':{width}} {'':10}" + "".join(f"{head:>7}" for head in heads),
-        ]
-        for name in self.names:
-            for label, found in self._judgements(name):
-                cells = [
-                    "- "
-                    if np.isnan(c.fraction)
-                    else f"{100.0 * c.fraction:.1f}" + " *"[not c.within]
-                    for part in _COVERED
-                    for c in found.coverage[part]
-                ]
-                rows.append(f"{name:{width}} {label:10}" + "".join(f"{c:>7}" for c in cells))
-        return rows
-
-    def _innovation_rows(self, width: int) -> list[str]:
-        return [f"{name:{width}} {self.innovations(name)}" for name in self.names]
-
-    def _difference_rows(self, width: int) -> list[str]:
-        rows = [f"{'':{width}} {'ratio of RMS':<26}  difference of means [m], = if none"]
+    def _differences(self) -> str:
+        """Table of the horizontal errors against the first filter."""
+        rows = []
         for name in self.names[1:]:
             if not {name, self.names[0]} <= set(self.reached):
-                rows.append(f"{name:{width}} -")
+                rows.append([name, "-", "-"])
                 continue
             d = self.against_first(name, "horizontal")
             ratio = f"{d.ratio:.3g} ({d.ratio_lower:.3g} .. {d.ratio_upper:.3g})"
             mark = "" if d.significant else " ="
-            rows.append(
-                f"{name:{width}} {ratio:<26}  "
-                f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
-            )
-        return rows
+            means = f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
+            rows.append([name, ratio, means])
+        return plain_table(["filter", "ratio of RMS", "difference of means [m], = if none"], rows)
 
     # -- figures ----------------------------------------------------------------------------------
 
     def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page; see `gmwm.report.write_validation_report`."""
+        """Write the page."""
         written: Path = make("page", self, path)
         return written
 
@@ -284,8 +247,11 @@ class Validation:
         """
         from gmwm import plotting
 
-        span = self._outage(outage)
-        panels = {}
+        if not 0 <= outage < len(self.study.outages):
+            raise InputError(
+                f"outage = {outage}: the experiment has {len(self.study.outages)} of them"
+            )
+        span, panels = self.study.outages[outage], {}
         for name in self.names:
             solution = self.study.example[name]
             shown = (solution.time >= span.start - _MARGIN) & (solution.time <= span.end + _MARGIN)
@@ -302,33 +268,23 @@ class Validation:
         panels: dict[str, Any] = {}
         for outage in self.study.outages:
             label = f"outage of {outage.duration:g} s at {outage.start:g} s"
-            panels[label] = {
-                name: _growth(self.study[name], outage.start, outage.end) for name in self.reached
-            }
+            panels[label] = {name: _growth(self.study[name], outage) for name in self.reached}
         if not panels:
             raise InputError("the experiment has no outage: there is nothing to draw")
         return plotting.growth(panels)
 
-    def _outage(self, index: int) -> Any:
-        if not 0 <= index < len(self.study.outages):
-            raise InputError(
-                f"outage = {index}: the experiment has {len(self.study.outages)} of them"
-            )
-        return self.study.outages[index]
 
-
-def _growth(
-    runs: FilterErrors, start: float, end: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _growth(runs: FilterErrors, outage: Outage) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times since the start, and horizontal and vertical RMS, true and predicted."""
-    shown = (runs.time >= start) & (runs.time <= end) & (runs.before | (runs.time < end))
+    shown = (runs.time >= outage.start) & (runs.time <= outage.end)
+    shown &= runs.before | (runs.time < outage.end)
     alive = np.all(np.isfinite(runs.error[:, shown, 0]), axis=1)
 
     def rms(values: FloatArray) -> FloatArray:
         squares = np.mean(values[alive][:, shown, :3] ** 2, axis=0)
         return np.sqrt(np.stack([squares[:, 0] + squares[:, 1], squares[:, 2]], axis=1))
 
-    return runs.time[shown] - start, rms(runs.error), rms(runs.sd)
+    return runs.time[shown] - outage.start, rms(runs.error), rms(runs.sd)
 
 
 def _starred(consistency: Consistency, group: str) -> str:
@@ -338,3 +294,9 @@ def _starred(consistency: Consistency, group: str) -> str:
         return "- "
     out = not np.isnan(ratio.lower) and not ratio.within
     return f"{ratio.value:.3g}" + " *"[out]
+
+
+def _percent(coverage: Any) -> str:
+    if np.isnan(coverage.fraction):
+        return "- "
+    return f"{100.0 * coverage.fraction:.1f}" + " *"[not coverage.within]

@@ -11,8 +11,8 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo.filter_errors import FilterErrors
-from gmwm.ins.montecarlo.trials import MonteCarlo
+from gmwm.ins.simulation.filter_errors import FilterErrors
+from gmwm.ins.simulation.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
 """What is judged, with its unit."""
@@ -55,8 +55,27 @@ class Difference:
 
 def sizes(runs: FilterErrors, time: float) -> dict[str, FloatArray]:
     """Size of each error of `QUANTITIES` in every run, (R,), before the fixes of an epoch."""
-    error = runs.error[:, runs.index(time)]
-    return _grouped(error)
+    return _sizes(runs.error[:, runs.index(time)])
+
+
+def _sizes(error: FloatArray) -> dict[str, FloatArray]:
+    return {
+        "horizontal": np.hypot(error[:, 0], error[:, 1]),
+        "vertical": np.abs(error[:, 2]),
+        "velocity": np.linalg.norm(error[:, 3:6], axis=1),
+        "attitude": np.degrees(np.linalg.norm(error[:, 6:], axis=1)),
+    }
+
+
+def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
+    """Root mean square over the outages of a run, of each error of `QUANTITIES`, (R,)."""
+    if not study.outages:
+        raise InputError("the study has no outage: give one at least")
+    each = [sizes(study[name], outage.end) for outage in study.outages]
+    return {
+        quantity: np.sqrt(np.mean([part[quantity] ** 2 for part in each], axis=0))
+        for quantity in QUANTITIES
+    }
 
 
 def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
@@ -73,10 +92,9 @@ def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
     InputError
         If the filter diverged in every run.
     """
-    found = sizes(runs, time)
-    predicted = _grouped(runs.sd[:, runs.index(time)])
+    predicted = _sizes(runs.sd[:, runs.index(time)])
     result = {}
-    for name, values in found.items():
+    for name, values in sizes(runs, time).items():
         alive = np.isfinite(values)
         if not np.any(alive):
             raise InputError("the filter diverged in every run: check its sensor models")
@@ -117,38 +135,11 @@ def difference(
     if not np.any(alive):
         raise InputError("one or the other filter diverged in every run: check their sensor models")
     a, b = a[alive], b[alive]
-    rng = np.random.default_rng(seed)
-    index = rng.integers(a.size, size=(tuning.BOOTSTRAP_DRAWS, a.size))
+    index = np.random.default_rng(seed).integers(a.size, size=(tuning.BOOTSTRAP_DRAWS, a.size))
     drawn = np.mean(a[index] - b[index], axis=1)
     ratios = np.sqrt(np.mean(a[index] ** 2, axis=1) / np.mean(b[index] ** 2, axis=1))
     ends = [0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE]
-    low, high = np.quantile(drawn, ends)
-    ratio_low, ratio_high = np.quantile(ratios, ends)
-    return Difference(
-        value=float(np.mean(a - b)),
-        lower=float(low),
-        upper=float(high),
-        ratio=float(np.sqrt(np.mean(a**2) / np.mean(b**2))),
-        ratio_lower=float(ratio_low),
-        ratio_upper=float(ratio_high),
-    )
-
-
-def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
-    """Root mean square over the outages of a run, of each error of `QUANTITIES`, (R,)."""
-    if not study.outages:
-        raise InputError("the study has no outage: give one at least")
-    each = [sizes(study[name], outage.end) for outage in study.outages]
-    return {
-        quantity: np.sqrt(np.mean([part[quantity] ** 2 for part in each], axis=0))
-        for quantity in QUANTITIES
-    }
-
-
-def _grouped(error: FloatArray) -> dict[str, FloatArray]:
-    return {
-        "horizontal": np.hypot(error[:, 0], error[:, 1]),
-        "vertical": np.abs(error[:, 2]),
-        "velocity": np.linalg.norm(error[:, 3:6], axis=1),
-        "attitude": np.degrees(np.linalg.norm(error[:, 6:], axis=1)),
-    }
+    ratio = float(np.sqrt(np.mean(a**2) / np.mean(b**2)))
+    lower, upper = map(float, np.quantile(drawn, ends))
+    ratio_lower, ratio_upper = map(float, np.quantile(ratios, ends))
+    return Difference(float(np.mean(a - b)), lower, upper, ratio, ratio_lower, ratio_upper)
