@@ -1,7 +1,7 @@
 """What the data say: wavelet variances, their covariance, the Allan family."""
 
-from gmwm.variance.covariance.haar import haar_covariance as haar_covariance
 from gmwm.variance.allan_family import Deviations as Deviations, deviations as deviations
+from gmwm.variance.covariance.haar import haar_covariance as haar_covariance
 from gmwm.variance.gaps import Runs as Runs
 from gmwm.variance.modwt import Modwt as Modwt, imodwt as imodwt, modwt as modwt
 from gmwm.variance.pilot import pilot_psd as pilot_psd
