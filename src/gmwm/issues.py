@@ -269,7 +269,8 @@ _READERS = (
 )  # fmt: skip
 
 _VARIANCE = (
-    Issue("curve-shortened", "{text}", severity="warning", topic="samples"),
+    Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
+          "complete record at {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (

@@ -17,7 +17,9 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.estimate import estimate
-from gmwm.variance.gaps.effects import (
+from gmwm.variance.filling import Filling
+from gmwm.variance.gap_kernels import pairs_at_lag
+from gmwm.variance.gaps import (
     Gaps,
     Runs,
     common_share,
@@ -25,8 +27,7 @@ from gmwm.variance.gaps.effects import (
     window_centres,
     window_count,
 )
-from gmwm.variance.gaps.filling import Filling
-from gmwm.variance.gaps.kernels import pairs_at_lag
+from gmwm.variance.kernels import cumulative
 from marks import slow
 
 
@@ -177,7 +178,7 @@ def test_change_is_that_of_the_quadratic_form(process, pattern):
     operators = np.zeros((averaging.size, n, n))
     for i in np.flatnonzero(~np.isnan(x)):  # the others are not looked at
         unit = np.where(np.isnan(x), np.nan, np.arange(n) == i)
-        for levels, values, _ in filling.series(unit, averaging, 0.0):
+        for levels, values, _ in filling.series(unit, cumulative(unit, 0.0), averaging, 0.0):
             operators[levels, :, i] = np.nan_to_num(values)
     covariance = covariance_of(process, n)
     change, error = filling.change(averaging)

@@ -1,6 +1,5 @@
 """Wavelet variance of streams against that of the whole series."""
 
-import itertools
 import pickle
 
 import numpy as np
@@ -10,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.variance.streaming import window_kernels
+from gmwm.variance import stream_kernels
 
 FINE = 10
 """Levels of 1 to 512 samples, all windows of which are seen."""
@@ -34,11 +33,6 @@ def streamed(x, cuts=(), **options):
     for block in np.split(x, sorted(cuts)):
         stream.update(block)
     return stream
-
-
-def merged(x, cuts):
-    edges = [0, *sorted(cuts), x.size]
-    return [streamed(x[a:b], start=a) for a, b in itertools.pairwise(edges) if b > a]
 
 
 def everything(wv):
@@ -97,74 +91,6 @@ def test_the_few_windows_of_a_record_little_longer_than_them_all_count(n, walk):
         whole = gmwm.wavelet_variance(x, dt=0.1)
         found = streamed(x, [n // 3, n - 7])
         assert_close_to_all_windows(found.result(), whole, truth.psd)
-        parts = merged(x, sorted([1 << (n.bit_length() - 2), n // 5, n - 3]))
-        joined = parts[0]
-        for part in parts[1:]:
-            joined = joined.merge(part)
-        assert_same(joined.result(), found.result(), rtol=1e-9)
-
-
-@settings(max_examples=15, deadline=None)
-@given(
-    st.integers(8, 20_000),
-    st.integers(0, 2**31),
-    st.lists(st.integers(0, 20_000), max_size=4),
-    st.integers(0, 12),
-    st.booleans(),
-)
-def test_parts_merge_to_the_whole_in_any_order(n, seed, cuts, gaps, flood):
-    rng = np.random.default_rng(seed)
-    x = with_gaps(noise(n, seed, 1e3), rng, gaps, n // 4 if flood else 40)
-    x[: min(8, n)] = noise(min(8, n), seed, 1e3)  # enough to be a series
-    whole = streamed(x)
-    parts = merged(x, [min(cut, n) for cut in cuts])
-    left = parts[0]
-    for part in parts[1:]:
-        left = left.merge(part)
-    right = parts[-1]
-    for part in parts[-2::-1]:
-        right = part.merge(right)
-    for found in (left, right):
-        assert found.n == n
-        np.testing.assert_array_equal(found._series[0].gaps, whole._series[0].gaps)
-        assert_same(found.result(), whole.result(), rtol=1e-7)
-
-
-def test_a_gap_over_a_cut_is_one():
-    x = noise(300, 1)
-    x[190:215] = np.nan
-    first, second, third = merged(x, [100, 200])
-    found = first.merge(second).merge(third)
-    np.testing.assert_array_equal(found._series[0].gaps, streamed(x)._series[0].gaps)
-
-
-@pytest.mark.parametrize("cuts", [(40, 100, 150, 200), (20, 40, 120, 150, 160, 280), (40, 300)])
-def test_parts_of_which_nothing_is_there_merge(cuts):
-    x = noise(350, 1)
-    for start, stop in ((0, 40), (100, 150), (200, 201), (300, 350)):
-        x[start:stop] = np.nan
-    first, *others = merged(x, cuts)
-    for part in others:
-        first = first.merge(part)
-    found, whole = first._series[0], streamed(x)._series[0]
-    np.testing.assert_array_equal(found.gaps, whole.gaps)
-    np.testing.assert_array_equal(found.tallies[[0, 1, 2, 3]], whole.tallies[[0, 1, 2, 3]])
-
-
-def test_a_merged_part_goes_on():
-    x = noise(40_000, 1)
-    both = streamed(x[:12_345]).merge(streamed(x[12_345:20_001], start=12_345))
-    both.update(x[20_001:])
-    assert_same(both.result(), streamed(x).result(), rtol=1e-9)
-
-
-@pytest.mark.parametrize("start", [1, 2, 4098, 30_003])
-def test_blocks_of_merged_parts_are_those_of_the_whole_wherever_it_begins(start):
-    x, cut = noise(8000, 4), 4000  # of either part all samples are kept, of the whole means of two
-    first, second = (streamed(part, start=start + k) for part, k in ((x[:cut], 0), (x[cut:], cut)))
-    found, whole = first.merge(second).result(), streamed(x, start=start).result()
-    assert found.block == whole.block
-    np.testing.assert_allclose(found.blocks, whole.blocks, rtol=1e-9)
 
 
 def test_single_samples_and_empty_blocks():
@@ -355,19 +281,12 @@ def test_infinite_blocks_change_nothing():
         (lambda: gmwm.StreamingVariance(0.1, ("a", "a")), "name of its own"),
         (lambda: gmwm.StreamingVariance(0.1, ()), "one at least"),
         (lambda: gmwm.StreamingVariance(0.1, {"a": "deg/s"}), "rad/s"),
-        (lambda: gmwm.StreamingVariance(0.1, start=-1), "start"),
         (lambda: gmwm.StreamingVariance(0.1).update(np.zeros((3, 2))), "shape"),
         (lambda: gmwm.StreamingVariance(0.1).update(["x"]), "not a number"),
         (lambda: streamed(np.zeros(7)).result(), "8 or more"),
         (lambda: streamed(np.full(100, 3.0)).result(), r"constant \(3\)"),
         (lambda: streamed(np.full(100, np.nan)).result(), "0 samples"),
         (lambda: streamed(np.array([1.0, np.nan, 2.0, np.nan] * 9)).result(), "no two samples"),
-        (lambda: streamed(noise(99, 0)).merge(streamed(noise(99, 0))), "ends at 99"),
-        (
-            lambda: streamed(noise(99, 0)).merge(gmwm.StreamingVariance(0.2, start=99)),
-            "dt is 0.1 and 0.2",
-        ),
-        (lambda: streamed(noise(99, 0)).merge(3), "no streaming variance"),
         (lambda: gmwm.StreamingVariance.load(__file__), "write it with save"),
     ],
 )
@@ -376,10 +295,18 @@ def test_a_sentence_for_what_cannot_be_used(make, message):
         make()
 
 
+def test_gaps_are_counted_by_length_and_those_before_the_first_sample_are_none():
+    x = noise(350, 1)
+    for start, stop in ((0, 40), (100, 150), (200, 201), (203, 204), (300, 350)):
+        x[start:stop] = np.nan
+    gaps = streamed(x, [20, 120, 203, 310])._series[0].sums.gaps
+    assert {int(i): gaps[i].tolist() for i in np.flatnonzero(gaps[:, 0])} == {0: [2, 2], 6: [1, 50]}
+
+
 def test_a_sum_keeps_what_larger_numbers_would_swallow():
     total = np.zeros(2)
     for value in (1.0, 1e100, 1.0, -1e100):
-        window_kernels.add(total, 0, 1, value)
+        stream_kernels.add(total, 0, 1, value)
     assert total.sum() == 2.0
 
 
@@ -395,19 +322,8 @@ def test_memory_that_was_never_written_is_never_used(monkeypatch):
     x = noise(30_000, 3, offset=5.0)
     x[4000:4003] = np.nan
     expected = streamed(x)
-    monkeypatch.setattr("gmwm.variance.streaming.series.np.empty", spoilt)
-    one, two = streamed(x[:9001]), streamed(x[9001:], start=9001)
-    merged = one.merge(two)
-    assert_same(merged.result(), expected.result(), rtol=1e-11)
-    stored = merged._series[0].arrays().values()
-    assert all(np.all(np.isfinite(each)) for each in stored if each.shape[-1] > 4000)
-
-
-def test_parts_of_every_length_are_joined_about_one_reference():
-    """Also where a row of the second holds a single value: it stayed about its own reference."""
-    x = noise(9000, 12, offset=5.0)
-    for size in (*range(1, 12), *range(1023, 1030), *range(2046, 2052), 3071, 3072, 3073, 4097):
-        for first in (2000, 9):
-            part = x[: first + size]
-            one, two = streamed(part[:first]), streamed(part[first:], start=first)
-            assert_same(one.merge(two).result(), streamed(part).result(), rtol=1e-11)
+    monkeypatch.setattr("gmwm.variance.streaming.np.empty", spoilt)
+    stream = streamed(x, [9001])
+    assert_same(stream.result(), expected.result())
+    stored = stream._series[0].arrays()
+    assert all(np.all(np.isfinite(stored[name])) for name in ("data", "present", "blocks"))

@@ -5,14 +5,15 @@ import pytest
 
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.process import haar_gain
-from gmwm.variance.gaps import Runs
-from gmwm.variance.gaps.effects import Gaps, window_centres, window_count
-from gmwm.variance.gaps.filling import _deviation, _gain, _nodes
-from gmwm.variance.gaps.kernels import fill, neighbours
+from gmwm.variance.filling import _deviation, _gain, _nodes
+from gmwm.variance.gap_kernels import fill, neighbours
+from gmwm.variance.gaps import Gaps, Runs, window_centres, window_count
 from gmwm.variance.kernels import cumulative
-from gmwm.variance.streaming.window_kernels import (
+from gmwm.variance.stream_kernels import (
     COUNT,
     FINE,
+    FOURTH,
+    LOST_FOURTH,
     LOST_MEAN,
     LOST_SQUARE,
     MEAN,
@@ -20,8 +21,9 @@ from gmwm.variance.streaming.window_kernels import (
     SQUARE,
     complete_windows,
     gappy_windows,
-    total,
+    sum_of,
 )
+from gmwm.variance.streaming import _Series
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.3])
@@ -87,8 +89,9 @@ def windows_of(values, present, m):
 @pytest.mark.parametrize(("number", "new"), [(70, 0), (70, 40), (9, 3), (3, 0)])
 def test_windows_of_a_complete_row(number, new):
     values = np.random.default_rng(3).normal(size=number)
-    sums, totals = np.zeros((FINE + 3, 6)), np.zeros(7)
-    complete_windows(values, new, 0, sums, totals, np.empty((2, number)))
+    found = _Series().sums
+    complete_windows(values, new, 0, found, np.empty((2, number)))
+    sums = found.levels
     for level in range(FINE):
         m = 2**level
         w = np.array([
@@ -100,21 +103,22 @@ def test_windows_of_a_complete_row(number, new):
         assert found == pytest.approx(np.sum(w), abs=1e-12)
         found = sums[level, SQUARE] + sums[level, LOST_SQUARE]
         assert found == pytest.approx(np.sum(w**2), rel=1e-12)
-    assert total(values) == pytest.approx(np.sum(values))
+    assert sum_of(values) == pytest.approx(np.sum(values))
 
 
 def test_windows_of_single_samples_with_gaps():
     rng = np.random.default_rng(4)
     values, present = rng.normal(5.0, 1.0, 50), (rng.random(50) < 0.7).astype(float)
-    sums, totals = np.zeros((FINE + 3, 6)), np.zeros(7)
-    gappy_windows(values, present, 10, 0, (0, 1), sums, totals, np.empty((2, 51)))
+    found = _Series().sums
+    gappy_windows(values, present, 10, 0, found, np.empty((2, 51)))
+    sums, totals = found.levels, found.totals
     both = (present[1:] > 0.0) & (present[:-1] > 0.0)
     both[:9] = False
     w = 0.5 * np.diff(values)[both]
     assert sums[0, COUNT] == w.size and sums[0, SCARCITY] == 0.0
     assert sums[0, MEAN] + sums[0, LOST_MEAN] == pytest.approx(np.sum(w))
     assert sums[0, SQUARE] + sums[0, LOST_SQUARE] == pytest.approx(np.sum(w**2))
-    assert totals[5] + totals[6] == pytest.approx(np.sum(w**4))
+    assert totals[FOURTH] + totals[LOST_FOURTH] == pytest.approx(np.sum(w**4))
 
 
 def test_lobes_that_are_not_resolved_are_replaced_by_their_mean():
