@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.compiled import compiled
-from gmwm._core.documents import Document
+from gmwm._core.documents import (
+    Array,
+    Document,
+    Interval,
+    Samples,
+    Text,
+    check_covariance,
+)
 from gmwm._core.frozen import freeze
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
@@ -38,13 +46,9 @@ from gmwm.process import (
     Process,
     StateSpace,
     as_model,
-    model_from_list,
 )
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
-
-if TYPE_CHECKING:
-    from gmwm._core.forms import Form
 
 _MOST_WORK = 1e9  # multiplications of the exact recursion, some seconds
 _VAGUE = 1e6  # variance of the unknown constant, in variances of the series
@@ -78,11 +82,11 @@ class CramerRao(Document):
     SCHEMA: ClassVar[str] = "gmwm.cramer-rao"
 
     model: Model
-    n: int
-    dt: float
-    keys: tuple[str, ...]
-    covariance: FloatArray
-    wavelet_covariance: FloatArray
+    n: Samples
+    dt: Annotated[Interval, Field(validation_alias="dt_s", serialization_alias="dt_s")]
+    keys: tuple[Text, ...]
+    covariance: Array
+    wavelet_covariance: Array
     exact: bool
 
     def __post_init__(self) -> None:
@@ -91,40 +95,11 @@ class CramerRao(Document):
     def __repr__(self) -> str:
         return f"<CramerRao of {self.model!r}, n = {self.n:,}, dt = {self.dt:g} s>"
 
-    def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        return {
-            "model": [term.to_dict() for term in self.model.terms],
-            "n": self.n,
-            "dt_s": self.dt,
-            "keys": list(self.keys),
-            "covariance": self.covariance.tolist(),
-            "wavelet_covariance": self.wavelet_covariance.tolist(),
-            "exact": self.exact,
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.form import CramerRaoForm
-
-        return CramerRaoForm
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        keys, model = tuple(content["keys"]), model_from_list(content["model"])
-        if not {*keys} <= {*model.params}:
-            raise InputError(f"its keys are not those of its model {model!r}")
-        shape = (len(keys), len(keys))
-        return cls(
-            model=model,
-            n=content["n"],
-            dt=content["dt_s"],
-            keys=keys,
-            covariance=np.array(content["covariance"], dtype=float).reshape(shape),
-            wavelet_covariance=np.array(content["wavelet_covariance"], dtype=float).reshape(shape),
-            exact=content["exact"],
-        )
+    def check_content(self) -> None:
+        if not {*self.keys} <= {*self.model.params}:
+            raise ValueError(f"keys are not those of the model {self.model!r}")
+        check_covariance(self.covariance.tolist(), len(self.keys))
+        check_covariance(self.wavelet_covariance.tolist(), len(self.keys), "wavelet_covariance")
 
     @property
     def stderr(self) -> dict[str, float]:

@@ -16,13 +16,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import ols_slope, weight_root
 from gmwm.estimate.result import Fit, Region, slope_name
+from gmwm.issues import Notice, notice
 from gmwm.process import (
     BiasInstability,
     Model,
@@ -190,7 +190,11 @@ class AllanLines:
             method=self.name,
             weights="",
             notices=(
-                *(_absence_notice(line) for key, line in lines.items() if key not in runs),
+                *(
+                    notice("no-region", key, {"slope": line.slope}, named=slope_name(line.slope))
+                    for key, line in lines.items()
+                    if key not in runs
+                ),
                 *_slope_notices(wv, [(lines[key], run) for key, run in given.items()]),
                 *_misfit_notices(fitted, wv),
                 *wv.notices,
@@ -360,11 +364,6 @@ def _fitted(model: Model, values: Mapping[str, float]) -> Model:
 # -- notices --------------------------------------------------------------------------------------
 
 
-def _absence_notice(line: _Line) -> Notice:
-    text = f"the Allan plot has no region of slope {slope_name(line.slope)}, so it is not estimated"
-    return Notice("no-region", "bad", line.key, text, {"slope": line.slope})
-
-
 def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> list[Notice]:
     """Regions given by the user whose slope is not that of their line."""
     notices = []
@@ -380,12 +379,10 @@ def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> 
         slope = float(combination @ np.log(wv.allan_deviation[levels]))
         error = float(np.sqrt(combination @ covariance @ combination))
         if abs(slope - line.slope) > max(tuning.WRONG_SLOPE, tuning.LINES_SIGMA * error):
-            text = (
-                f"from {wv.tau[run.first]:.4g} to {wv.tau[run.last]:.4g} s the Allan plot has the "
-                f"slope {slope:+.2f}, not {slope_name(line.slope)}: give another region"
-            )
+            words = {"first": wv.tau[run.first], "last": wv.tau[run.last]}
             values = {"slope": slope, "nominal": line.slope}
-            notices.append(Notice("wrong-slope", "bad", line.key, text, values))
+            named = slope_name(line.slope)
+            notices.append(notice("wrong-slope", line.key, values, named=named, **words))
     return notices
 
 
@@ -402,7 +399,5 @@ def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     worst, tau = float(np.max(misfit)), float(wv.tau[int(np.argmax(misfit))])
     if worst <= tuning.POOR_DEVIATION:
         return []
-    text = (
-        f"the sum of the lines misses the Allan deviation by {per_cent(worst)} at tau = {tau:.3g} s"
-    )
-    return [Notice("misfit", "bad", "", text, {"misfit": worst, "tau": tau, "discrepancy": 0.0})]
+    values = {"misfit": worst, "tau": tau, "discrepancy": 0.0}
+    return [notice("misfit", "", values, variant="lines", share=per_cent(worst))]

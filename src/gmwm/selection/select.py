@@ -31,8 +31,6 @@ from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
-    from gmwm._core.forms import Form
-
 RULES = ("criterion", "merge")
 _SHOWN = 12
 _REDUNDANT = (
@@ -151,24 +149,15 @@ class Selection(Document, Printed):
         return frame(rows, ("model", *names, "chosen", "tie", "compared_only"))
 
     def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        return {
-            "ranking": [item.to_dict() for item in self.ranking],
-            "chosen": self.ranking.index(self.chosen),
-            "fit": self.fit.to_dict(),
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.selection.form import SelectionForm
-
-        return SelectionForm
+        return super().content() | {"chosen": self.ranking.index(self.chosen)}
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        ranking = tuple(map(Candidate.from_dict, content["ranking"]))
-        return cls(ranking, ranking[content["chosen"]], Fit.from_dict(content["fit"]))
+        ranking, index = content["ranking"], content["chosen"]
+        if not isinstance(index, int) or index not in range(len(ranking)):
+            raise InputError("the chosen model is not in the ranking")
+        found = super().from_content({**content, "chosen": ranking[index]})
+        return replace(found, chosen=found.ranking[index])
 
     def __repr__(self) -> str:
         return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"

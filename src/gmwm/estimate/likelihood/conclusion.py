@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.likelihood import Columns, LogLikelihood, defined, objective_of
@@ -16,7 +15,8 @@ from gmwm.estimate.likelihood.scoring import Maximum, maximise, regular_inverse
 from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.moments import suffices
 from gmwm.estimate.problem import Coordinates, Moments, Slope, density, frequency_nodes
-from gmwm.estimate.result import Comparison, Estimates, Fit, conclude, no_test_notice
+from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 
 _CLOSE = 0.02  # twice the error of the profile likelihood
@@ -92,7 +92,7 @@ def conclude_likelihood(
     if series.is_bridged:
         untested = float("nan")
         comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
-        found = replace(found, notices=(*found.notices, no_test_notice()))
+        found = replace(found, notices=(*found.notices, notice("no-test")))
         return conclude(found, comparison, wv, misfits=False)
     agrees = suffices(0.0, target - implied, covariance, target, implied, max(comparison.dof, 1))
     return conclude(found, comparison, wv, misfits=not agrees)

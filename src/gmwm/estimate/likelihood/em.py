@@ -22,7 +22,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -45,6 +44,7 @@ from gmwm.estimate.likelihood.scoring import Maximum, observed_information
 from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.problem import Slope, spectral_information
 from gmwm.estimate.result import Fit
+from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
 
@@ -376,8 +376,8 @@ def _conclude(
     likelihood = KalmanLikelihood(columns)
     notices = []
     if not converged:
-        text = f"EM did not converge in {len(trace)} iterations: allow more, or start closer"
-        notices.append(Notice("not-converged", "bad", "", text, {"iterations": len(trace)}))
+        values, hint = {"iterations": len(trace)}, "allow more, or start closer"
+        notices.append(notice("not-converged", "", values, variant="em", hint=hint))
     absent: list[int] = []  # terms on their way to zero, which EM never reaches
     while True:
         present = [i for i in range(len(processes)) if i not in absent]
@@ -396,8 +396,8 @@ def _conclude(
     information = observed if is_maximum else expected
     top = Top(part, left, Maximum(z, objective(z), is_maximum), information, likelihood)
     if not is_maximum:
-        text = "EM did not reach a maximum of the likelihood: lower the tolerance"
-        notices.append(Notice("not-converged", "bad", "", text))
+        hint = "lower the tolerance"
+        notices.append(notice("not-converged", variant="no-maximum", hint=hint))
     slope = None
     if columns.drift_is_free:
         slope = Slope(*columns.slope(likelihood.regression(left)))
@@ -405,7 +405,6 @@ def _conclude(
         slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
         first = next(p for p in processes if not p.is_white)
         if not first.is_walk:
-            text = f"a drift that enters the {first.title()} state is not a ramp of the signal"
-            notices.append(Notice("drift-in-state", "bad", "", text))
+            notices.append(notice("drift-in-state", term=first.title()))
     report = Report("em", trace[-1], notices, trace)
     return conclude_likelihood(series, processes, absent, top, slope, report)

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -47,6 +46,7 @@ from gmwm.estimate.problem import (
     spectral_information,
 )
 from gmwm.estimate.result import Fit
+from gmwm.issues import notice
 from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel
 
@@ -189,11 +189,9 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         absent.append(present[redundant])
     notices = []
     if not top.maximum.converged:
-        text = "the maximum of the likelihood was not reached"
-        notices.append(Notice("not-converged", "bad", "", text))
+        notices.append(notice("not-converged"))
     if np.any(np.linalg.eigvalsh(top.information) <= 0.0):
-        text = "the likelihood has no curvature in some direction: too many parameters"
-        notices.append(Notice("no-curvature", "bad", "", text))
+        notices.append(notice("no-curvature"))
     slope = None
     if series.columns.drift_is_free:
         regression = KalmanLikelihood(series.columns).regression(top.processes)

@@ -10,7 +10,6 @@ from itertools import islice
 import numpy as np
 
 from gmwm._core.distributions import chi2
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
@@ -25,6 +24,7 @@ from gmwm.estimate.result import (
     conclude,
     upper_amplitude,
 )
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
 
@@ -100,12 +100,8 @@ def conclude_moments(
         limits[i] = float(max(limit, 0.0) ** (1.0 / design.terms[i].linear.power))
     notices = limit_notices(design, point)
     if target.size < design.n_free:
-        text = (
-            f"{target.size} levels cannot determine {design.n_free} parameters: record longer or "
-            "take a smaller model"
-        )
         values = {"levels": target.size, "parameters": design.n_free}
-        notices.append(Notice("too-few-levels", "bad", "", text, values))
+        notices.append(notice("too-few-levels", "", values))
     found = Estimates(
         coordinates=design.coordinates,
         processes=processes,
@@ -175,12 +171,8 @@ def limit_notices(design: Design, point: Point) -> list[Notice]:
     for k, i in enumerate(design.owners()):
         if amplitudes[i] > 0.0 and at_limit[k]:
             process = design.at_shape(i, point.shapes[i])
-            text = (
-                f"the {process.named()} is at the limit of what this record can show: it is not "
-                "identifiable, leave it out"
-            )
             values = {"process": type(process).__name__, "shape": point.shapes[i][0]}
-            notices.append(Notice("search-limit", "bad", "", text, values))
+            notices.append(notice("search-limit", "", values, term=process.named()))
     return notices
 
 
@@ -245,12 +237,8 @@ def _with_doubtful_terms(
     notices = [n for n in fit.notices if n.code != "amplitude-bound" or n.where not in found]
     for gain, i in islice(((gain, i) for gain, i in redundant if not is_needed(i)), 1):
         process = processes[i]
-        text = (
-            f"the {process.named()} does not improve the fit significantly: it is not "
-            "identifiable, leave it out"
-        )
         shape = {p.name: process.values[p.name] for p in process.shape_parameters}
         values = {"process": type(process).__name__, "gain": gain, **shape}
-        notices.append(Notice("redundant-term", "bad", "", text, values))
+        notices.append(notice("redundant-term", "", values, term=process.named()))
     bounds = {key: bound for key, bound in fit.upper_bounds.items() if key not in found}
     return replace(fit, notices=tuple(notices), upper_bounds=bounds)

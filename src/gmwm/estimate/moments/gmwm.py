@@ -109,7 +109,7 @@ class GMWM:
             # not in the reference mixture on their own may follow what it cannot.
             level.start_at(reference.discrepancy)
             first.append(level.value)
-            if all(process.is_textbook for process in noise):
+            if all(process.is_candidate for process in noise):
                 del first[0]
         found = None
         for value in dict.fromkeys(first):

@@ -24,7 +24,7 @@ from gmwm.variance import WaveletVariance
 
 _BISECTIONS = 14
 
-TEXTBOOK = tuple(kind() for kind in CATALOGUE if kind.is_textbook)
+TEXTBOOK = tuple(kind() for kind in CATALOGUE if kind.is_candidate)
 """Processes of which the mixture is made, with open parameters."""
 
 
@@ -81,7 +81,7 @@ def _kinds(extra: tuple[Process, ...]) -> tuple[Process, ...]:
     # follows one thing only, which no other process can. Simulated processes would take long.
     lines = tuple(p for p in extra if p.is_line and p.values["frequency"] is not None)
     kinds = {type(p): p for p in extra if not p.is_line and p.has_spectrum()}
-    more = (p for kind, p in kinds.items() if not kind.is_textbook)
+    more = (p for kind, p in kinds.items() if not kind.is_candidate)
     return (*TEXTBOOK, *more, *(line.with_values(amplitude=None) for line in lines))
 
 

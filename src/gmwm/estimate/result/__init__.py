@@ -33,5 +33,4 @@ from gmwm.estimate.result.remarks import (
     estimate_notices as estimate_notices,
     misfit_notices as misfit_notices,
     missed_level_notices as missed_level_notices,
-    no_test_notice as no_test_notice,
 )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import (
@@ -26,6 +25,7 @@ from gmwm.estimate.result.remarks import (
     misfit_notices,
     missed_level_notices,
 )
+from gmwm.issues import Notice
 from gmwm.process import Process
 from gmwm.variance import WaveletVariance
 

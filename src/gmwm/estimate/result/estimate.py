@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
+from annotated_types import Ge, Le
+
+from gmwm._core.documents import Positive, Text
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.process import Model
 
@@ -142,10 +145,10 @@ class Region:
     coefficient: Of the line ``coefficient * tau^slope``, u/s^slope.
     """
 
-    key: str
-    slope: float
-    tau_min: float
-    tau_max: float
+    key: Text
+    slope: Annotated[float, Ge(-1.0), Le(1.0)]
+    tau_min: Positive
+    tau_max: Positive
     coefficient: float
 
 

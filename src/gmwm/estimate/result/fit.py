@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, MaxLen
+from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
-from gmwm._core.documents import Document
+from gmwm._core.documents import (
+    Array,
+    Document,
+    OrInfinity,
+    OrNaN,
+    Text,
+    check_covariance,
+)
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
-from gmwm._core.notices import Notice
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
@@ -23,15 +31,13 @@ from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
 from gmwm.estimate.result.estimate import HEAD, Estimate, Region, estimates_of, slope_name
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.estimate.result.intervals import confidence_interval
-from gmwm.estimate.result.remarks import REASONS
-from gmwm.process import Model, model_from_list
+from gmwm.issues import CATALOGUE, Notice
+from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-    from gmwm._core.forms import Form
 
 METHOD_NAMES = {
     "gmwm": "GMWM",
@@ -43,6 +49,7 @@ METHOD_NAMES = {
 }
 """Names of the methods in tables."""
 
+_LARGEST_DISCREPANCY = 1000.0  # a model that is off by more describes nothing
 _PER_OCTAVE = 12  # points of a curve: with one, a line and a resonance look broken
 
 
@@ -94,25 +101,30 @@ class Fit(Document, Printed):
     SCHEMA: ClassVar[str] = "gmwm.fit"
 
     model: Model
-    wv: WaveletVariance
-    keys: tuple[str, ...]
-    covariance: FloatArray
-    upper_bounds: Mapping[str, float]
-    objective: float
-    chi_square: float
-    chi_square_allowed: float
-    dof: int
-    discrepancy: float
-    method: str
-    weights: str
+    wv: Annotated[
+        WaveletVariance,
+        Field(validation_alias="wavelet_variance", serialization_alias="wavelet_variance"),
+    ]
+    keys: tuple[Text, ...]
+    covariance: Array
+    upper_bounds: Mapping[Text, Annotated[OrInfinity, Ge(0.0)]]
+    objective: OrNaN
+    chi_square: OrNaN
+    chi_square_allowed: OrNaN
+    dof: Annotated[int, Ge(-checks.MOST_SAMPLES), Le(checks.MOST_SAMPLES)]
+    discrepancy: Annotated[float, Ge(0.0), Le(_LARGEST_DISCREPANCY)]
+    method: Text
+    weights: Text
     notices: tuple[Notice, ...]
-    log_likelihood: float = float("nan")
-    trace: tuple[float, ...] = ()
-    slope_dof: float = float("inf")
+    log_likelihood: OrNaN = float("nan")
+    trace: Annotated[tuple[float, ...], MaxLen(1_000_000)] = ()
+    slope_dof: Annotated[OrInfinity, Gt(0.0)] = float("inf")
     regions: tuple[Region, ...] = ()
 
     def __post_init__(self) -> None:
         checks.choice("method", self.method, tuple(METHOD_NAMES))
+        if not self.keys:
+            object.__setattr__(self, "covariance", np.zeros((0, 0)))
         freeze(self, "covariance", "upper_bounds")
 
     # -- validity ---------------------------------------------------------------------------------
@@ -125,10 +137,9 @@ class Fit(Document, Printed):
     @property
     def reasons(self) -> Mapping[str, bool]:
         """Conditions of a valid fit by name, and whether this one meets them."""
-        lacking = {REASONS[notice.code] for notice in self.notices if notice.severity == "bad"}
-        result: Mapping[str, bool] = frozen(
-            {name: name not in lacking for name in REASONS.values()}
-        )
+        lacking = {notice.issue.lacks for notice in self.notices if notice.severity == "bad"}
+        names = (issue.lacks for issue in CATALOGUE.values() if issue.lacks)
+        result: Mapping[str, bool] = frozen({name: name not in lacking for name in names})
         return result
 
     @property
@@ -394,26 +405,8 @@ class Fit(Document, Printed):
         """A table of the parameters, one a row, in SI units; needs pandas."""
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
-    def content(self) -> dict[str, Any]:
-        """All fields, and the numbers that readers of the file want, in JSON types."""
+    def derived(self) -> dict[str, Any]:
         return {
-            "model": [term.to_dict() for term in self.model.terms],
-            "keys": list(self.keys),
-            "covariance": self.covariance.tolist(),
-            "upper_bounds": {key: plain(bound) for key, bound in self.upper_bounds.items()},
-            "objective": self.objective,
-            "chi_square": plain(self.chi_square),
-            "chi_square_allowed": plain(self.chi_square_allowed),
-            "dof": self.dof,
-            "discrepancy": self.discrepancy,
-            "method": self.method,
-            "weights": self.weights,
-            "notices": [notice.to_dict() for notice in self.notices],
-            "log_likelihood": plain(self.log_likelihood),
-            "trace": list(self.trace),
-            "slope_dof": plain(self.slope_dof),
-            "regions": [asdict(region) for region in self.regions],
-            "wavelet_variance": self.wv.to_dict(),
             "params": self.params,
             "stderr": self.stderr,
             "p_value": plain(self.p_value),
@@ -422,48 +415,19 @@ class Fit(Document, Printed):
             "units": {estimate.key: estimate.unit for estimate in self.estimates},
         }
 
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.result.form import FitForm
-
-        return FitForm
+    def check_content(self) -> None:
+        if self.model.is_open or len({*self.keys}) != len(self.keys):
+            raise ValueError("its model has open parameters, or a key stands twice")
+        if not {*self.keys} <= {*self.params}:
+            raise ValueError("keys are not those of parameters")
+        check_covariance(self.covariance.tolist(), len(self.keys))
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        return cls(
-            **cls._fields(content), wv=WaveletVariance.from_dict(content["wavelet_variance"])
-        )
-
-    @classmethod
-    def _fields(cls, content: Mapping[str, Any]) -> dict[str, Any]:
-        """The fields of a fit but the data, from checked content.
-
-        Raises InputError if the model and the parameters do not belong together.
-        """
-        model = model_from_list(content["model"])
-        params = {key: value or 0.0 for key, value in model.params.items()}
-        unknown = set(content["keys"]) - set(params)
-        if model.is_open or unknown or content["params"] != params:
-            raise InputError(f"its model {model!r} and its parameters do not belong together")
-        p, infinity = len(content["keys"]), float("inf")
-        kept = ("dof", "discrepancy", "method", "weights")
-        return {name: content[name] for name in kept} | {
-            "model": model,
-            "keys": tuple(content["keys"]),
-            "covariance": np.array(content["covariance"], dtype=float).reshape(p, p),
-            "upper_bounds": {
-                key: or_nan(bound, infinity) for key, bound in content["upper_bounds"].items()
-            },
-            "objective": or_nan(content["objective"]),
-            "chi_square": or_nan(content["chi_square"]),
-            "chi_square_allowed": or_nan(content["chi_square_allowed"]),
-            "notices": tuple(map(Notice.from_dict, content["notices"])),
-            "log_likelihood": or_nan(content["log_likelihood"]),
-            "trace": tuple(content["trace"]),
-            "slope_dof": or_nan(content["slope_dof"], infinity),
-            "regions": tuple(Region(**region) for region in content["regions"]),
-        }
+        found = super().from_content(content)
+        if content["params"] != found.params:
+            raise InputError(f"its model {found.model!r} and its parameters do not belong together")
+        return found
 
 
 def _p_value(statistic: float, dof: int) -> float:
@@ -475,11 +439,6 @@ def _p_value(statistic: float, dof: int) -> float:
 def plain(value: float) -> float | None:
     """A number for JSON, which has no infinity and no NaN."""
     return value if np.isfinite(value) else None
-
-
-def or_nan(value: float | None, missing: float = float("nan")) -> float:
-    """A stored number, or its replacement where there is none."""
-    return missing if value is None else value
 
 
 def dense_curves(

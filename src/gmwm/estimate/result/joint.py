@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import MinLen
 
 from gmwm._core.distributions import chi2
+from gmwm._core.documents import NotNegative, OrNaN, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
-from gmwm.estimate.result.fit import Fit, or_nan, plain
+from gmwm.estimate.result.fit import Fit
+from gmwm.issues import notice
 from gmwm.process import Model
 from gmwm.variance import PooledVariance, WaveletVariance
-
-if TYPE_CHECKING:
-    from gmwm._core.forms import Form
 
 _CELLS = 4  # numbers in a line of the table
 _LEAST_SHARE = 1e-9  # smallest share of the weight that all recordings but one must have
@@ -48,10 +47,10 @@ class JointFit(Fit):
 
     SCHEMA: ClassVar[str] = "gmwm.joint-fit"
 
-    parts: tuple[Fit, ...] = ()
-    equality_p: float = float("nan")
-    curves_p: float = float("nan")
-    spread: Mapping[str, float] = field(default_factory=dict)
+    parts: Annotated[tuple[Fit, ...], MinLen(1)] = ()
+    equality_p: OrNaN = float("nan")
+    curves_p: OrNaN = float("nan")
+    spread: Mapping[Text, NotNegative] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -85,34 +84,10 @@ class JointFit(Fit):
             return f"{which}, equality of the parameters: p = {self.equality_p:.2g}"
         return f"{which}, agreement with the joint model: p = {self.curves_p:.2g}"
 
-    def content(self) -> dict[str, Any]:
-        """All fields, in JSON types."""
-        return {
-            **super().content(),
-            "parts": [part.to_dict() for part in self.parts],
-            "equality_p": plain(self.equality_p),
-            "curves_p": plain(self.curves_p),
-            "spread": dict(self.spread),
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.result.form import JointFitForm
-
-        return JointFitForm
-
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        parts = tuple(Fit.from_dict(part) for part in content["parts"])
-        return cls(
-            **cls._fields(content),
-            wv=PooledVariance.of([part.wv for part in parts]),
-            parts=parts,
-            equality_p=or_nan(content["equality_p"]),
-            curves_p=or_nan(content["curves_p"]),
-            spread=content["spread"],
-        )
+        found = super().from_content(content)
+        return replace(found, wv=PooledVariance.of([part.wv for part in found.parts]))
 
 
 def fit_joint(
@@ -138,21 +113,12 @@ def fit_joint(
     equality_p, spread = _heterogeneity(whole, each)
     curves_p = _curves_test(whole, each)
     notices = list(whole.notices)
-    text = ""
+    p_values = {"equality_p": equality_p, "curves_p": curves_p}
     if equality_p < tuning.RECORDINGS_DIFFER:
-        text = (
-            f"the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
-            "values are their mean, see the spread"
-        )
+        notices.append(notice("recordings-differ", "", p_values))
     elif np.isnan(equality_p) and curves_p < tuning.RECORDINGS_DIFFER:
         # Where the parameters cannot be compared, the curves can.
-        text = (
-            f"the wavelet variances differ from the joint model (p = {curves_p:.2g}): the "
-            "recordings differ, or the model is wrong"
-        )
-    if text:
-        p_values = {"equality_p": equality_p, "curves_p": curves_p}
-        notices.append(Notice("recordings-differ", "bad", "", text, p_values))
+        notices.append(notice("recordings-differ", "", p_values, variant="curves"))
     values = {f.name: getattr(whole, f.name) for f in fields(Fit)} | {"notices": tuple(notices)}
     return JointFit(**values, parts=each, equality_p=equality_p, curves_p=curves_p, spread=spread)
 

@@ -4,57 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations, pairwise
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
-
-REASONS = {
-    "amplitude-bound": "amplitudes_above_zero",
-    "search-limit": "shapes_within_search",
-    "redundant-term": "terms_needed",
-    "undetermined": "shapes_determined",
-    "indistinct-terms": "terms_distinct",
-    "confounded": "parameters_separable",
-    "too-few-levels": "enough_levels",
-    "misfit": "describes_data",
-    "level-missed": "describes_every_level",
-    "not-converged": "converged",
-    "no-curvature": "converged",
-    "drift-in-state": "drift_is_ramp",
-    "no-region": "regions_found",
-    "wrong-slope": "slopes_agree",
-    "recordings-differ": "recordings_agree",
-    "not-static": "recording_static",
-    "tilt": "attitude_kept",
-    "rate-changes": "rate_constant",
-    "counts": "units_agree",
-    "gravity": "units_agree",
-    "swapped": "units_agree",
-    "rounding": "resolution_fine",
-    "saturation": "within_range",
-    "abrupt-end": "within_range",
-    "stuck": "samples_change",
-    "dead": "samples_change",
-    "held": "samples_measured",
-    "filled": "samples_measured",
-    "value-repeated": "samples_measured",
-    "variance": "noise_steady",
-    "step": "stationary",
-    "transient": "stationary",
-    "drift-at-start": "stationary",
-    "slow-period": "stationary",
-    "departures-many": "stationary",
-    "unsteady": "noise_steady",
-}
-"""Code of a notice that makes a fit not valid -> the condition that the fit does not meet."""
 
 
 def estimate_notices(
@@ -70,23 +31,13 @@ def estimate_notices(
     keys, matrix: The estimated parameters and their covariance.
     upper: Upper limits of amplitudes that are not significantly above zero.
     """
-    bad = [
-        Notice(
-            "amplitude-bound",
-            "bad",
-            key,
-            "not significantly above zero: only an upper limit is known",
-            {"upper": limit},
-        )
-        for key, limit in upper.items()
-    ]
+    bad = [notice("amplitude-bound", key, {"upper": limit}) for key, limit in upper.items()]
     errors = dict(zip(keys, map(float, np.sqrt(np.diag(matrix))), strict=True))
     for item in model.parameters:
         parameter, error = item.parameter, errors.get(item.key, 0.0)
         is_positive_shape = parameter.role == "shape" and parameter.lower == 0.0
         if is_positive_shape and error > tuning.UNDETERMINED * (item.value or 0.0):
-            text = f"not determined by this record (standard error {error:.2g})"
-            bad.append(Notice("undetermined", "bad", item.key, text, {"stderr": error}))
+            bad.append(notice("undetermined", item.key, {"stderr": error}))
     bad += _indistinct_notices(model, keys, matrix)
     for (i, first), (j, second) in combinations(enumerate(keys), 2):
         if errors[first] == 0.0 or errors[second] == 0.0:
@@ -94,12 +45,8 @@ def estimate_notices(
         correlation = float(matrix[i, j] / (errors[first] * errors[second]))
         is_loose = errors[second] > tuning.LOOSE * abs(model.params[second] or 0.0)
         if abs(correlation) > tuning.CONFOUNDED and is_loose:
-            text = (
-                f"cannot be distinguished from {first} (their estimates have a correlation of "
-                f"{correlation:.5f}): fix one of them"
-            )
             values = {"other": first, "correlation": correlation}
-            bad.append(Notice("confounded", "bad", second, text, values))
+            bad.append(notice("confounded", second, values))
     return bad, _bandwidth_notices(model, wv)
 
 
@@ -118,12 +65,9 @@ def _indistinct_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -
         gradient = np.array([-1.0 / a, 1.0 / b])
         error = float(np.sqrt(gradient @ matrix[np.ix_([i, j], [i, j])] @ gradient))
         if np.log(b / a) < tuning.DISTINCT_SIGMA * error or b / a < tuning.DISTINCT_RATIO:
-            text = (
-                f"two {title} terms do not differ significantly ({first} = {a:.3g} s, {second} = "
-                f"{b:.3g} s): use one fewer"
-            )
             values = {"first": first, "second": second, first: a, second: b}
-            notices.append(Notice("indistinct-terms", "bad", second, text, values))
+            words: dict[str, Any] = {"kind": title, "one": a, "other": b}
+            notices.append(notice("indistinct-terms", second, values, **words))
     return notices
 
 
@@ -147,12 +91,9 @@ def _bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
             continue  # a term of zero amplitude is no filter of the sensor's
         unit, factor = customary_unit("u/sqrt(Hz)", wv.quantity, wv.unit)
         density = float(np.sqrt(low))
-        text = (
-            f"the sensor's {bandwidth:.3g} Hz low-pass shapes this noise ({term.title()}, N = "
-            f"{density * factor:.3g} {unit}); a filter needs no state for it"
-        )
         values = {"bandwidth": bandwidth, "density": density}
-        notices.append(Notice("sensor-bandwidth", "note", key, text, values))
+        words: dict[str, Any] = {"term": term.title(), "size": density * factor, "unit": unit}
+        notices.append(notice("sensor-bandwidth", key, values, **words))
     return notices
 
 
@@ -173,18 +114,8 @@ def missed_level_notices(goodness: Goodness) -> list[Notice]:
         return []
     residual, tau = goodness.largest
     side = "above" if residual > 0.0 else "below"
-    text = (
-        f"at tau = {tau:.3g} s the data lie {brief(abs(residual))} standard errors {side} the "
-        "model: it lacks a term there, or the recording has a fault"
-    )
     values = {"tau": tau, "residual": residual, "p_value": goodness.largest_p}
-    return [Notice("level-missed", "bad", "", text, values)]
-
-
-def no_test_notice() -> Notice:
-    """Notice of a fit whose wavelet variance is not that of the data."""
-    text = "the fit is not tested: the gaps leave no wavelet variance, straight lines bridge them"
-    return Notice("no-test", "note", "", text)
+    return [notice("level-missed", "", values, errors=brief(abs(residual)), side=side)]
 
 
 def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> list[Notice]:
@@ -200,17 +131,18 @@ def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> l
         return []
     misfit, tau, residual = beyond
     values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
-    share = per_cent(abs(misfit))
-    if not goodness.is_poor:
-        text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
-        text += ", which the intervals allow for" if discrepancy > 0.0 else ""
-        return [Notice("misfit", "note", "", text, values)]
     side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
-    text = f"the data lie {share} {side} the model's Allan deviation"
-    if failed or goodness.largest_p < tuning.POOR_P:
-        text = f"predictions over {tau:.3g} s are too {scale}: there {text}, by "
-        text += f"{brief(abs(residual))} standard errors"
-        return [Notice("misfit", "bad", "", text, values)]
-    chance = f"{100.0 * goodness.largest_p:.0f} % of right models are missed as clearly"
-    text = f"at tau = {tau:.3g} s {text}, which may be chance: {chance} somewhere"
-    return [Notice("misfit", "note", "", text, values)]
+    words: dict[str, Any] = {
+        "share": per_cent(abs(misfit)),
+        "side": side,
+        "scale": scale,
+        "errors": brief(abs(residual)),
+        "chance": 100.0 * goodness.largest_p,
+    }
+    if not goodness.is_poor:
+        variant = "allowed" if discrepancy > 0.0 else "slight"
+    elif failed or goodness.largest_p < tuning.POOR_P:
+        return [notice("misfit", "", values, **words)]
+    else:
+        variant = "chance"
+    return [notice("misfit", "", values, severity="note", variant=variant, **words)]

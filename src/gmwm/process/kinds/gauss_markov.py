@@ -56,7 +56,6 @@ class GaussMarkov(Process):
     is_candidate: ClassVar[bool] = True
     compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
-    is_textbook: ClassVar[bool] = True
     is_exponential: ClassVar[bool] = True
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:

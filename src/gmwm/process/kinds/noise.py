@@ -37,7 +37,6 @@ class WhiteNoise(Process):
     short_name: ClassVar[str] = "N"
     is_candidate: ClassVar[bool] = True
     is_white: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -79,7 +78,6 @@ class QuantizationNoise(Process):
     label: ClassVar[str] = "quantization noise"
     short_name: ClassVar[str] = "Q"
     is_candidate: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
 
     def __init__(self, Q: float | None = None) -> None:
         super().__init__(Q)
@@ -128,7 +126,6 @@ class RandomWalk(Process):
     short_name: ClassVar[str] = "K"
     is_candidate: ClassVar[bool] = True
     is_walk: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)
