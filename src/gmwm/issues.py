@@ -269,7 +269,8 @@ _READERS = (
 )  # fmt: skip
 
 _VARIANCE = (
-    Issue("curve-shortened", "{text}", severity="warning", topic="samples"),
+    Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
+          "complete record at {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (
@@ -344,42 +345,69 @@ _CALIBRATION = (
 )  # fmt: skip
 
 _ESTIMATE = (
-    Issue("amplitude-bound", "{text}", severity="bad", topic="fit", lacks="amplitudes_above_zero",
+    Issue("amplitude-bound", "not significantly above zero: only an upper limit is known",
+          severity="bad", topic="fit", lacks="amplitudes_above_zero",
           reason="a term was not found"),
-    Issue("confounded", "{text}", severity="bad", topic="fit", lacks="parameters_separable",
-          reason="terms cannot be separated"),
-    Issue("drift-in-state", "{text}", severity="bad", topic="fit", lacks="drift_is_ramp",
-          reason="the drift is no ramp"),
-    Issue("indistinct-terms", "{text}", severity="bad", topic="fit", lacks="terms_distinct",
-          reason="two terms look alike"),
-    Issue("level-missed", "{text}", severity="bad", topic="fit", lacks="describes_every_level",
-          reason="the model misses one level"),
-    Issue("misfit", "{text}", severity="bad", topic="fit", lacks="describes_data",
-          reason="the model misses the data"),
-    Issue("no-curvature", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("no-region", "{text}", severity="bad", topic="fit", lacks="regions_found",
-          reason="no straight region found"),
-    Issue("no-test", "{text}", topic="fit"),
-    Issue("not-converged", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("recordings-differ", "{text}", severity="bad", topic="fit", lacks="recordings_agree",
-          reason="the recordings disagree"),
-    Issue("redundant-term", "{text}", severity="bad", topic="fit", lacks="terms_needed",
+    Issue("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
+          "of {correlation:.5f})", "fix one of them", severity="bad", topic="fit",
+          lacks="parameters_separable", reason="terms cannot be separated"),
+    Issue("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
+          severity="bad", topic="fit", lacks="drift_is_ramp", reason="the drift is no ramp"),
+    Issue("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} "
+          "s, {second} = {other:.3g} s)", "use one fewer", severity="bad", topic="fit",
+          lacks="terms_distinct", reason="two terms look alike"),
+    Issue("level-missed", "at tau = {tau:.3g} s the data lie {errors} standard errors {side} the "
+          "model: it lacks a term there, or the recording has a fault", severity="bad",
+          topic="fit", lacks="describes_every_level", reason="the model misses one level"),
+    Issue("misfit", {
+        "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
+            "model's Allan deviation, by {errors} standard errors",
+        "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
+                  "which may be chance: {chance:.0f} % of right models are missed as clearly",
+        "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
+        "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
+                   "which the intervals allow for",
+        "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s",
+    }, severity="bad", topic="fit", lacks="describes_data", reason="the model misses the data"),
+    Issue("no-curvature", "the likelihood has no curvature in some direction: too many parameters",
+          severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
+          severity="bad", topic="fit", lacks="regions_found", reason="no straight region found"),
+    Issue("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
+          "bridge them", topic="fit"),
+    Issue("not-converged", {
+        "": "the maximum of the likelihood was not reached",
+        "em": "EM did not converge in {iterations} iterations",
+        "no-maximum": "EM did not reach a maximum of the likelihood",
+    }, severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("recordings-differ", {
+        "": "the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
+            "values are their mean, see the spread",
+        "curves": "the wavelet variances differ from the joint model (p = {curves_p:.2g}): the "
+                  "recordings differ, or the model is wrong",
+    }, severity="bad", topic="fit", lacks="recordings_agree", reason="the recordings disagree"),
+    Issue("redundant-term", "the {term} does not improve the fit significantly: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit", lacks="terms_needed",
           reason="a term is not needed"),
-    Issue("search-limit", "{text}", severity="bad", topic="fit", lacks="shapes_within_search",
-          reason="a correlation time beyond reach"),
-    Issue("sensor-bandwidth", "{text}", topic="fit"),
-    Issue("too-few-levels", "{text}", severity="bad", topic="fit", lacks="enough_levels",
-          reason="record too short"),
-    Issue("undetermined", "{text}", severity="bad", topic="fit", lacks="shapes_determined",
+    Issue("search-limit", "the {term} is at the limit of what this record can show: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit",
+          lacks="shapes_within_search", reason="a correlation time beyond reach"),
+    Issue("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise "
+          "({term}, N = {size:.3g} {unit}); a filter needs no state for it", topic="fit"),
+    Issue("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
+          "record longer or take a smaller model", severity="bad", topic="fit",
+          lacks="enough_levels", reason="record too short"),
+    Issue("undetermined", "not determined by this record (standard error {stderr:.2g})",
+          severity="bad", topic="fit", lacks="shapes_determined",
           reason="record too short for model"),
-    Issue("wrong-slope", "{text}", severity="bad", topic="fit", lacks="slopes_agree",
-          reason="slopes contradict the model"),
+    Issue("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
+          "{slope:+.2f}, not {named}", "give another region", severity="bad", topic="fit",
+          lacks="slopes_agree", reason="slopes contradict the model"),
 )  # fmt: skip
 
 _SELECTION = (
-    Issue("ramp-or-walk", "{text}", topic="selection"),
+    Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
+          "them apart, so the model has no ramp", topic="selection"),
     Issue("tie", "{text}", topic="selection"),
 )  # fmt: skip
 

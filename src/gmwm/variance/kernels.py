@@ -158,12 +158,12 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
     """Cumulative sum of ``values - mean``, starting with 0; missing samples (NaN) add nothing."""
     result = np.empty(values.size + 1)  # numpy asks for large pages, compiled code does not
-    _accumulate(values, mean, result)
+    accumulate(values, mean, result)
     return result
 
 
 @compiled()
-def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
+def accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
     """What pieces of 256 samples add is compensated.
 
     Within a piece the sum begins anew, in four of them at a time, since each addition waits for the

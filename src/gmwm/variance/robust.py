@@ -33,7 +33,7 @@ from scipy.optimize import brentq
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import legendre
-from gmwm.variance.robust_kernels import biweight_means, middle_bin
+from gmwm.variance.robust_kernels import biweight_means
 
 EFFICIENCY = 0.6
 """Efficiency at Gaussian data by default."""
@@ -43,7 +43,6 @@ _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256
 _SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.395; 1 - 1e-7 is below 1e4
 _TOLERANCE = 1e-7  # of the last Newton step in log nu^2; the error left is its square
-_FEW = 2**14  # coefficients; below, counting costs more than it saves
 _ZERO = 1e-6  # times the root mean square: a median below counts as zero
 _NARROW = 1e-4  # in log nu^2: a maximum below zero, so close, is not a solution
 _LARGEST_STEP = np.log(2.0)
@@ -100,8 +99,8 @@ def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) ->
     """Robust variance, about zero, of the wavelet coefficients of one level.
 
     The equation has a second, meaningless solution far below, and may have more in contaminated
-    data: taken is the one found first from the squared median of \\|W\\| over 0.6745, on the branch
-    on which the equation falls with nu^2, as it does for Gaussian data.
+    data. The solution is the one found first from the squared median of \\|W\\| over 0.6745, on the
+    branch on which the equation falls with nu^2, as it does for Gaussian data.
 
     Parameters
     ----------
@@ -149,8 +148,8 @@ def _start(w: FloatArray, largest: float) -> float:
     Coefficients that are zero come out as rounding errors of the cumulative sum: with long slow
     series up to about a millionth of the others.
     """
-    size, rank = (np.abs(w), w.size // 2) if w.size < _FEW else middle_bin(w)
-    scale = float(np.partition(size, rank)[rank]) / _QUARTILE
+    rank = w.size // 2
+    scale = float(np.partition(np.abs(w), rank)[rank]) / _QUARTILE
     if scale > _ZERO * largest:  # which is at least the root mean square
         return scale
     square = largest * float(np.sqrt(np.mean((w / largest) ** 2)))

@@ -13,17 +13,17 @@ rho, E[H_p H_q] = q! rho^q if p = q, else 0 (Mehler), so that for two levels
 
 with c_jk(h) the number of pairs at lag h. For independent coefficients the sum of all terms is
 the classical variance over the efficiency. Each power of a correlation function is one itself
-(Schur), so what is added is positive semi-definite.
+(Schur), so the excess is positive semi-definite.
 
 The powers from the fourth on are local: two levels whose averaging times differ by 2^d have
 correlations of order 2^(-d/2), over a few times the longer averaging time, and share about
-2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to
-``_REACH`` apart are summed, on a common grid of lags. It is made of means over blocks of samples,
-which give the coefficients at every ``block``-th lag exactly; between these lags the sum of powers
-is taken as a straight line. Correlations are by cosine transform from frequencies in the middle
-of their bins: the transform then gives correlations less their first alias, and a spectrum that
-grows without bound towards zero frequency needs no care. Farther levels, which hardly matter
-unless one narrow resonance makes them all, get a value of the right size.
+2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to four
+apart are summed, on a common grid of lags. It is made of means over blocks of samples, which give
+the coefficients at every ``block``-th lag exactly; between these lags the sum of powers is taken as
+a straight line. Correlations are by cosine transform from frequencies in the middle of their bins:
+the transform then gives correlations less their first alias, and a spectrum that grows without
+bound towards zero frequency needs no care. Farther levels hardly matter unless one narrow resonance
+makes them all; they get a value of the right size.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _MAX_TERMS = 40
 
 @lru_cache(maxsize=64)
 def excess_series(efficiency: float) -> FloatArray:
-    """b_q^2 q! for q = 4, 6, ...: what powers of the correlation add to the covariance.
+    """b_q^2 q! for q = 4, 6, ...: factors of the powers of the correlation.
 
     Their sum is 2/efficiency - 2; the last one holds what the series leaves out.
     """
@@ -119,7 +119,7 @@ def _grid(n: int, m: FloatArray, first: int, own: int, block: int) -> _Grid:
 
 @lru_cache(maxsize=4)
 def _grids(n: int, levels: int) -> tuple[_Grid, ...]:
-    """Everything about the sums over lags that does not depend on the spectrum."""
+    """The grids of all levels."""
     m = dyadic_levels(n)[:levels]
     grids = [_grid(n, m, 0, min(tuning.ROBUST_FIRST_LEVELS, m.size), 1)]
     first = tuning.ROBUST_FIRST_LEVELS
@@ -154,7 +154,7 @@ def excess_correlation(
 
 
 def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> FloatArray:
-    """What is added to the covariance, over nu_j^2 nu_k^2, for levels within reach, (J, J)."""
+    """Excess of the covariance over nu_j^2 nu_k^2, for levels within reach, (J, J)."""
     result = np.zeros((levels, levels))
     for grid in _grids(n, levels):
         density = block_density(psd, dt, grid.frequency, grid.block)
