@@ -17,9 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    PATH,
     estimating_options,
     memory_option,
     models_of_channels,
+    option,
     output_folder,
     part_options,
     printing_options,
@@ -50,20 +52,22 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", "counts", "gravity", "swapped",
-)  # fmt: skip
+    "not-static",
+    "tilt",
+    "rate-changes",
+    "rounding",
+    "saturation",
+    "abrupt-end",
+    "stuck",
+    "held",
+    "filled",
+    "value-repeated",
+    "variance",
+    "counts",
+    "gravity",
+    "swapped",
+)
 """Codes of notices of a fit that are those of the recording."""
-
-
-_EXPORTED = {
-    "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
-    "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
-    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
-    "state-space": "state-space.json",
-}  # fmt: skip
-"""Names of the files of programs that want something else than NAME.yaml."""
 
 
 _FILES = ("calibration.json", "report.html", "imu.yaml")
@@ -74,27 +78,34 @@ def output_option(default: str) -> Callable[[Any], Any]:
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @output_option("gmwm-out")
 @reading_options
 @part_options
 @estimating_options
-@click.option("--remove-departures", is_flag=True,
-              help="Subtract steps, transients at the start and slow periods that are found, and "
-                   "calibrate what is left.")  # fmt: skip
-@click.option(
-    "--export",
-    "target",
-    metavar="NAME",
-    help="Also write the file of this program into the folder; see gmwm export --list.",
+@option(
+    "--remove-departures",
+    "Subtract steps, transients at the start and slow periods that are found, and "
+    "calibrate what is left.",
 )
-@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
-              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
-                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Processes at most; short recordings take one.")  # fmt: skip
-@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
+@option(
+    "--export NAME",
+    "Also write the file of this program into the folder; see gmwm export --list.",
+    name="target",
+)
+@option(
+    "--datasheet YAML",
+    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
+    "of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
+    type=PATH,
+)
+@option(
+    "--jobs N",
+    "Processes at most; short recordings take one.",
+    type=click.IntRange(min=1),
+    default=2,
+)
+@option("--timings", "Print where the time went, stage by stage.")
 @memory_option
 @printing_options
 def calibrate(
@@ -133,10 +144,10 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
-        from gmwm._core.runs import beside, spare
+        from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm._core.memory import limited
@@ -149,7 +160,7 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
-        replaceable(output / _EXPORTED.get(target, f"{target}.yaml"))
+        replaceable(output / TARGETS[target].file_name)
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"), limited(memory):
             recordings = [read_recording(file, **reading) for file in files]
@@ -326,7 +337,7 @@ def write_files(
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
     if target is not None and not (target == "kalibr" and "imu.yaml" in names):
-        path = folder / _EXPORTED.get(target, f"{target}.yaml")
+        path = folder / TARGETS[target].file_name
         with stage("exports"):
             export(result, target, path=path)
         lines.append(f"wrote {path} for {target}")

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._core.runs import one_blas_thread, shared
+from gmwm._core.jobs import one_blas_thread, shared
 from gmwm._core.spool import release
 from gmwm._core.typing import Progress, known_of
 from gmwm.diagnosis import tuning

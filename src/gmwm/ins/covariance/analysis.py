@@ -9,14 +9,13 @@ from itertools import pairwise
 import numpy as np
 
 from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.analysis_kernels import run_both
 from gmwm.ins.filter import (
     NAVIGATION,
     Filter,
-    IntArray,
     Outputs,
     SensorStates,
     modified,
@@ -24,7 +23,7 @@ from gmwm.ins.filter import (
 )
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +164,9 @@ class Course:
         run_both(
             self.epoch, self.samples, dt, self.mid_matrix, self.mid_v, self.mid_lla,
             self.end_matrix, self.end_v, self.end_rate,
-            P, table.axis, table.partner, table.phi, table.phi_off, table.gain, table.noise,
-            table.noise_off, table.cross, table.integral, ready.coloured,
-            J, joint.axis, joint.partner, joint.phi, joint.phi_off, joint.gain, joint.noise,
-            joint.noise_off, joint.cross, joint.integral,
-            np.where(real.coloured >= 0, real.coloured + m, -1),
-            events.epoch, events.kind, events.sd, ready.lever_arm, ready.second_order,
+            P, table.table, ready.noise_states, J, joint.table,
+            np.where(real.noise_states >= 0, real.noise_states + m, -1),
+            events, ready.lever_arm, ready.second_order,
             self.outputs.epoch, self.outputs.before, out_P, out_J,
         )  # fmt: skip
         index = self.outputs.epoch
@@ -178,7 +174,7 @@ class Course:
         nine = slice(0, NAVIGATION)
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
-        believed_sum, joint_sum = _sums(table), _sums(joint)
+        believed_sum, joint_sum = table.sums, joint.sums
         found = Analysis(
             time=self.outputs.time(dt),
             before=self.outputs.before == 1,
@@ -245,26 +241,24 @@ def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
     def both(first: FloatArray, second: FloatArray) -> FloatArray:
         return np.concatenate([first, second], axis=-1)
 
-    still = np.zeros_like(believed.noise)
+    own, real = believed.table, truth.table
+    still = np.zeros_like(own.noise)
     covariance = np.zeros((believed.m + truth.m,) * 2)
     covariance[believed.m :, believed.m :] = truth.covariance
-    return replace(
-        truth,
+    return SensorStates(
         names=(*believed.names, *truth.names),
-        axis=np.append(believed.axis, truth.axis),
-        output=np.append(-believed.output, truth.output),
-        partner=np.append(believed.partner, truth.partner + believed.m),
         mean=np.append(believed.mean, truth.mean),
         covariance=covariance,
-        phi=both(believed.phi, truth.phi),
-        phi_off=both(believed.phi_off, truth.phi_off),
-        gain=both(-believed.gain, truth.gain),
-        noise=both(still, truth.noise),
-        noise_off=both(still, truth.noise_off),
-        cross=both(still, truth.cross),
+        table=real._replace(
+            paired=own.paired or real.paired,
+            axis=np.append(own.axis, real.axis),
+            output=np.append(-own.output, real.output),
+            partner=np.append(own.partner, real.partner + believed.m),
+            phi=both(own.phi, real.phi),
+            phi_off=both(own.phi_off, real.phi_off),
+            gain=both(-own.gain, real.gain),
+            noise=both(still, real.noise),
+            noise_off=both(still, real.noise_off),
+            cross=both(still, real.cross),
+        ),
     )
-
-
-def _sums(table: SensorStates) -> FloatArray:
-    """Matrix (6, m) that adds up the states of each sensor."""
-    return np.where(table.axis == np.arange(6)[:, None], table.output, 0.0)

@@ -11,16 +11,17 @@ from __future__ import annotations
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.ins.filter import (
-    IS_HEIGHT,
-    IS_POSITION,
-    IS_VELOCITY,
-    IntArray,
+    IS_GNSS,
+    Events,
+    Kinematics,
+    SensorTable,
     excess,
-    measurement_row,
     measurement_update,
-    noise_state,
+    new_scratch,
+    new_transition,
+    observe,
     propagate,
     tilt_squared,
     transition,
@@ -73,33 +74,15 @@ def run_both(
     epoch: IntArray, samples: IntArray, dt: float,
     mid_matrix: FloatArray, mid_v: FloatArray, mid_lla: FloatArray,
     end_matrix: FloatArray, end_v: FloatArray, end_rate: FloatArray,
-    P: FloatArray, axis: IntArray, partner: IntArray, phi: FloatArray, phi_off: FloatArray,
-    gain: FloatArray, noise: FloatArray, noise_off: FloatArray, cross: FloatArray,
-    integral: FloatArray, coloured: IntArray,
-    J: FloatArray, j_axis: IntArray, j_partner: IntArray, j_phi: FloatArray,
-    j_phi_off: FloatArray, j_gain: FloatArray, j_noise: FloatArray, j_noise_off: FloatArray,
-    j_cross: FloatArray, j_integral: FloatArray, j_coloured: IntArray,
-    event_epoch: IntArray, event_kind: IntArray, event_sd: FloatArray, lever: FloatArray,
+    P: FloatArray, table: SensorTable, noise_states: IntArray,
+    J: FloatArray, joint: SensorTable, j_noise_states: IntArray,
+    events: Events, lever: FloatArray,
     second_order: bool,
     out_epoch: IntArray, out_before: IntArray, out_P: FloatArray, out_J: FloatArray,
 ) -> None:  # fmt: skip
-    """Propagate a filter's covariance and the joint second moments through a scenario.
-
-    epoch, samples: (S + 1,) of int, epochs at which something is asked for or a step ends, and
-        samples of the step that leads there (none to the first).
-    mid_matrix, mid_v, mid_lla: True attitude, velocity and position in the middle of each step.
-    end_matrix, end_v, end_rate: Attitude, velocity and angular rate (body axes, rad/s) at each
-        epoch.
-    P, axis, ..., coloured: Of the filter, as in `gmwm.ins.filter.filter_arrays`.
-    J, j_axis, ..., j_coloured: Of the joint vector; ``j_coloured`` are the places of the true
-        coloured noise.
-    event_epoch, ..., out_before: As in `gmwm.ins.filter.filter_arrays`.
-    out_P: (K, 9 + m, 9 + m), out_J : (K, N, N), results.
-    """
-    n, size, m = P.shape[0], J.shape[0], axis.size
-    F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
-    S, T, U, row = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n)
-    j_S, j_T, j_row = np.zeros((6, size)), np.zeros((9, size)), np.zeros(size)
+    """Propagate a filter's covariance and the joint second moments through a scenario."""
+    n, size, m = P.shape[0], J.shape[0], table.axis.size
+    change, scratch, j_scratch = new_transition(), new_scratch(n), new_scratch(size)
     h, K, x = np.zeros(9), np.zeros(n), np.zeros(n)
     a, k = np.zeros(size), np.zeros(size)
     event = out = 0
@@ -107,12 +90,10 @@ def run_both(
     for s in range(epoch.size):
         count = samples[s]
         if count > 0:
-            transition(mid_v[s], mid_lla[s], mid_matrix[s], count * dt, F, A, B)
-            propagate(P, A, B, axis, partner, phi[count], phi_off[count], gain[count], noise[count],
-                  noise_off[count], cross[count], integral[count], S, T, U, row)  # fmt: skip
-            propagate(J, A, B, j_axis, j_partner, j_phi[count], j_phi_off[count], j_gain[count],
-                  j_noise[count], j_noise_off[count], j_cross[count], j_integral[count],
-                  j_S, j_T, U, j_row)  # fmt: skip
+            middle = Kinematics(mid_matrix[s], mid_v[s], mid_lla[s])
+            transition(middle, count * dt, change)
+            propagate(P, change, table, count, scratch)
+            propagate(J, change, joint, count, j_scratch)
             if second_order:
                 g = gravity(mid_lla[s, 0], mid_lla[s, 2])
                 gathered = tilt_squared(P, g, count * dt, gathered)
@@ -122,22 +103,23 @@ def run_both(
             out += 1
         attitude = P[6, 6] + P[7, 7] + P[8, 8] if second_order else 0.0
         j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if second_order else 0.0
-        while event < event_epoch.size and event_epoch[event] == epoch[s]:
-            kind = event_kind[event]
-            for component in range(1 if kind == IS_HEIGHT else 3):
-                sd = event_sd[event, component]
+        end = Kinematics(end_matrix[s], end_v[s], mid_lla[s])
+        while event < events.epoch.size and events.epoch[event] == epoch[s]:
+            kind = events.kind[event]
+            for component in range(3):
+                sd = events.sd[event, component]
                 if not sd > 0.0:
                     continue
-                measurement_row(kind, component, end_matrix[s], end_v[s], end_rate[s], lever, h)
+                observe(kind, component, events.value[event], end, end_rate[s], lever, h)
                 state = estimate = truth = -1
-                if noise_state(kind, component, coloured) >= 0:
-                    state = estimate = 9 + noise_state(kind, component, coloured)
-                    truth = 9 + noise_state(kind, component, j_coloured)
+                if noise_states[kind, component] >= 0:
+                    state = estimate = 9 + noise_states[kind, component]
+                    truth = 9 + j_noise_states[kind, component]
                 expected = sd * sd + excess(P, h, attitude)
                 measurement_update(P, h, state, expected, 0.0, x, K)
                 variance = sd * sd + excess(J, h, j_attitude)
                 update_jointly(J, h, estimate, truth, variance, K, m, a, k)
-            if kind in (IS_POSITION, IS_VELOCITY):
+            if IS_GNSS[kind]:
                 gathered = j_gathered = 0.0
             event += 1
         while out < out_epoch.size and out_epoch[out] == epoch[s]:

@@ -19,7 +19,7 @@ from gmwm.ins import tuning
 from gmwm.ins.covariance.analysis import Analysis, Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.ins.trajectory import Trajectory, fixed_wing_loiter
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
