@@ -8,11 +8,11 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.distributions import fisher
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectral.spectrum import POWER_INFLATION, Spectrum
+from gmwm.diagnosis.spectrum import POWER_INFLATION, Spectrum
+from gmwm.issues import Notice, notice
 
 _CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
 _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
@@ -81,43 +81,31 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
     families = _families(lines)
     notices = []
     for main, harmonics in families[: tuning.NAMED_LINES]:
-        amplitude = readable(main.amplitude, unit)
-        text = (
-            f"a periodic line at {main.frequency:.4g} Hz, amplitude {amplitude}, "
-            f"{brief(main.ratio, 3)} times its surroundings"
-        )
-        if harmonics:
-            at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
-            text += f", with harmonics at {at} Hz"
+        values = {
+            "frequency": main.frequency,
+            "amplitude": main.amplitude,
+            "ratio": main.ratio,
+            "width": main.width,
+            "harmonics": float(len(harmonics)),
+        }
+        at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
+        also = f", with harmonics at {at} Hz" if harmonics else ""
+        amplitude, times = readable(main.amplitude, unit), brief(main.ratio, 3)
         notices.append(
-            Notice(
-                "line",
-                "warning",
-                name,
-                text,
-                {
-                    "frequency": main.frequency,
-                    "amplitude": main.amplitude,
-                    "ratio": main.ratio,
-                    "width": main.width,
-                    "harmonics": float(len(harmonics)),
-                },
-                "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
+            notice(
+                "line", name, values, severity="warning", shown=amplitude, times=times, also=also
             )
         )
     rest = families[tuning.NAMED_LINES :]
     if rest:
         strongest = rest[0][0]
-        text = (
-            f"{len(rest)} weaker periodic line{'s' if len(rest) > 1 else ''}, the strongest at "
-            f"{strongest.frequency:.4g} Hz, amplitude {readable(strongest.amplitude, unit)}"
-        )
-        numbers = {
+        values = {
             "count": float(len(rest)),
             "frequency": strongest.frequency,
             "amplitude": strongest.amplitude,
         }
-        notices.append(Notice("line", "note", name, text, numbers))
+        amplitude = readable(strongest.amplitude, unit)
+        notices.append(notice("line", name, values, variant="weak", hint="", shown=amplitude))
     return notices
 
 

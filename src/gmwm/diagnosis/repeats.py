@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice, Severity
-from gmwm._core.typing import FloatArray, known_of
+from gmwm._core.typing import known_of
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.channel import Examined, Held
+from gmwm.diagnosis.health import Repetition
 from gmwm.diagnosis.resolution import step_size
-from gmwm.diagnosis.result import Repetition
-from gmwm.diagnosis.samples import is_dithered
+from gmwm.diagnosis.samples import is_dithered, stuck
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import Channel
 
 
@@ -41,16 +43,8 @@ def thinned(channel: Channel, found: Repetition) -> Channel:
 
 def repetition_notice(channel: Channel, found: Repetition) -> Notice:
     """Say how often each sample comes, and the rate of the channel."""
-    rate = 1.0 / (channel.dt * found.times)
-    text = f"each sample is repeated, {found.times} times in all: the channel's own rate is "
-    return Notice(
-        "repeated-samples",
-        "note",
-        channel.name,
-        f"{text}{rate:.6g} Hz",
-        {"times": float(found.times), "rate": rate},
-        "one of each is used, at that rate",
-    )
+    values = {"times": float(found.times), "rate": 1.0 / (channel.dt * found.times)}
+    return notice("repeated-samples", channel.name, values)
 
 
 def interpolation_notice(channel: Channel) -> Notice | None:
@@ -78,45 +72,35 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     near = float(np.mean(bends <= tuning.NEARLY_STRAIGHT * size)) - share
     if share < max(tuning.FEWEST_STRAIGHT, tuning.BESIDE_STRAIGHT * near, 10.0 * limit / size):
         return None
-    text = f"{share:.2g} of the samples lie on straight lines between others"
     if share < tuning.LEAST_STRAIGHT:
-        values_of = {"share": share}
-        text += ": put there for samples that were lost or sorted out"
-        hint = "make such samples missing (NaN)"
         severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
-        return Notice("filled", severity, channel.name, text, values_of, hint)
+        return notice("filled", channel.name, {"share": share}, severity=severity)
     rate = 0.5 * (1.0 - share) / channel.dt
-    text += f": it was interpolated from about {rate:.3g} Hz, and its noise is not the sensor's"
-    hint = (
-        "record what the sensor gives, in a topic of its own or without the driver's interpolation "
-        "(RealSense: unite_imu_method 0); the channel is skipped in the calibration"
-    )
-    values_of = {"share": share, "rate": rate}
-    return Notice("interpolated", "bad", channel.name, text, values_of, hint)
+    return notice("interpolated", channel.name, {"share": share, "rate": rate})
 
 
-def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, float]:
-    """Share of samples that repeat the one before without being measured, and that of chance.
+def held_samples(channel: Examined) -> Held:
+    """Find samples that repeat the one before without being measured.
 
     Where a packet is lost, recorders write the last sample again. Of measured samples, differences
     of no step are by a power of the ratio more frequent than those of one step by which these are
-    than those of two: 1/3 of a Gaussian law.
-
-    values: (n,), samples in their order, NaN where missing.
-    step: u; 0 if samples are not rounded: then none equals the one before by chance.
-    scatter: Standard deviation of what cannot be predicted of a sample, u.
-    Returns: zeros if chance, with three standard errors, explains those that repeat.
+    than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with three standard errors,
+    explains those that repeat.
     """
+    values, step, scatter = channel.values, channel.step, channel.scatter
+    # Where steps are wide in a part of the values, neighbours are equal by chance in that part.
+    if step != channel.smallest and 2.0 * step >= scatter:
+        return Held()
     sizes = np.diff(values)
     sizes = known_of(np.abs(sizes, out=sizes))
     same = int(np.count_nonzero(sizes == 0.0))
     fewest = max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN)
     if same < fewest:
-        return 0.0, 0.0
+        return Held()
     width = step or tuning.NEAR * scatter
     near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
-    if not is_dithered(known_of(values), step) or not min(one, two):
-        return 0.0, 0.0
+    if not is_dithered(channel.present, step) or not min(one, two):
+        return Held()
     if step == 0.0:
         # Steps that slowly change their size, by a correction, are a lattice all the same: of noise
         # without steps half as many are so near.
@@ -126,28 +110,24 @@ def held_share(values: FloatArray, step: float, scatter: float) -> tuple[float, 
         chance = 0.5 * one / sizes.size * max(one / two, 1.0) ** power
         error = float(np.hypot((1.0 + power) / np.sqrt(one), power / np.sqrt(two)))
     if same - chance * np.exp(3.0 * error) * sizes.size < fewest:
-        return 0.0, 0.0
-    return same / sizes.size - chance, chance
-
-
-def leaves_runs(values: FloatArray) -> bool:
-    """Whether some samples in a row are left where those that repeat the one before are missing.
-
-    Not where every fifth is: a slower sensor in the rows of a faster clock.
-    """
+        return Held()
+    share = same / sizes.size - chance
+    runs = next(stuck(channel), None)
+    if runs is not None and 2.0 * runs.values["samples"] > share * channel.present.size:
+        return Held(0.0, chance)  # most of what is held is held in a few places
+    # A slower sensor in the rows of a faster clock leaves no runs of samples between them.
     ends = np.flatnonzero(np.isnan(values[1:]) | (np.diff(values) == 0.0)) + 1
     longest = np.max(np.diff(ends, prepend=0, append=values.size))
-    return bool(longest > tuning.FEWEST_BETWEEN_HELD)
+    return Held(share, chance, bool(longest <= tuning.FEWEST_BETWEEN_HELD))
 
 
-def held_notice(name: str, share: float, chance: float, *, is_even: bool) -> Notice:
-    """Say how many samples repeat the one before, and whether that is every so manyth."""
-    text = f"{share:.2g} of the samples repeat the one before, where chance explains {chance:.2g}"
-    return Notice(
-        "held",
-        "bad" if share > tuning.HELD_AT_MOST else "warning",
-        name,
-        f"{text}: lost packets, for which the last sample was written again",
-        {"share": share, "chance": chance},
-        "record at the sensor's own rate" if is_even else "make such samples missing (NaN)",
-    )
+def held_or_stuck(channel: Examined) -> Iterator[Notice]:
+    """Say how many samples repeat the one before, or where values stick."""
+    share, chance, is_even = channel.held
+    if share == 0.0:
+        yield from stuck(channel)
+        return
+    severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
+    hint = "record at the sensor's own rate" if is_even else None
+    values = {"share": share, "chance": chance}
+    yield notice("held", channel.name, values, severity=severity, hint=hint)

@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.diagnosis.unmeasured import Copy, find_copies
+from gmwm.diagnosis.copies import Copy, find_copies
 
 RATE = 100.0
 
@@ -107,7 +107,7 @@ def test_a_file_that_has_its_beginning_again_is_calibrated_without_it():
 
 def test_a_file_that_is_mostly_copies_is_refused_with_the_cause():
     x = noise(20_000, 1)
-    with pytest.raises(gmwm.InputError, match="are as earlier ones in every channel"):
+    with pytest.raises(gmwm.InputError, match="repeat earlier ones in every channel"):
         gmwm.calibrate(recorded(np.tile(x, 4)))
 
 

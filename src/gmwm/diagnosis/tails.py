@@ -15,23 +15,23 @@ has a scale and a shape; the mixture has one parameter more.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq, minimize
 
 from gmwm._core.distributions import binom, gennorm, norm, student
-from gmwm._core.notices import Notice
-from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.channel import Examined, Spans
 from gmwm.diagnosis.innovations import Innovations
+from gmwm.issues import Notice, notice
 
 _NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond
 
 
-def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> float:
+def contamination(errors: Innovations, events: Spans) -> float:
     """Share of prediction errors beyond four robust standard deviations, each event counted once.
 
     events: As `gmwm.diagnosis.events.find_events` finds them.
@@ -47,25 +47,6 @@ def contamination(errors: Innovations, events: tuple[tuple[int, int], ...]) -> f
     known = int(np.count_nonzero(errors.known))
     is_chance = bool(binom.sf(count - 1, known, _NOISE) > tuning.FALSE_ALARM)
     return 0.0 if is_chance or count <= tuning.HARMFUL_OUTLIERS * known else count / known
-
-
-def contamination_notice(name: str, share: float) -> Notice | None:
-    """Say how many outliers there are.
-
-    name: Of the channel.
-    share: From `contamination`.
-    """
-    if share == 0.0:
-        return None
-    return Notice(
-        "outliers",
-        "warning",
-        name,
-        f"{per_cent(share)} of the samples are outliers spread over the record, beyond four "
-        f"standard deviations, where noise has {per_cent(_NOISE)}",
-        {"share": share},
-        "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
-    )
 
 
 _Survival = Callable[[FloatArray], FloatArray]
@@ -99,15 +80,11 @@ class Tails:
         )
 
 
-def _student(x: FloatArray, shape: float, scale: float) -> FloatArray:
-    return np.asarray(2.0 * student.sf(x / scale, shape))
-
-
-def _power(x: FloatArray, shape: float, scale: float) -> FloatArray:
-    return np.asarray(2.0 * gennorm.sf(x / scale, shape))
-
-
-_LAWS = {"student": _student, "power": _power}
+_LAWS: dict[str, Callable[[FloatArray, float, float], FloatArray]] = {
+    "student": lambda x, shape, scale: np.asarray(2.0 * student.sf(x / scale, shape)),
+    "power": lambda x, shape, scale: np.asarray(2.0 * gennorm.sf(x / scale, shape)),
+}
+"""Probabilities beyond x, on both sides together."""
 
 
 def heavy_tails(errors: Innovations) -> Tails | None:
@@ -185,35 +162,15 @@ def _most_likely(
     return -float(best.fun), np.asarray(best.x)
 
 
-def tails_notice(name: str, errors: Innovations, tails: Tails | None) -> Notice | None:
-    """Say what the law is, and that nothing has to be done about it.
-
-    name: Of the channel.
-    """
-    if tails is None:
-        return None
-    shape = (
-        f"Student's t with {tails.shape:.2g} degrees of freedom"
-        if tails.law == "student"
-        else f"exp(-|x|^{tails.shape:.2g})"
-    )
-    return Notice(
-        "heavy-tails",
-        "note",
-        name,
-        f"the noise has heavier tails than Gaussian noise, like {shape}, all through: large "
-        "samples are its own and no outliers",
-        {
-            "law": tails.law,
-            "shape": tails.shape,
-            "scale": tails.scale,
-            "kurtosis": _excess_kurtosis(errors),
-        },
-        "nothing is left out; the standard error of the white noise allows for it",
-    )
-
-
-def _excess_kurtosis(errors: Innovations) -> float:
-    there = errors.known & (errors.scale > 0.0)  # none where the channel is dead in part
-    square = (errors.values[there] / errors.scale[there]) ** 2
-    return float(np.mean(square**2) / np.mean(square) ** 2 - 3.0)
+def outliers_or_tails(channel: Examined) -> Iterator[Notice]:
+    """Say how many outliers there are, or that the noise has heavy tails."""
+    tails, errors = channel.tails, channel.errors
+    if channel.outliers > 0.0:
+        yield notice("outliers", channel.name, {"share": channel.outliers}, usual=_NOISE)
+    elif tails is not None:
+        there = errors.known & (errors.scale > 0.0)  # not where the channel is dead in part
+        square = (errors.values[there] / errors.scale[there]) ** 2
+        kurtosis = float(np.mean(square**2) / np.mean(square) ** 2 - 3.0)
+        numbers = {"law": tails.law, "shape": tails.shape, "scale": tails.scale}
+        values = numbers | {"kurtosis": kurtosis}
+        yield notice("heavy-tails", channel.name, values, variant=tails.law)

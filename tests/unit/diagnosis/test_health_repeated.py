@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from examining import examined
 from scipy.signal import lfilter
 
 import gmwm
-from gmwm.diagnosis.unmeasured import held_share
+from gmwm.diagnosis.repeats import held_samples
 from marks import slow
 
 
@@ -144,10 +145,10 @@ def test_chance_explains_equal_neighbours_of_rounded_noise(step, law):
     for seed in range(10):
         noise = getattr(np.random.default_rng(seed), law)(size=5000)
         for values in (noise, np.cumsum(noise), lfilter(np.ones(4), [1.0], noise)):
-            assert held_share(np.rint(values / step) * step, step, 1.0) == (0.0, 0.0)
+            assert held_samples(examined(np.rint(values / step) * step, step=step)).share == 0.0
         # As if the temperature changed a sensitivity: hardly two samples are of one lattice.
         drifting = np.rint(noise / step) * step * (1.0 + 0.05 * np.sin(np.arange(5000) / 800.0))
-        share, _ = held_share(drifting, 0.0, 1.0)
+        share = held_samples(examined(drifting)).share
         assert share < 0.01
 
 
@@ -157,7 +158,7 @@ def test_the_share_of_samples_written_again_is_found(step, error):
     noise = rng.normal(size=5000)
     last = np.where(rng.random(5000) < 0.15, 0, np.arange(5000))
     values = (np.rint(noise / step) * step if step else noise)[np.maximum.accumulate(last)]
-    share, chance = held_share(values, step, 1.0)
+    share, chance, _ = held_samples(examined(values, step=step))
     assert share == pytest.approx(0.15, abs=error)
     assert chance == pytest.approx(0.85 * step / np.sqrt(4.0 * np.pi), abs=0.01)
 

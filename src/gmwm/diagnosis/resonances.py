@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectral.spectrum import Bands, Spectrum
+from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.spectrum import Bands, Spectrum, background, bands, spectrum
+from gmwm.issues import Notice, notice
 from gmwm.process import Resonance
 
 # Logarithms of frequency over that of the band, of damping and of height; background.
@@ -81,18 +82,15 @@ def find_resonances(
 
 def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
     """Say where it is, how damped and how high."""
-    text = (
-        f"a resonance at {bump.frequency:.3g} Hz, damping {bump.damping:.2g}, "
-        f"{brief(bump.ratio)} times its surroundings, {readable(bump.sigma, unit)} rms"
-    )
-    hint = "gmwm calibrate adds a Resonance to the model where it is needed"
-    numbers = {
+    values = {
         "frequency": bump.frequency,
         "damping": bump.damping,
         "ratio": bump.ratio,
         "sigma": bump.sigma,
     }
-    return Notice("resonance", "note", name, text, numbers, hint)
+    return notice(
+        "resonance", name, values, times=brief(bump.ratio), shown=readable(bump.sigma, unit)
+    )
 
 
 def _sides(height: FloatArray, j: int) -> tuple[int, int]:
@@ -208,3 +206,36 @@ def _points(
     kept = count > 0.0
     count = count[kept]
     return place[kept] / count * spectrum.resolution, power[kept] / count, count
+
+
+def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
+    """Lines, and resonances of what they leave.
+
+    values: (n,), samples, NaN where missing.
+    dt: s.
+    Returns: None of a series that is too short, or of which more than half is missing.
+    """
+    if (
+        values.size < tuning.FEWEST_OF_SPECTRUM
+        or np.count_nonzero(~np.isnan(values)) < values.size / 2
+    ):
+        return (), ()
+    power = spectrum(values, dt)
+    if not np.any(power.density > 0.0):
+        return (), ()
+    lines = find_lines(power, background(power, bands(power)))
+    occupied = np.zeros(power.density.size, dtype=bool)
+    for line in lines:
+        margin = (line.stop - line.start) // 2
+        occupied[max(line.start - margin, 0) : line.stop + margin] = True
+    if 2 * np.count_nonzero(occupied) > occupied.size:
+        return lines, ()  # a square wave: hardly anything is left to be a background
+    rest = bands(power, occupied)
+    return lines, find_resonances(power, rest, background(power, rest), occupied)
+
+
+def spectral_notices(
+    name: str, unit: str, lines: tuple[Line, ...], bumps: tuple[Bump, ...]
+) -> list[Notice]:
+    """Say which lines and resonances a channel has."""
+    return [*line_notices(name, unit, lines), *(resonance_notice(name, unit, b) for b in bumps)]

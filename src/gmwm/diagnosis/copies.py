@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gmwm._core.notices import Notice
-from gmwm._core.typing import IntArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.unmeasured.row_keys import MIXED, RowKeys, row_keys
+from gmwm.diagnosis.motion import remembered
+from gmwm.issues import Notice, notice
 from gmwm.readers import Recording
+
+_RowKeys = NDArray[np.uint64]
+
+_MIXED = np.uint64(0x9E3779B97F4A7C15)
+"""2^64 over the golden ratio, odd: neighbouring numbers go far apart (Knuth, *The Art of Computer
+Programming* 3, sec. 6.4)."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,7 @@ class Copy:
     first: int
 
 
+@remembered
 def find_copies(recording: Recording) -> tuple[Copy, ...]:
     """Rows that are there twice: noise does not repeat, a buffer that is sent again does.
 
@@ -34,7 +42,7 @@ def find_copies(recording: Recording) -> tuple[Copy, ...]:
     """
     if not recording.inertial:
         return ()
-    return tuple(_copies(row_keys(channel.values for channel in recording.inertial)))
+    return tuple(_copies(_row_keys(channel.values for channel in recording.inertial)))
 
 
 def first_in_common(one: Recording, other: Recording) -> tuple[float, float] | None:
@@ -46,38 +54,30 @@ def first_in_common(one: Recording, other: Recording) -> tuple[float, float] | N
     ]
     if not shared:
         return None
-    keys = [row_keys(each[name].values for name in shared) for each in (one, other)]
+    keys = [_row_keys(each[name].values for name in shared) for each in (one, other)]
     for copy in _copies(np.concatenate(keys)):
         if copy.first < one.n <= copy.start:
             return copy.first * one.dt, (copy.start - one.n) * other.dt
     return None
 
 
-def copies_notice(found: Sequence[Copy], dt: float) -> Notice | None:
+def copied_rows(recording: Recording) -> Iterator[Notice]:
     """Say how many rows are copies, where the longest stretch of them is and of what."""
+    found, dt = find_copies(recording), recording.dt
     if not found:
-        return None
-    rows = sum(each.stop - each.start for each in found)
+        return
     longest = max(found, key=lambda each: each.stop - each.start)
-    start, first = longest.start * dt, longest.first * dt
-    length = (longest.stop - longest.start) * dt
-    many = f"in {len(found):,} stretches, the longest {length:.6g} s" if found[1:] else "all"
-    text = (
-        f"{rows:,} rows are as earlier ones in every channel, {many} from {start:.6g} s on, as "
-        f"from {first:.6g} s on: noise does not repeat"
-    )
     values = {
-        "samples": float(rows),
+        "samples": float(sum(each.stop - each.start for each in found)),
         "count": float(len(found)),
-        "longest": length,
-        "start": start,
-        "first": first,
+        "longest": (longest.stop - longest.start) * dt,
+        "start": longest.start * dt,
+        "first": longest.first * dt,
     }
-    hint = "look for files joined with an overlap and for buffers that are sent again"
-    return Notice("rows-copied", "warning", "", text, values, hint)
+    yield notice("rows-copied", "", values, variant="several" if found[1:] else "")
 
 
-def _copies(keys: RowKeys) -> Iterator[Copy]:
+def _copies(keys: _RowKeys) -> Iterator[Copy]:
     window = _window(keys)
     anchors, firsts = _seen_before(keys, window)
     done = 0
@@ -92,7 +92,22 @@ def _copies(keys: RowKeys) -> Iterator[Copy]:
         yield Copy(anchor - before, stop, first - before)
 
 
-def _window(keys: RowKeys) -> int:
+def _row_keys(columns: Iterable[FloatArray]) -> _RowKeys:
+    """A number for each row, the same for the same values.
+
+    columns: One at least, of (n,).
+    """
+    keys: _RowKeys = np.zeros(1, dtype=np.uint64)
+    for values in columns:
+        keys = keys ^ np.ascontiguousarray(values, dtype=float).view(np.uint64)
+        # Numbers of few digits differ in their highest bits alone.
+        for _ in range(2):
+            keys *= _MIXED
+            keys ^= keys >> np.uint64(29)
+    return keys
+
+
+def _window(keys: _RowKeys) -> int:
     """Rows that are not the same twice by chance.
 
     Rows of fine samples are hardly ever; where they are coarse or slow, one that is the same makes
@@ -108,7 +123,7 @@ def _window(keys: RowKeys) -> int:
     return tuning.FEWEST_COPIED if is_fine else tuning.FEWEST_COARSE_COPIED
 
 
-def _seen_before(keys: RowKeys, window: int) -> tuple[IntArray, IntArray]:
+def _seen_before(keys: _RowKeys, window: int) -> tuple[IntArray, IntArray]:
     """Rows from which a window is as an earlier one, and where that begins.
 
     Of all windows those are looked at whose number ends in some zero bits: which these are, the
@@ -119,7 +134,7 @@ def _seen_before(keys: RowKeys, window: int) -> tuple[IntArray, IntArray]:
     none = np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     if keys.size <= window:
         return none
-    powers = np.full(keys.size, MIXED)
+    powers = np.full(keys.size, _MIXED)
     np.multiply.accumulate(powers, out=powers)
     sums = np.cumsum(keys * powers)
     # The window that ends at row i, times the power of what comes after it, is the same anywhere.
@@ -135,14 +150,14 @@ def _seen_before(keys: RowKeys, window: int) -> tuple[IntArray, IntArray]:
     return chosen[again] + 1, firsts[again] + 1
 
 
-def _same_before(keys: RowKeys, row: int, first: int, most: int) -> int:
+def _same_before(keys: _RowKeys, row: int, first: int, most: int) -> int:
     """Rows before two that are the same, up to some."""
     most = min(most, first)
     differ = np.flatnonzero(keys[row - most : row] != keys[first - most : first])
     return most - 1 - int(differ[-1]) if differ.size else most
 
 
-def _same_from(keys: RowKeys, row: int, first: int) -> int:
+def _same_from(keys: _RowKeys, row: int, first: int) -> int:
     """Rows from two on that are the same."""
     size = 1 << 10
     while True:

@@ -10,23 +10,27 @@ noise is that of the quietest seconds of the log itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import scipy
 
-from gmwm._core.distributions import chi2
-from gmwm._core.notices import Notice
+from gmwm._core.distributions import chi2, norm
+from gmwm._core.text import brief
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion
-from gmwm.diagnosis.still.blocks import blocks_of
+from gmwm.diagnosis.motion import find_motion, is_moved_with, remembered
+from gmwm.diagnosis.resolution import step_size
+from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _WIDTH = 60  # characters of the timeline
+_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -69,18 +73,14 @@ class Still:
         """Which stretches are used, and how far they reach."""
         listed = ", ".join(f"{start:.4g} to {stop:.4g}" for start, stop in self.stretches[:8])
         more = f" and {len(self.stretches) - 8} more" if len(self.stretches) > 8 else ""
-        text = (
-            f"in motion or vibrating for a part of its {self.duration:.4g} s; at rest from "
-            f"{listed} s{more} |{self.timeline}|: these {self.total:.4g} s are used, and no "
-            f"averaging time is longer than the longest of them, {self.longest:.4g} s"
-        )
         values = {
             "stretches": len(self.stretches),
             "total": self.total,
             "longest": self.longest,
             "duration": self.duration,
         }
-        return Notice("still-stretches", "warning", "", text, values, "slower errors are not seen")
+        listed = f"{listed} s{more}"
+        return notice("still-stretches", "", values, listed=listed, timeline=self.timeline)
 
 
 def find_still(recording: Recording) -> Still:
@@ -261,3 +261,183 @@ def _has_band(values: FloatArray, dt: float) -> bool:
         if strong and np.sum(density[band]) > tuning.SHARE_OF_BAND * total:
             return True
     return False
+
+
+# -- blocks of a recording -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Blocks of a quarter of a second, of the channels that motion can be seen in.
+
+    size: Samples of a block.
+    means, scatter: (blocks, axes), mean and variance of each block, u and u^2; NaN where half is
+        missing.
+    """
+
+    channels: tuple[Channel, ...]
+    size: int
+    means: FloatArray
+    scatter: FloatArray
+
+    @property
+    def length(self) -> float:
+        """Of a block, s."""
+        return self.size * self.channels[0].dt
+
+    @property
+    def is_gyro(self) -> BoolArray:
+        """Which axes are gyros."""
+        return np.array([channel.quantity == "gyro" for channel in self.channels])
+
+    @cached_property
+    def loudness(self) -> Loudness:
+        """When axes scatter more than at their quietest."""
+        step = [step_size(channel.values[~np.isnan(channel.values)]) for channel in self.channels]
+        return loudness(self.scatter, np.array(step))
+
+    @property
+    def loud_stretches(self) -> tuple[tuple[float, float], ...]:
+        """Begin and end of each, s."""
+        edges = np.flatnonzero(np.diff(self.loudness.loud, prepend=False, append=False))
+        times = (self.length * edges).tolist()
+        return tuple(zip(times[::2], times[1::2], strict=True))
+
+
+def vibration(recording: Recording) -> Iterator[Notice]:
+    """Say when a recording vibrates that does not move."""
+    blocks = None if find_motion(recording).moves else blocks_of(recording)
+    stretches = blocks.loud_stretches if blocks is not None else ()
+    if blocks is None or not stretches:
+        return
+    total, ratio = sum(stop - start for start, stop in stretches), blocks.loudness.ratio
+    longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
+    listed = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest))
+    more = f" and {len(stretches) - _LISTED} more" if len(stretches) > _LISTED else ""
+    values = {"stretches": len(stretches), "total": total, "ratio": ratio}
+    yield notice("vibration", "", values, times=brief(ratio), listed=listed + more)
+
+
+@remembered
+def blocks_of(recording: Recording) -> Blocks | None:
+    """The blocks of a recording; None if there are too few, or no channel to be seen in."""
+    size = max(round(tuning.STILL_BLOCK * recording.rate), tuning.FEWEST_OF_MOTION)
+    channels = tuple(
+        channel
+        for channel in recording.inertial
+        if channel.is_of_a_sensor and is_moved_with(channel)
+    )
+    count = recording.n // size
+    if not channels or count < tuning.FEWEST_STILL:
+        return None
+    means, scatter = np.full((2, count, len(channels)), np.nan)
+    for axis, channel in enumerate(channels):
+        blocks = np.asarray(channel.values[: count * size], dtype=float).reshape(count, size)
+        known = np.count_nonzero(~np.isnan(blocks), axis=1)
+        enough = known > size // 2
+        means[enough, axis] = np.nanmean(blocks[enough], axis=1)
+        squares = np.nansum((blocks - means[:, [axis]]) ** 2, axis=1)
+        scatter[enough, axis] = squares[enough] / (known[enough] - 1)
+    seen = np.flatnonzero(np.any(scatter > 0.0, axis=0))
+    if not seen.size:
+        return None
+    return Blocks(tuple(channels[i] for i in seen), size, means[:, seen], scatter[:, seen])
+
+
+# -- stretches that scatter more than others -------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Loudness:
+    """When some axes scatter more than at their quietest.
+
+    loud: (blocks,) of bool.
+    ratio: Largest standard deviation in a loud stretch over that at rest, of any axis.
+    """
+
+    loud: BoolArray
+    ratio: float
+
+
+def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
+    """Find the loud stretches of a recording from the scatter of its blocks.
+
+    scatter: (blocks, axes), variance within each block, u^2; NaN where it is not known.
+    step: (axes,), to which samples are rounded, u; 0 where they are not.
+    Returns: no loud block where their scatter does no harm.
+    """
+    nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
+    # A block that does not scatter at all is dead, not quiet, if all others do by more than a step.
+    smallest = np.nanmin(np.where(scatter > 0.0, scatter, np.inf), axis=0, initial=np.inf)
+    dead = (scatter == 0.0) & (step**2 < smallest)
+    known = np.flatnonzero(~np.any(np.isnan(scatter) | dead, axis=1))
+    count = known.size // tuning.BLOCKS_OF_LEVEL
+    if count < tuning.FEWEST_BLOCKS:
+        return nothing
+    # Noise below a step scatters by up to half of it, only where the level is between two steps.
+    values = np.maximum(scatter[known], step**2 / 4.0)
+    least = np.array([np.min(each[each > 0.0], initial=np.inf) for each in values.T])
+    logs = np.log(np.maximum(values, least)[:, np.isfinite(least)])
+    if not logs.size:
+        return nothing
+    found = [_loud_blocks(series) for series in (*logs.T, np.mean(logs, axis=1))]
+    axes = [axis for axis, (where, _) in enumerate(found[:-1]) if where.any()]
+    # The axes that vibrate know together when they do; else those that do not at the same time.
+    together, _ = _loud_blocks(np.mean(logs[:, axes], axis=1)) if axes else found[-1]
+    chosen = together if together.any() else np.any([where for where, _ in found], axis=0)
+    loud = nothing.loud.copy()
+    loud[known] = chosen
+    level = max((level for where, level in found if where.any()), default=0.0)
+    return Loudness(loud, float(np.exp(0.5 * level)))
+
+
+def _loud_blocks(logs: FloatArray) -> tuple[BoolArray, float]:
+    """Those blocks of one axis that are loud, and the highest of their levels above the lowest."""
+    ends = _changes(logs)
+    levels = np.array([np.median(logs[a:b]) for a, b in pairwise(ends)])
+    lengths = np.diff(ends)
+    long = lengths >= tuning.BLOCKS_OF_LEVEL * tuning.MEDIAN_BLOCKS
+    above = levels - np.min(levels[long]) if np.any(long) else np.zeros(levels.size)
+    loud = above > np.log(tuning.LOUDER_THAN_REST)
+    share = lengths[loud] / logs.size
+    added = float(np.sum(share * np.expm1(above[loud])))
+    lasts = np.max(lengths[loud], initial=0) >= tuning.SHORTEST_STILL / tuning.STILL_BLOCK
+    harms = added > tuning.HARMFUL_SCATTER and (lasts or np.sum(share) > tuning.LEAST_SHAKEN)
+    if not harms:
+        return np.zeros(logs.size, dtype=bool), 0.0
+    # A change that was missed leaves something at rest in a loud stretch.
+    smooth = scipy.ndimage.median_filter(logs, tuning.BLOCKS_OF_FLOOR + 1, mode="nearest")
+    half = np.repeat(np.where(loud, 0.5 * above, np.inf), lengths)
+    return smooth - np.min(levels[long]) > half, float(np.max(above[loud]))
+
+
+def _changes(logs: FloatArray) -> list[int]:
+    """Begin, sudden changes of the level, end: block numbers."""
+    width, lag = tuning.BLOCKS_OF_LEVEL, tuning.MEDIAN_BLOCKS
+    seconds = logs[: logs.size // width * width].reshape(-1, width).mean(axis=1)
+    padded = np.pad(seconds, lag // 2, mode="edge")
+    smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, lag), axis=1)
+    change = smooth[lag:] - smooth[:-lag]
+    scale = float(np.quantile(np.abs(change), tuning.QUIET)) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
+    # The scale is known the less, the shorter the recording.
+    unsure = 1.0 + tuning.FEW_SECONDS / np.sqrt(seconds.size)
+    far = norm.isf(0.5 * tuning.FALSE_ALARM / seconds.size) * tuning.BEYOND_NOISE * unsure
+    sign = np.sign(change) * (np.abs(change) > max(np.log(tuning.LOUDER_THAN_REST), far * scale))
+    edges = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
+    ends = [0]
+    for a, b in pairwise(edges.tolist()):
+        if sign[a]:
+            middle = (a + int(np.argmax(np.abs(change[a:b]))) + lag // 2 + 1) * width
+            split = _split(logs, max(ends[-1], middle - lag * width), middle + lag * width)
+            if split > ends[-1]:
+                ends.append(split)
+    return [*ends, logs.size]
+
+
+def _split(logs: FloatArray, start: int, stop: int) -> int:
+    """Where two levels describe a few seconds best."""
+    part = logs[start:stop]
+    before = np.arange(1, part.size)
+    sums = np.cumsum(part)[:-1]
+    explained = sums**2 / before + (np.sum(part) - sums) ** 2 / (part.size - before)
+    return start + 1 + int(np.argmax(explained))

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import Ge, Le
 
-from gmwm._core.documents import Document
-from gmwm._core.frames import frame
+from gmwm._core.documents import Document, NotNegative, Positive, Rate, Samples, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import SEVERITIES, Notice, Severity
 from gmwm._core.spool import scaled
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, wrapped
-from gmwm.diagnosis.gathered import gathered
+from gmwm.diagnosis import tuning
 from gmwm.errors import InputError, MissingNameError
+from gmwm.issues import SEVERITIES, Notice, Severity, notice
 from gmwm.readers import Recording
 
 if TYPE_CHECKING:
     import pandas
 
-    from gmwm._core.forms import Form
-
 _INDENT = 11
+
+Index = Annotated[int, Ge(0)]
+Share = Annotated[float, Ge(0.0), Le(1.0)]
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,12 @@ class Repetition:
     first: Index of a first one, below ``times``.
     """
 
-    times: int
-    first: int
+    times: Annotated[int, Ge(2)]
+    first: Index
+
+    def __post_init__(self) -> None:
+        if self.first >= self.times:
+            raise ValueError("first is not below times")
 
 
 @dataclass(frozen=True)
@@ -56,24 +62,14 @@ class ChannelHealth:
         channel at its own rate, events those of the recording.
     """
 
-    lines: tuple[tuple[float, float], ...] = ()
-    resonances: tuple[tuple[float, float], ...] = ()
-    events: tuple[tuple[int, int], ...] = ()
-    lsb: float = 0.0
-    outliers: float = 0.0
-    held: float = 0.0
-    noise: float = 0.0
+    lines: tuple[tuple[Positive, NotNegative], ...] = ()
+    resonances: tuple[tuple[Positive, Positive], ...] = ()
+    events: tuple[tuple[Index, Index], ...] = ()
+    lsb: NotNegative = 0.0
+    outliers: Share = 0.0
+    held: Share = 0.0
+    noise: NotNegative = 0.0
     repetition: Repetition | None = None
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> ChannelHealth:
-        """Inverse of `dataclasses.asdict`, after a round trip through JSON and its form."""
-        known = {each.name: content[each.name] for each in fields(cls)}
-        known |= {name: tuple(known[name]) for name in ("lines", "resonances", "events")}
-        repeated = known.pop("repetition")
-        return cls(
-            **known, repetition=repeated and Repetition(repeated["times"], repeated["first"])
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,9 +100,9 @@ class Health(Document, Printed):
 
     notices: tuple[Notice, ...]
     channels: Mapping[str, ChannelHealth]
-    source: str
-    rate: float
-    n: int
+    source: Text
+    rate: Rate
+    n: Samples
 
     def __post_init__(self) -> None:
         freeze(self, "channels")
@@ -188,8 +184,8 @@ class Health(Document, Printed):
                     values[start:stop] = np.nan
                 gone = int(np.count_nonzero(np.isnan(values))) - channel.missing
                 copies = "copies, " if self.of(code="rows-copied") else ""
-                text = f"{gone:,} samples of {copies}spikes, shocks or lost packets left out"
-                notices.append(Notice("events-left-out", "note", name, text, {"samples": gone}))
+                values_of = {"samples": gone}
+                notices.append(notice("events-left-out", name, values_of, copies=copies))
                 channel = replace(channel, values=values)
             channels.append(channel)
         return replace(recording, channels=tuple(channels), notices=tuple(notices))
@@ -215,8 +211,9 @@ class Health(Document, Printed):
             found = [notice for notice in notices if notice.where == where]
             if found:
                 rows += ["", where or "whole recording"]
-            for notice in found:
-                rows += _wrapped(notice)
+            for each in found:
+                text = each.text + (f"; {each.hint}" if each.hint else "")
+                rows += wrapped(text, first=f"  {each.severity:{_INDENT - 2}}", indent=_INDENT)
         return "\n".join(rows)
 
     def to_frame(self) -> pandas.DataFrame:
@@ -224,36 +221,56 @@ class Health(Document, Printed):
         columns = ("where", "code", "severity", "text", "hint", "values")
         return frame((notice.to_dict() for notice in self.notices), columns)
 
+    def derived(self) -> dict[str, Any]:
+        return {"worst": self.worst}
+
     def content(self) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "rate_hz": self.rate,
-            "n": self.n,
-            "worst": self.worst,
-            "notices": [notice.to_dict() for notice in self.notices],
-            "channels": {name: asdict(channel) for name, channel in self.channels.items()},
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.diagnosis.form import HealthForm
-
-        return HealthForm
+        found = super().content()
+        return found | {"rate_hz": found.pop("rate")}
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        return cls(
-            notices=tuple(map(Notice.from_dict, content["notices"])),
-            channels={
-                name: ChannelHealth.from_content(item) for name, item in content["channels"].items()
-            },
-            source=content["source"],
-            rate=content["rate_hz"],
-            n=content["n"],
-        )
+        return super().from_content({"rate": content.get("rate_hz"), **content})
+
+    def check_content(self) -> None:
+        for name, channel in self.channels.items():
+            if any(not 0 <= start < stop <= self.n for start, stop in channel.events):
+                raise ValueError(f"an event of {name} is not an interval of samples")
 
 
-def _wrapped(notice: Notice) -> list[str]:
-    """Severity in front, text and hint beside it."""
-    text = notice.text + (f"; {notice.hint}" if notice.hint else "")
-    return wrapped(text, first=f"  {notice.severity:{_INDENT - 2}}", indent=_INDENT)
+def gathered(notices: Iterable[Notice]) -> list[Notice]:
+    """Lines and resonances that channels share, reported once: by the channel that shows it best.
+
+    A mounting or a power supply is seen by several sensors at the same frequency.
+    """
+    groups: list[list[Notice]] = []
+    for each in notices:
+        group = next((group for group in groups if _is_shared(group, each)), None)
+        if group is None:
+            groups.append([each])
+        else:
+            group.append(each)
+    return [_one(group) if len(group) > 1 else group[0] for group in groups]
+
+
+def _is_shared(group: list[Notice], other: Notice) -> bool:
+    first = group[0]
+    if other.code not in ("line", "resonance") or "count" in other.values:
+        return False
+    if (first.code, first.severity, first.source) != (other.code, other.severity, other.source):
+        return False
+    if "count" in first.values or other.where in (each.where for each in group):
+        return False
+    within = tuning.SHARED_FREQUENCY * first.values["frequency"]
+    return bool(abs(other.values["frequency"] - first.values["frequency"]) < within)
+
+
+def _one(group: list[Notice]) -> Notice:
+    best = max(group, key=lambda each: each.values["ratio"])
+    text = (
+        f"{best.text} (in {best.where}); {len(group)} channels have it: look at the mounting and "
+        "the power supply"
+    )
+    where = ", ".join(each.where for each in group)
+    actions = dict.fromkeys(each.hint for each in group if each.hint)
+    return replace(best, where=where, text=text, hint="; ".join(actions))
