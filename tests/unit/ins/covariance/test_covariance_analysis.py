@@ -140,7 +140,7 @@ def test_a_filter_without_sensor_states():
 
 
 def test_rates_are_those_of_the_increment_that_ends_at_the_epoch_and_at_first_of_the_first():
-    course = Course.of(RICH, IMU)
+    course = Course.of(RICH, IMU).track
     assert course.epoch[0] == 0
     np.testing.assert_array_equal(course.end_rate[0], IMU.rotation[0] / DT)
     np.testing.assert_array_equal(course.end_rate[1:], IMU.rotation[course.epoch[1:] - 1] / DT)
