@@ -123,13 +123,15 @@ def bound_of(
     fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
-    sd = _start(group, problem, model)
+    dominated = (*problem.targets, *problem.region)
+    biases = [max(axis.bias_sd for axis in group)] * len(dominated)
+    sd = start_sd(biases, dominated, model, tuning.INITIAL_SHARE)
     times = (horizon, 10.0 * horizon)
     errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
     tight: list[Predicted | None] = [None] * len(group)
     if form != TIGHTEST and any(found[0].tightness > tuning.LOOSE for found in errors):
         other = dominating(problem, TIGHTEST)
-        start = _start(group, problem, other)
+        start = start_sd(biases, dominated, other, tuning.INITIAL_SHARE)
         tight = [predicted(axis, axis.chain, other, start, times[:1])[0] for axis in group]
     numbers = []
     for axis, target, found, best in zip(group, problem.targets, errors, tight, strict=True):
@@ -138,19 +140,8 @@ def bound_of(
         notices += [] if best is None else _looseness(found[0], best)
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)
-        numbers.append(
-            FilterNumbers(
-                form=form,
-                model=model,
-                horizon=horizon,
-                initial_sd=sd,
-                method="bound",
-                predicted=found,
-                notices=tuple(notices),
-                quantity=axis.quantity,
-                stderr=stderr,
-            )
-        )
+        about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
+        numbers.append(FilterNumbers(*about))
     return tuple(numbers)
 
 
@@ -164,16 +155,19 @@ def _problem(group: Sequence[AxisModel], horizon: float, level: float | None) ->
     return Problem(targets, horizon, tuple(region))
 
 
-def _start(group: Sequence[AxisModel], problem: Problem, model: Model) -> float:
-    """Standard deviation of the bias at the start: the walk, or a constant where there is none."""
-    stationary = Model(tuple(term for term in model.terms if not term.is_walk))
-    walks = len(stationary.terms) < len(model.terms)
-    own = max(axis.bias_sd for axis in group) ** 2
+def start_sd(
+    biases: Sequence[float], spectra: Sequence[RequiredSpectrum], model: Model, slow_share: float
+) -> float:
+    """Standard deviation of the bias at the start: of the walk, or of a constant without one.
+
+    biases: Standard deviations of constant biases, one a spectrum.
+    slow_share: Of the variance of the slow terms that a walk starts with.
+    """
+    still = Model(tuple(term for term in model.terms if not term.is_walk))
+    share = slow_share if len(still.terms) < len(model.terms) else 0.0
     variances = [
-        own
-        + each.constant_sd**2
-        + (tuning.INITIAL_SHARE * each.slow_variance(stationary) if walks else 0.0)
-        for each in (*problem.targets, *problem.region)
+        bias**2 + each.constant_sd**2 + (share * each.slow_variance(still) if share else 0.0)
+        for bias, each in zip(biases, spectra, strict=True)
     ]
     return float(np.sqrt(max(variances)))
 
@@ -282,8 +276,9 @@ def covered_terms_notices(
         ordered = sorted(((share, key) for key, share in shares.items()), reverse=True)
         large = {key: share for share, key in ordered if share > tuning.MENTIONED}
         parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
-        words = {"times": float(np.sqrt(square / alone)) if alone > 0.0 else 0.0, "parts": parts}
-        found.append(notice(code, "", large, variant="more" if alone > 0.0 else "", **words))
+        times = float(np.sqrt(square / alone)) if alone > 0.0 else 0.0
+        variant = "more" if alone > 0.0 else ""
+        found.append(notice(code, "", large, variant=variant, times=times, parts=parts))
     return found
 
 

@@ -16,14 +16,7 @@ from scipy.special import gamma
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers.propagation import held, integrated
-from gmwm.process import (
-    BiasInstability,
-    Process,
-    RateRamp,
-    StateSpace,
-    evaluated,
-    legendre,
-)
+from gmwm.process import BiasInstability, Process, RateRamp, StateSpace, evaluated, legendre
 
 ORDERS = 3
 """Integrals: once, twice and three times."""

@@ -21,8 +21,13 @@ from gmwm.filter_numbers.axes import (
     given_tau,
     per_axis,
 )
-from gmwm.filter_numbers.bound import covered_terms_notices, fit_notices, predicted
-from gmwm.filter_numbers.propagation import Chain
+from gmwm.filter_numbers.bound import (
+    covered_terms_notices,
+    fit_notices,
+    predicted,
+    start_sd,
+)
+from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
 from gmwm.ins.covariance import smallest_score
@@ -131,32 +136,27 @@ class _Search:
     def chain(self, axis: AxisModel) -> Chain:
         return axis.between(self.times[-1]) if self.is_relative else axis.chain
 
-    def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[FilterNumbers]:
-        """Those of axes that share them."""
-        _, model, sd = self.least(group, tau)
+    def required(self, group: Sequence[AxisModel]) -> tuple[RequiredSpectrum, ...]:
         longest = self.times[-1]
-        targets = [RequiredSpectrum.of(a.model, a.dt, longest, a.unit) for a in group]
-        numbers = []
+        return tuple(RequiredSpectrum.of(a.model, a.dt, longest, a.unit) for a in group)
+
+    def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[FilterNumbers]:
+        """The numbers of axes that share them."""
+        _, model, sd = self.least(group, tau)
+        longest, numbers = self.times[-1], []
+        targets = self.required(group)
         for axis, target in zip(group, targets, strict=True):
             found = predicted(axis, self.chain(axis), model, sd, [*self.times, 10.0 * longest])
             # All else that a bound leaves out is part of the truth here.
             notices = [each for each in target.notices if each.code == "ramp-as-constant"]
             notices += _overconfidence(found, longest)
-            notices += _less_white_noise(axis, model)
+            own = float(np.sqrt(axis.model.white_density()))
+            share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
+            notices += [notice("less-white-noise", "", {"share": share})] * (share <= tuning.BELOW)
             notices += covered_terms_notices(axis, target, model, targets)
             notices += fit_notices(axis, None)
-            numbers.append(
-                FilterNumbers(
-                    form=self.form,
-                    model=model,
-                    horizon=longest,
-                    initial_sd=sd,
-                    method="reduce",
-                    predicted=found,
-                    notices=tuple(notices),
-                    quantity=axis.quantity,
-                )
-            )
+            about = (self.form, model, longest, sd, "reduce", found, tuple(notices), axis.quantity)
+            numbers.append(FilterNumbers(*about))
         return numbers
 
     def correlation_time(self, groups: Sequence[Sequence[AxisModel]]) -> float:
@@ -168,34 +168,30 @@ class _Search:
         grid = np.log(self.times[-1] * np.array(tuning.SHARED_TAUS))
         best = int(np.argmin([cost(each) for each in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
-        found = minimize_scalar(
-            cost, bounds=around, method="bounded", options={"xatol": tuning.SHARED_TAU_WITHIN}
-        )
+        options = {"xatol": tuning.SHARED_TAU_WITHIN}
+        found = minimize_scalar(cost, bounds=around, method="bounded", options=options)
         return float(np.exp(found.x))
 
     def least(self, group: Sequence[AxisModel], tau: float | None) -> tuple[float, Model, float]:
         """The least score, its numbers, and the standard deviation of the bias at the start."""
-        start, sd = self._start(group, tau)
+        targets = self.required(group)
+        start, sd = self._start(group, targets, tau)
         names = [name for name in start.params if tau is None or name != "tau"]
         values = np.array([float(start.params[name] or 0.0) for name in names])
 
         def scaled(logs: FloatArray) -> Model:
             return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
 
+        def errors(axis: AxisModel, model: Model) -> list[ChainErrors]:
+            given = (axis.model, model, axis.dt, self.times)
+            chains = self.chain(axis).judged
+            return [c.errors(*given, true_sd=axis.bias_sd, believed_sd=sd) for c in chains]
+
         def score(logs: FloatArray) -> float:
-            model = scaled(logs)
-            errors = [
-                [
-                    chain.errors(
-                        axis.model, model, axis.dt, self.times, true_sd=axis.bias_sd, believed_sd=sd
-                    )
-                    for chain in self.chain(axis).judged
-                ]
-                for axis in group
-            ]
+            by_axis = [errors(axis, scaled(logs)) for axis in group]
             total = 0.0
-            for i in range(max(map(len, errors))):
-                found = [each[i] for each in errors if i < len(each)]
+            for i in range(max(map(len, by_axis))):
+                found = [each[i] for each in by_axis if i < len(each)]
                 # Of all axes together: one that shares its numbers may be conservative, another
                 # overconfident.
                 uneven = np.log(np.mean([each.nees() for each in found], axis=0)) ** 2
@@ -203,31 +199,21 @@ class _Search:
                 total += float(np.sum(mean + tuning.EVENNESS * uneven))
             return total
 
-        starts = [np.zeros(len(names)), *self._with_peaks(group, start, names)]
+        starts = [np.zeros(len(names))]
+        if any(each.code == "fast-peak-left-out" for target in targets for each in target.notices):
+            # A second start, with N read off at the longest time: of quantization of an angle it is
+            # a hundred times that of the bound, with a minimum between.
+            longest = self.times[-1]
+            at = np.array([longest])
+            read = max(2.0 * longest * axis.model.haar_variance(at, axis.dt)[0] for axis in group)
+            factor = float(np.sqrt(read / start.white_density()))
+            starts.append(np.where(np.array(names) == "N", np.log(factor), 0.0))
         least, logs = smallest_score(score, starts)
         return least, scaled(logs), sd
 
-    def _with_peaks(
-        self, group: Sequence[AxisModel], start: Model, names: Sequence[str]
-    ) -> list[FloatArray]:
-        """A second start where a bound leaves a peak out, with N read off at the longest time.
-
-        Of quantization of an angle it is a hundred times that of the bound, with a minimum between.
-        """
-        longest = self.times[-1]
-        notices = [
-            each
-            for axis in group
-            for each in RequiredSpectrum.of(axis.model, axis.dt, longest, axis.unit).notices
-        ]
-        if not any(each.code == "fast-peak-left-out" for each in notices):
-            return []
-        time = np.array([longest])
-        read = max(2.0 * longest * axis.model.haar_variance(time, axis.dt)[0] for axis in group)
-        factor = float(np.sqrt(read / start.white_density()))
-        return [np.where(np.array(names) == "N", np.log(factor), 0.0)]
-
-    def _start(self, group: Sequence[AxisModel], tau: float | None) -> tuple[Model, float]:
+    def _start(
+        self, group: Sequence[AxisModel], targets: tuple[RequiredSpectrum, ...], tau: float | None
+    ) -> tuple[Model, float]:
         """A bound with given correlation times, without zeros; standard deviation at the start.
 
         Without a walk it lies above the models from the frequency of the longest time on: below, a
@@ -235,20 +221,12 @@ class _Search:
         search.
         """
         longest = self.times[-1]
-        targets = tuple(RequiredSpectrum.of(a.model, a.dt, longest, a.unit) for a in group)
         lowest = 0.0 if "K" in self.form else 0.5 / np.pi / longest
-        problem = Problem(targets, longest, lowest=lowest)
         taus = [factor * longest for factor in _TIMES[self.form]] if tau is None else [tau]
+        problem = Problem(targets, longest, lowest=lowest)
         model = with_correlation_times(problem, self.form, taus)
-        still = Model(tuple(term for term in model.terms if not term.is_walk))
-        walks = len(still.terms) < len(model.terms)
-        variances = [
-            axis.bias_sd**2
-            + target.constant_sd**2
-            + (target.slow_variance(still) if walks else 0.0)
-            for axis, target in zip(group, targets, strict=True)
-        ]
-        return model, float(np.sqrt(max(variances)))
+        biases = [axis.bias_sd for axis in group]
+        return model, start_sd(biases, targets, model, slow_share=1.0)
 
 
 def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:
@@ -263,10 +241,3 @@ def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:
         return [notice("optimistic", "", values, severity="note", variant="beyond", hint=hint)]
     hint = "use gmwm.bound, a form with more terms, or own numbers of each axis"
     return [notice("optimistic", "", values, variant="reduce", hint=hint)]
-
-
-def _less_white_noise(axis: AxisModel, model: Model) -> list[Notice]:
-    """Whether the filter's white noise is less than that of the error model."""
-    own = float(np.sqrt(axis.model.white_density()))
-    share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
-    return [notice("less-white-noise", "", {"share": share})] if share <= tuning.BELOW else []

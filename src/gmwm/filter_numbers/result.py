@@ -10,15 +10,7 @@ from annotated_types import MaxLen, MinLen
 from pydantic import Field
 
 from gmwm._core import checks
-from gmwm._core.documents import (
-    Document,
-    NoneIs,
-    NotNegative,
-    Positive,
-    Rate,
-    Text,
-    plain_schema,
-)
+from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text, plain_schema
 from gmwm._core.frozen import freeze
 from gmwm._core.tables import cell, frame, plain_table
 from gmwm._core.text import WIDTH, Printed, bullets, wrapped

@@ -6,14 +6,7 @@ from dataclasses import FrozenInstanceError, replace
 import pytest
 
 import gmwm
-from gmwm import (
-    FilterNumbers,
-    GaussMarkov,
-    InputError,
-    RandomWalk,
-    SensorNumbers,
-    WhiteNoise,
-)
+from gmwm import FilterNumbers, GaussMarkov, InputError, RandomWalk, SensorNumbers, WhiteNoise
 from gmwm.filter_numbers import Predicted
 from gmwm.issues import Notice
 

@@ -13,14 +13,7 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import Aids, KeptCovariances, Track, run_jointly
-from gmwm.ins.filter import (
-    NAVIGATION,
-    Filter,
-    Outputs,
-    SensorStates,
-    modified,
-    unmodified,
-)
+from gmwm.ins.filter import NAVIGATION, Filter, Outputs, SensorStates, modified, unmodified
 from gmwm.ins.filter.filter_arrays import Sensors
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, t
 
-from gmwm import (
-    AR,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-)
+from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
 from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
