@@ -444,8 +444,12 @@ _INS = (
     Issue("biases-assumed", "{text}", topic="navigation"),
     Issue("columns-unused", "{text}", topic="navigation"),
     Issue("consistent", "{text}", severity="good", topic="navigation"),
-    Issue("diverged", "{text}", severity="bad", topic="navigation"),
-    Issue("fewer-runs", "{text}", severity="warning", topic="navigation"),
+    Issue("diverged", {
+        "": "{text}",
+        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
+    }, severity="bad", topic="navigation"),
+    Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
+          "this length that do not overlap", severity="warning", topic="navigation"),
     Issue("fixes-left-out", "{text}", topic="navigation"),
     Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
     Issue("heading", "{text}", topic="navigation"),

@@ -17,9 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    PATH,
     estimating_options,
     memory_option,
     models_of_channels,
+    option,
     output_folder,
     part_options,
     printing_options,
@@ -50,9 +52,21 @@ _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
 _OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", "counts", "gravity", "swapped",
-)  # fmt: skip
+    "not-static",
+    "tilt",
+    "rate-changes",
+    "rounding",
+    "saturation",
+    "abrupt-end",
+    "stuck",
+    "held",
+    "filled",
+    "value-repeated",
+    "variance",
+    "counts",
+    "gravity",
+    "swapped",
+)
 """Codes of notices of a fit that are those of the recording."""
 
 
@@ -64,27 +78,34 @@ def output_option(default: str) -> Callable[[Any], Any]:
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @output_option("gmwm-out")
 @reading_options
 @part_options
 @estimating_options
-@click.option("--remove-departures", is_flag=True,
-              help="Subtract steps, transients at the start and slow periods that are found, and "
-                   "calibrate what is left.")  # fmt: skip
-@click.option(
-    "--export",
-    "target",
-    metavar="NAME",
-    help="Also write the file of this program into the folder; see gmwm export --list.",
+@option(
+    "--remove-departures",
+    "Subtract steps, transients at the start and slow periods that are found, and "
+    "calibrate what is left.",
 )
-@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
-              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
-                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Processes at most; short recordings take one.")  # fmt: skip
-@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
+@option(
+    "--export NAME",
+    "Also write the file of this program into the folder; see gmwm export --list.",
+    name="target",
+)
+@option(
+    "--datasheet YAML",
+    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
+    "of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
+    type=PATH,
+)
+@option(
+    "--jobs N",
+    "Processes at most; short recordings take one.",
+    type=click.IntRange(min=1),
+    default=2,
+)
+@option("--timings", "Print where the time went, stage by stage.")
 @memory_option
 @printing_options
 def calibrate(
@@ -123,10 +144,10 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
-        from gmwm._core.runs import beside, spare
+        from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm._core.memory import limited

@@ -6,11 +6,6 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 """
 
 from gmwm._core.units import AUXILIARY as AUXILIARY
-from gmwm.readers.at_rest import (
-    block_means as block_means,
-    steady_turn as steady_turn,
-    turning_gravity as turning_gravity,
-)
 from gmwm.readers.cells import DATE as DATE, seconds_of as seconds_of
 from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES
 from gmwm.readers.csv_table import CsvTable as CsvTable
@@ -32,3 +27,8 @@ from gmwm.readers.recording import (
 )
 from gmwm.readers.table import label as label
 from gmwm.readers.text_file import content_size as content_size
+from gmwm.readers.turning import (
+    block_means as block_means,
+    steady_turn as steady_turn,
+    turning_gravity as turning_gravity,
+)

@@ -17,7 +17,6 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.at_rest import rest_notices, turn_notices
 from gmwm.readers.binary import BinaryTable, layout_of
 from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import (
@@ -43,6 +42,7 @@ from gmwm.readers.formats import (
 from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
+from gmwm.readers.rest import rest_notices
 from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
 from gmwm.readers.spool import load_columns
 from gmwm.readers.table import Table, column_of
@@ -197,9 +197,6 @@ def part_of(table: Table, given: Given) -> Part:
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
     used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
-    sharing = next((n.values["rows"] for n in clock_notices if n.code == "stamps-in-bursts"), 0)
-    may_turn = roles.time is not None and 1 < sharing <= tuning.MOST_IN_TURNS
-    is_even = may_turn and _are_groups(arrays[roles.time or 0], sharing)
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -222,12 +219,9 @@ def part_of(table: Table, given: Given) -> Part:
         recording,
         unit_of,
         given.units,
-        isinstance(given.channels, Mapping),
+        are_columns_given=isinstance(given.channels, Mapping),
         has_layout=isinstance(table, BinaryTable),
     )
-    if may_turn:
-        telling = _telling(table, roles, sharing)
-        at_rest = (*turn_notices(recording, sharing, telling, is_even=is_even), *at_rest)
     recording = replace(
         recording,
         channels=(*recording.channels, *further),
@@ -256,26 +250,6 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
                 "turns: keep those of one",
                 "several-sensors",
             )
-
-
-def _are_groups(stamps: FloatArray, rows: int) -> bool:
-    """Whether so many rows in turn have one stamp all through."""
-    sizes = np.diff(np.flatnonzero(np.diff(stamps, prepend=np.nan, append=np.nan) != 0.0))
-    return bool(np.mean(sizes == rows) > tuning.TURNS_ALIKE)
-
-
-def _telling(table: Table, roles: Roles, rows: int) -> list[str]:
-    """Columns without a role whose numbers come in turns, one to each row of a stamp."""
-    used, found = {*roles.columns, *(column.index for column in roles.auxiliary)}, []
-    for index in range(len(table.names)):
-        try:
-            values = table.load([index])[index] if index not in used else np.zeros(0)
-        except (InputError, KeyError):  # of words
-            continue
-        turn = values[:-rows] == values[rows:]
-        if np.unique(values[:rows]).size == rows and np.mean(turn) > tuning.TURNS_ALIKE:
-            found.append(column_of(table, index))
-    return found
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

@@ -72,11 +72,13 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
         "trusted": [row["name"] for row in rows if row["valid"]],
         "causes": [(", ".join(names), why) for why, names in _causes(calibration).items()],
         "rows": rows,
-        "bounds": {"B": any(map(_is_bound, (row["B"] for row in rows))),
-                   "N or K": any(map(_is_bound, values))},
+        "bounds": {
+            "B": any(map(_is_bound, (row["B"] for row in rows))),
+            "N or K": any(map(_is_bound, values)),
+        },
         "parameters": parameters_sentence(calibration),
         "boxes": boxes,
-    }  # fmt: skip
+    }
 
 
 def _causes(calibration: Calibration) -> dict[str, list[str]]:

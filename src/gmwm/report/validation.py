@@ -12,7 +12,7 @@ import numpy as np
 
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
-from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
 from gmwm.report.text import model_text
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm._core.runs import do_runs, runs as engine
+from gmwm._core import runs as engine
+from gmwm._core.runs import do_runs
 
 STUDY = {"name": "squares", "seed": 1}
 

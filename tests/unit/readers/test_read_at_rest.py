@@ -92,13 +92,8 @@ def test_a_bias_of_one_degree_per_second_is_no_gravity(write):
     [
         ("deg/s", "rad/s", {}),  # the noise
         ("deg/s", "rad/s", {"gyro": 5e-5, "bias": (0.02, 0.0, 0.01)}),  # the mean
-        ("deg/s", "rad/s", {"gyro": 5e-5, "bias": (0.0, 0.0, 1e-3), "turn": 0.1}),  # gravity
-        ("rad/s", "deg/s", {"turn": 0.1}),
         ("mdeg/s", "deg/s", {}),
         ("deg/h", "deg/s", {"gyro": 1e-5, "bias": (1e-4, 0.0, 1e-4)}),
-        ("rad/s", "deg/s", {"gyro": 1e-4, "bias": (0.03, 0.0, 0.02)}),  # too quiet for its mean
-        ("deg/s", "rad/s", {"gyro": 3e-7, "bias": (0.6 * EARTH, 0.0, 0.8 * EARTH)}),  # the earth
-        ("rad/s", "deg/s", {"gyro": 3e-7, "bias": (0.6 * EARTH, 0.0, 0.8 * EARTH)}),
     ],
 )
 @pytest.mark.parametrize("is_given", [False, True])
@@ -113,36 +108,6 @@ def test_a_gyro_in_another_unit_is_suspected(write, true, read_as, quality, is_g
     # Of milli-degrees per second and degrees per hour there is a factor of 3.6 between.
     assert true in found.hint
     assert factor(found.values["likely"], true) == pytest.approx(1.0, abs=0.75)
-
-
-@pytest.mark.parametrize(
-    ("true", "quality", "said"),
-    [
-        (
-            "rad/s",
-            {"gyro": 1e-4, "bias": (0.0, 0.0, 0.0)},
-            "1.6e-06 deg/sqrt(h) is less than gyros",
-        ),
-        ("rad/s", {"gyro": 3e-6, "bias": (1e-4, 0.0, 1e-4)}, "is less than gyros have"),
-        ("deg/s", {"gyro": 1e-4}, "is that of a navigation gyro, which reads the earth's 15 deg/h"),
-        ("deg/s", {"gyro": 3e-5, "bias": (2e-3, 0.0, 0.0)}, "the mean rate is 0.115 deg/h"),
-    ],
-)
-def test_a_cheap_gyro_in_degrees_per_hour_is_too_good(write, true, quality, said):
-    rows = in_units(imu(**quality), true, "g")
-    (found,) = notices(read(write(rows, header("deg/h", "g")), rate=100.0))
-    assert (found.code, found.severity) == ("gyro-unit", "warning")
-    assert said in found.text and true in found.hint
-
-
-def test_a_navigation_gyro_of_one_axis_or_without_its_mean_is_right(write):
-    rows = imu(gyro=3e-8, bias=(0.4 * EARTH, 0.0, 0.0))
-    for columns, mean in (([0, 3, 4, 5], 0.0), (range(6), rows[:, :3].mean(axis=0))):
-        part = rows.copy()
-        part[:, :3] -= mean
-        names = [NAMES[column] for column in columns]
-        path = write(in_units(part, "deg/h", "g")[:, columns], header("deg/h", "g", names))
-        assert not notices(read(path, rate=100.0))
 
 
 def test_a_rate_that_no_unit_explains(write):
@@ -192,42 +157,6 @@ def test_counts_of_an_accelerometer(write):
     rows[4999, 3:] += 0.5
     recording = read(write(rows[:, 3:5], header("", "m/s^2", NAMES[3:5])), rate=100.0)
     assert "counts" not in {each.code for each in recording.notices}
-
-
-@pytest.mark.parametrize(
-    ("column", "is_in", "stated", "times"),
-    [
-        (1, "deg/s", "rad/s", 57.3), (2, "rad/s", "deg/s", 1 / 57.3), (0, "mdeg/s", "deg/s", 1e3),
-        (3, "g", "m/s^2", 1 / 9.807),
-    ],
-)  # fmt: skip
-def test_one_axis_in_another_unit(write, column, is_in, stated, times):
-    units = (stated, "m/s^2") if column < 3 else ("deg/s", stated)
-    rows = in_units(imu(gyro=7e-5, bias=(0.0, 0.0, 0.0)), *units)
-    path = write(rows, header(*units))
-    assert "axis-unit" not in {each.code for each in read(path, rate=100.0).notices}
-    rows[:, column] /= factor(is_in, "rad/s" if column < 3 else "m/s^2")
-    rows[:, column] *= factor(stated, "rad/s" if column < 3 else "m/s^2")
-    recording = read(write(rows, header(*units)), rate=100.0)
-    (found,) = [each for each in recording.notices if each.code == "axis-unit"]
-    assert found.where == NAMES[column] and found.severity == "warning"
-    assert found.values["ratio"] == pytest.approx(times, rel=0.05)
-    assert found.values["likely"] == is_in
-    # Of two axes as well.
-    if column == 1:
-        recording = read(write(rows[:, :2], header(*units, NAMES[:2])), rate=100.0)
-        assert found.where in {e.where for e in recording.notices if e.code == "axis-unit"}
-
-
-@pytest.mark.parametrize("sensor", ["gyro", "accel"])
-def test_axes_of_unequal_noise_are_no_units(write, sensor):
-    rng, wrong = np.random.default_rng(4), 0
-    names = [name for name in NAMES if name.startswith(sensor)]
-    for _ in range(100):
-        rows = 1e-3 * np.exp(rng.uniform(-np.log(5), np.log(5), 3)) * rng.normal(size=(500, 3))
-        recording = read(write(rows, header("rad/s", "m/s^2", names)), rate=100.0)
-        wrong += "axis-unit" in {each.code for each in recording.notices}
-    assert wrong <= (0 if sensor == "gyro" else 2)
 
 
 def test_missing_axes_and_samples_are_survived(write):

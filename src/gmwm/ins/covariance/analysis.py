@@ -12,12 +12,24 @@ from scipy.linalg import block_diag, eigh
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.joint_kernels import Aids, KeptCovariances, Track, run_jointly
-from gmwm.ins.filter import NAVIGATION, Filter, Outputs, SensorStates, modified, unmodified
-from gmwm.ins.filter.filter_arrays import Sensors
+from gmwm.ins.covariance.joint_kernels import (
+    JointFilter,
+    KeptCovariances,
+    Track,
+    run_jointly,
+)
+from gmwm.ins.filter import (
+    NAVIGATION,
+    Filter,
+    Kinematics,
+    Outputs,
+    SensorStates,
+    modified,
+    unmodified,
+)
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.issues import Notice, notice
 
 _ALL, _POSITION = slice(None), slice(0, 3)
@@ -134,27 +146,17 @@ class Course:
         asked = scenario.aiding.without(scenario.outages).events(trajectory.dt, trajectory.n).epoch
         # Every epoch that is asked for, and none more than a stride apart.
         marks = np.union1d(asked, np.append(outputs.epoch, [0, trajectory.n]))
-        ends = [[0], *(np.append(np.arange(a + stride, b, stride), b) for a, b in pairwise(marks))]
-        epoch: IntArray = np.concatenate(ends).astype(np.int64)
+        between = [np.append(np.arange(a, b, stride), b)[1:] for a, b in pairwise(marks)]
+        epoch: IntArray = np.concatenate([np.zeros(1, dtype=np.int64), *between])
         samples = np.diff(epoch, prepend=0)
         # The middle of an odd number of samples lies between two epochs.
         early = epoch - samples + samples // 2
         late = early + samples % 2
-
-        def middle(values: FloatArray) -> FloatArray:
-            return np.ascontiguousarray(0.5 * (values[early] + values[late]))
-
-        track = Track(
-            epoch=epoch,
-            samples=samples,
-            dt=trajectory.dt,
-            mid_matrix=middle(matrix_from_rpy(trajectory.rpy)),
-            mid_v=middle(trajectory.velocity),
-            mid_lla=middle(trajectory.lla),
-            end_matrix=matrix_from_rpy(trajectory.rpy[epoch]),
-            end_v=np.ascontiguousarray(trajectory.velocity[epoch]),
-            end_rate=imu.rotation[np.maximum(epoch - 1, 0)] / trajectory.dt,
-        )
+        motion = (matrix_from_rpy(trajectory.rpy), trajectory.velocity, trajectory.lla)
+        middle = (np.ascontiguousarray(0.5 * (each[early] + each[late])) for each in motion)
+        end = (np.ascontiguousarray(each[epoch]) for each in motion)
+        rate = imu.rotation[np.maximum(epoch - 1, 0)] / trajectory.dt
+        track = Track(epoch, samples, trajectory.dt, Kinematics(*middle), Kinematics(*end), rate)
         return cls(scenario, outputs, track)
 
     def analyse(self, truth: SensorModels, believed: SensorModels) -> Analysis:
@@ -166,38 +168,33 @@ class Course:
         events = aiding.events(dt, scenario.trajectory.n)
         initial = scenario.trajectory.state(0)
         table, joint = ready.states, _joint(ready.states, real.states)
-        m = table.m
         P = ready.covariance(initial, scenario.initial_sd)
         start = modified(np.diag(scenario.initial_sd.deviations**2), initial.velocity)
         J = block_diag(start, joint.covariance + np.outer(joint.mean, joint.mean))
-        kept = KeptCovariances(
-            self.outputs.epoch,
-            self.outputs.before,
-            np.empty((self.outputs.epoch.size, *P.shape)),
-            np.empty((self.outputs.epoch.size, *J.shape)),
+        size = self.outputs.epoch.size
+        out_P, out_J = np.empty((size, *P.shape)), np.empty((size, *J.shape))
+        kept = KeptCovariances(self.outputs.epoch, self.outputs.before, out_P, out_J)
+        estimate, true = (
+            np.where(places >= 0, places + first, -1)
+            for places, first in (
+                (ready.noise_states, NAVIGATION),
+                (real.noise_states, NAVIGATION + table.m),
+            )
         )
-        aids = Aids(
-            events.epoch,
-            events.kind,
-            events.sd,
-            _shifted(ready.coloured, NAVIGATION),
-            _shifted(real.coloured, NAVIGATION + m),
-            ready.lever_arm,
-            ready.second_order,
-        )
-        run_jointly(self.track, P, _arrays(table), J, _arrays(joint), aids, kept)
+        noises = (estimate, true, ready.lever_arm, ready.second_order)
+        run_jointly(self.track, events, JointFilter(table.table, joint.table, *noises), P, J, kept)
         index, nine = self.outputs.epoch, slice(0, NAVIGATION)
         velocity = scenario.trajectory.velocity[index]
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
-        believed_sum, joint_sum = _sums(table), _sums(joint)
+        believed_sum, joint_sum = table.sums, joint.sums
         found = Analysis(
             time=self.outputs.time(dt),
             before=self.outputs.before == 1,
-            predicted=unmodified(kept.P[:, nine, nine], velocity),
-            actual=unmodified(kept.J[:, nine, nine], velocity),
-            sensor_predicted=believed_sum @ kept.P[:, NAVIGATION:, NAVIGATION:] @ believed_sum.T,
-            sensor_actual=joint_sum @ kept.J[:, NAVIGATION:, NAVIGATION:] @ joint_sum.T,
+            predicted=unmodified(out_P[:, nine, nine], velocity),
+            actual=unmodified(out_J[:, nine, nine], velocity),
+            sensor_predicted=believed_sum @ out_P[:, NAVIGATION:, NAVIGATION:] @ believed_sum.T,
+            sensor_actual=joint_sum @ out_J[:, NAVIGATION:, NAVIGATION:] @ joint_sum.T,
         )
         ends = [outage.end for outage in scenario.outages]
         return replace(found, notices=tuple(_too_large(found, ends)))
@@ -240,41 +237,28 @@ def _too_large(found: Analysis, ends: Sequence[float]) -> Iterator[Notice]:
             )
 
 
-def _shifted(places: IntArray, first: int) -> IntArray:
-    """Places of sensor states in a whole vector; -1 stays."""
-    return np.where(places >= 0, places + first, -1)
-
-
-def _arrays(states: SensorStates) -> Sensors:
-    """The table of states for kernels."""
-    names = Sensors._fields[2:]
-    return Sensors(np.zeros(7, dtype=np.int64), False, *(getattr(states, each) for each in names))
-
-
 def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
     """Estimated states, which nothing but the filter moves, and then the true ones."""
 
     def both(first: FloatArray, second: FloatArray) -> FloatArray:
         return np.concatenate([first, second], axis=-1)
 
-    still = np.zeros_like(believed.noise)
-    return replace(
-        truth,
+    own, real = believed.table, truth.table
+    still = np.zeros_like(own.noise)
+    return SensorStates(
         names=(*believed.names, *truth.names),
-        axis=np.append(believed.axis, truth.axis),
-        output=np.append(-believed.output, truth.output),
-        partner=np.append(believed.partner, truth.partner + believed.m),
         mean=np.append(believed.mean, truth.mean),
         covariance=block_diag(np.zeros((believed.m, believed.m)), truth.covariance),
-        phi=both(believed.phi, truth.phi),
-        phi_off=both(believed.phi_off, truth.phi_off),
-        gain=both(-believed.gain, truth.gain),
-        noise=both(still, truth.noise),
-        noise_off=both(still, truth.noise_off),
-        cross=both(still, truth.cross),
+        table=real._replace(
+            paired=own.paired or real.paired,
+            axis=np.append(own.axis, real.axis),
+            output=np.append(-own.output, real.output),
+            partner=np.append(own.partner, real.partner + believed.m),
+            phi=both(own.phi, real.phi),
+            phi_off=both(own.phi_off, real.phi_off),
+            gain=both(-own.gain, real.gain),
+            noise=both(still, real.noise),
+            noise_off=both(still, real.noise_off),
+            cross=both(still, real.cross),
+        ),
     )
-
-
-def _sums(table: SensorStates) -> FloatArray:
-    """Matrix (6, m) that adds up the states of each sensor."""
-    return np.where(table.axis == np.arange(6)[:, None], table.output, 0.0)

@@ -16,21 +16,21 @@ from typing import NamedTuple
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.ins.filter import (
-    IS_HEIGHT,
-    IS_POSITION,
-    IS_VELOCITY,
-    IntArray,
+    IS_GNSS,
+    Events,
+    Kinematics,
+    SensorTable,
     excess,
-    measurement_row,
     measurement_update,
-    noise_state,
+    new_scratch,
+    new_transition,
+    observe,
     propagate,
     tilt_squared,
     transition,
 )
-from gmwm.ins.filter.filter_arrays import Sensors
 from gmwm.ins.geometry import gravity
 
 
@@ -49,36 +49,32 @@ class Track(NamedTuple):
     epoch, samples: (S + 1,), epoch at the end of each step, and samples of the step that leads
         there (none to the first).
     dt: Sampling interval, s.
-    mid_matrix, mid_v, mid_lla: Attitude, velocity and position in the middle of each step.
-    end_matrix, end_v, end_rate: Attitude, velocity and angular rate (body axes, rad/s) at its end.
+    middle, end: Arrays of the true motion in the middle of each step, and at its end.
+    rate: (S + 1, 3), angular rate at the end, body axes, rad/s.
     """
 
     epoch: IntArray
     samples: IntArray
     dt: float
-    mid_matrix: FloatArray
-    mid_v: FloatArray
-    mid_lla: FloatArray
-    end_matrix: FloatArray
-    end_v: FloatArray
-    end_rate: FloatArray
+    middle: Kinematics
+    end: Kinematics
+    rate: FloatArray
 
 
-class Aids(NamedTuple):
-    """Measurements in order of time, and how the filter takes them.
+class JointFilter(NamedTuple):
+    """A navigation filter beside the truth.
 
-    epoch, kind, sd: (E,), (E,), (E, 3).
-    coloured, true_coloured: (4,), places in the joint vector of the estimated and the true coloured
-        noise of the north, east and down position and of the height; -1 for none.
+    table, joint: Sensor states of the filter, and of the joint vector.
+    estimate, truth: (kinds, 3), places in the joint vector of the estimated and the true slow noise
+        of each measurement; -1 for none.
     lever: (3,), m.
     second_order: Whether products of errors are allowed for.
     """
 
-    epoch: IntArray
-    kind: IntArray
-    sd: FloatArray
-    coloured: IntArray
-    true_coloured: IntArray
+    table: SensorTable
+    joint: SensorTable
+    estimate: IntArray
+    truth: IntArray
     lever: FloatArray
     second_order: bool
 
@@ -102,8 +98,7 @@ def update_jointly(
     """Update the joint second moments by a scalar measurement with a given gain, in place.
 
     h: (n,), row of the integrals.
-    estimate, truth: Places of the estimated and the true coloured noise of the measurement; -1 for
-        none.
+    estimate, truth: Places of the estimated and the true slow noise of the measurement, or -1.
     variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
@@ -187,53 +182,44 @@ def aid_jointly(
 
 @compiled()
 def run_jointly(
-    track: Track, P: FloatArray, table: Sensors, J: FloatArray, joint: Sensors, aids: Aids,
+    track: Track, events: Events, about: JointFilter, P: FloatArray, J: FloatArray,
     kept: KeptCovariances,
 ) -> None:  # fmt: skip
-    """Propagate a navigation filter's covariance and the joint second moments along a trajectory.
-
-    table, joint: Sensor states of the filter, and of the joint vector.
-    """
-    n, size = P.shape[0], J.shape[0]
-    F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
-    S, T, U, row = np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n)
-    j_S, j_T, j_row = np.zeros((6, size)), np.zeros((9, size)), np.zeros(size)
-    h, gain, x = np.zeros(9), np.zeros(n), np.zeros(n)
+    """Propagate P and J of a navigation filter along a trajectory."""
+    change, scratch, j_scratch = new_transition(), new_scratch(P.shape[0]), new_scratch(J.shape[0])
+    h, gain, x = np.zeros(9), np.zeros(P.shape[0]), np.zeros(P.shape[0])
     event = out = 0
     gathered = j_gathered = 0.0
     for s in range(track.epoch.size):
-        epoch, c = track.epoch[s], track.samples[s]
-        if c > 0:
-            step, lla = c * track.dt, track.mid_lla[s]
-            transition(track.mid_v[s], lla, track.mid_matrix[s], step, F, A, B)
-            t, j = table, joint
-            propagate(P, A, B, t.axis, t.partner, t.phi[c], t.phi_off[c], t.gain[c], t.noise[c],
-                  t.noise_off[c], t.cross[c], t.integral[c], S, T, U, row)  # fmt: skip
-            propagate(J, A, B, j.axis, j.partner, j.phi[c], j.phi_off[c], j.gain[c], j.noise[c],
-                  j.noise_off[c], j.cross[c], j.integral[c], j_S, j_T, U, j_row)  # fmt: skip
-            if aids.second_order:
-                g = gravity(lla[0], lla[2])
+        epoch, count = track.epoch[s], track.samples[s]
+        if count > 0:
+            middle = Kinematics(track.middle.C[s], track.middle.v[s], track.middle.lla[s])
+            step = count * track.dt
+            transition(middle, step, change)
+            propagate(P, change, about.table, count, scratch)
+            propagate(J, change, about.joint, count, j_scratch)
+            if about.second_order:
+                g = gravity(middle.lla[0], middle.lla[2])
                 gathered = tilt_squared(P, g, step, gathered)
                 j_gathered = tilt_squared(J, g, step, j_gathered)
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
             kept.P[out], kept.J[out] = P, J
             out += 1
-        attitude = P[6, 6] + P[7, 7] + P[8, 8] if aids.second_order else 0.0
-        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if aids.second_order else 0.0
-        while event < aids.epoch.size and aids.epoch[event] == epoch:
-            kind = aids.kind[event]
-            for component in range(1 if kind == IS_HEIGHT else 3):
-                sd = aids.sd[event, component]
+        attitude = P[6, 6] + P[7, 7] + P[8, 8] if about.second_order else 0.0
+        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if about.second_order else 0.0
+        end = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s])
+        while event < events.epoch.size and events.epoch[event] == epoch:
+            kind, value = events.kind[event], events.value[event]
+            for component in range(3):
+                sd = events.sd[event, component]
                 if not sd > 0.0:
                     continue
-                measurement_row(kind, component, track.end_matrix[s], track.end_v[s],
-                                track.end_rate[s], aids.lever, h)  # fmt: skip
-                estimate = noise_state(kind, component, aids.coloured)
-                truth = noise_state(kind, component, aids.true_coloured)
+                observe(kind, component, value, end, track.rate[s], about.lever, h)
+                estimate, truth = about.estimate[kind, component], about.truth[kind, component]
                 expected = sd * sd + excess(P, h, attitude)
                 measurement_update(P, h, estimate, expected, 0.0, x, gain)
                 update_jointly(J, h, estimate, truth, sd * sd + excess(J, h, j_attitude), gain)
-            if kind in (IS_POSITION, IS_VELOCITY):
+            if IS_GNSS[kind]:
                 gathered = j_gathered = 0.0
             event += 1
         while out < kept.epoch.size and kept.epoch[out] == epoch:

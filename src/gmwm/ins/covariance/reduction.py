@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,10 +16,10 @@ from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.analysis import Analysis, Course
+from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.ins.trajectory import Trajectory, fixed_wing_loiter
 from gmwm.issues import Notice, notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
@@ -171,7 +172,13 @@ def reduce(
     names = [f"{kind} {name}" for kind in ("gyro", "accel") for name in FORMS[form]]
 
     def scaled(logs: FloatArray) -> SensorModels:
-        return _scaled(start, dict(zip(names, map(float, np.exp(logs)), strict=True)))
+        factors = dict(zip(names, map(float, np.exp(logs)), strict=True))
+        changed: dict[str, Model] = {}
+        for axis, model in start.models.items():
+            kind = axis.partition("_")[0]
+            values = {k: float(v or 0.0) * factors[f"{kind} {k}"] for k, v in model.params.items()}
+            changed[axis] = model.with_params(values)
+        return replace(start, models=changed)
 
     def score(logs: FloatArray) -> float:
         analysis = course.analyse(truth, scaled(logs))
@@ -180,13 +187,19 @@ def reduce(
 
     _, logs = smallest_score(score, [np.zeros(len(names))])
     best = scaled(logs)
-    analyses = [course.analyse(truth, each) for each in (truth, start, best)]
+    full, read, reduced = (course.analyse(truth, each) for each in (truth, start, best))
+    errors = []
+    for outage in scenario.outages:
+        at = full.index(outage.end)
+        sds = (full.sd, read.sd, read.predicted_sd, reduced.sd, reduced.predicted_sd)
+        horizontal = (float(np.hypot(*sd[at, :2])) for sd in sds)
+        errors.append(ReducedError(outage.duration, *horizontal, float(reduced.nees()[at])))
     return Reduction(
         form=form,
         models=best,
         inflation=dict(zip(names, map(float, np.exp(logs)), strict=True)),
-        errors=tuple(_errors(outage, *analyses) for outage in scenario.outages),
-        notices=(*analyses[2].notices, *([notice("judged-on-loiter")] if assumed else ())),
+        errors=tuple(errors),
+        notices=(*reduced.notices, *([notice("judged-on-loiter")] if assumed else ())),
     )
 
 
@@ -197,14 +210,14 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
     longest: Longest outage, s.
     dt: Sampling interval, s.
     """
-    reduced, bias_sd = {}, {}
+    reduced: dict[str, Model] = {}
+    bias_sd: dict[str, float] = {}
     tau = dt * 2.0 ** np.arange(np.ceil(np.log2(10.0 * longest / dt)) + 1)
     for axis in AXES:
         model = models.models[axis]
         deviation = np.sqrt(2.0 * model.haar_variance(tau, dt))
-        white = float(np.interp(np.log(tuning.WHITE_AT), np.log(tau), deviation)) * np.sqrt(
-            tuning.WHITE_AT
-        )
+        read = float(np.interp(np.log(tuning.WHITE_AT), np.log(tau), deviation))
+        white = read * math.sqrt(tuning.WHITE_AT)
         if form == "N+K":
             at_end = float(np.interp(np.log(longest), np.log(tau), deviation))
             reduced[axis] = WhiteNoise(white) + RandomWalk(at_end * np.sqrt(3.0 / longest))
@@ -255,32 +268,3 @@ def with_outages(
             f"minutes apart need {end:g} s: give a longer one, or fewer outages"
         )
     return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=tuning.SETTLING)
-
-
-def _scaled(models: SensorModels, factors: Mapping[str, float]) -> SensorModels:
-    changed: dict[str, Model] = {}
-    for axis, model in models.models.items():
-        kind = axis.partition("_")[0]
-        values = {
-            key: float(value or 0.0) * factors[f"{kind} {key}"]
-            for key, value in model.params.items()
-        }
-        changed[axis] = model.with_params(values)
-    return replace(models, models=changed)
-
-
-def _errors(outage: Outage, full: Analysis, read: Analysis, reduced: Analysis) -> ReducedError:
-    index = full.index(outage.end)
-
-    def horizontal(sd: FloatArray) -> float:
-        return float(np.hypot(sd[index, 0], sd[index, 1]))
-
-    return ReducedError(
-        duration=outage.duration,
-        full=horizontal(full.sd),
-        read_off=horizontal(read.sd),
-        read_off_predicted=horizontal(read.predicted_sd),
-        reduced=horizontal(reduced.sd),
-        reduced_predicted=horizontal(reduced.predicted_sd),
-        nees=float(reduced.nees()[index]),
-    )

@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.fleet import (
+from gmwm.population import (
     CONFIDENCE,
     CONTENT,
     DERIVED,
@@ -212,8 +212,9 @@ def _troubled(fleet: Fleet) -> list[dict[str, str]]:
     """Units without a calibration, and axes without a valid model, with the reasons."""
     rows = [
         {"device": unit.name, "where": "", "text": fleet.failed[path].text}
-        for path, unit in fleet.units.items() if path in fleet.failed
-    ]  # fmt: skip
+        for path, unit in fleet.units.items()
+        if path in fleet.failed
+    ]
     for path, calibration in fleet.done.items():
         name = fleet.units[path].name
         for channel, fit in calibration.items():

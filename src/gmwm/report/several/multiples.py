@@ -10,9 +10,9 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.comparison import AxisComparison, Equality
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
+from gmwm.population import AxisComparison, Equality
 from gmwm.report.datasheet import Datasheet
 
 COLOURS = 8
@@ -64,8 +64,9 @@ def multiple(
         stated = sheet.deviation(axis.name, fits[0].wv.quantity, tau, fits[0].wv.dt)
         if stated is not None:
             parts.append(_line("sheet", x(np.log10(tau)), y(np.log10(factor * stated))))
-    shifts = dict(zip(axis.fits, _DODGE * np.linspace(-0.5, 0.5, max(len(axis.fits), 2)),
-                      strict=False))  # fmt: skip
+    shifts = dict(
+        zip(axis.fits, _DODGE * np.linspace(-0.5, 0.5, max(len(axis.fits), 2)), strict=False)
+    )
     for label, fit in axis.fits.items():
         at = x(np.log10(fit.wv.tau) + shifts[label])
         ends = [y(_log(factor, each)) for each in (fit.wv.lower, fit.wv.upper)]
@@ -132,9 +133,12 @@ def _ticks(y: _Scale) -> list[float]:
 
 
 def _ratios(
-    equality: Equality, shown: Iterable[str], labels: Sequence[str], x: _Scale,
+    equality: Equality,
+    shown: Iterable[str],
+    labels: Sequence[str],
+    x: _Scale,
     shifts: dict[str, float],
-) -> str:  # fmt: skip
+) -> str:
     """Differences from the common curve in per cent, with their intervals."""
     away = 100.0 * (equality.ratios - 1.0)
     error = 196.0 * equality.errors
@@ -184,8 +188,9 @@ def _points(
 
 def _line(name: str, x: FloatArray, y: FloatArray) -> str:
     known = np.isfinite(y)
-    places = " ".join(f"{a:.1f},{min(b, _MIDDLE):.1f}" for a, b in zip(x[known], y[known],
-                                                                       strict=True))  # fmt: skip
+    places = " ".join(
+        f"{a:.1f},{min(b, _MIDDLE):.1f}" for a, b in zip(x[known], y[known], strict=True)
+    )
     return f'<polyline class="{name}" points="{places}"/>'
 
 

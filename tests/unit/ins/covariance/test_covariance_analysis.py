@@ -13,9 +13,9 @@ from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.montecarlo.filter_errors import GROUPS
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.simulation.filter_errors import GROUPS
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 
 DT = 0.05

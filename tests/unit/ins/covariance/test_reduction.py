@@ -18,8 +18,8 @@ from gmwm.ins.covariance.reduction import (
 )
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
 
 DT = 0.1

@@ -14,8 +14,8 @@ from gmwm.ins.filter.measurement_kernels import (
     residual,
 )
 from gmwm.ins.filter.states import SensorStates
-from gmwm.ins.geometry.earth import ned_difference, offset
-from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.geometry import ned_difference, offset
+from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy
 from gmwm.ins.imu.sensors import SensorModels
 
 DT = 0.01

@@ -6,8 +6,6 @@ from importlib.util import find_spec
 collect_ignore = [
     file
     for file, modules in {
-        "test_recorded_formats.py": ("rosbags", "h5py", "polars"),
-        "messages/test_recorded_messages.py": ("rosbags", "h5py", "pyulog"),
         "messages/test_damaged_logs.py": ("pyulog",),
         "messages/test_read_rosbag.py": ("rosbags",),
         "test_read_frames.py": ("rosbags", "h5py", "polars"),

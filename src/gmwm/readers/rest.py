@@ -1,0 +1,274 @@
+"""Sensors at rest: units, columns and scales that their mean or noise contradicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
+from gmwm._core.units import SI_UNIT, factor
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.names import AXES
+from gmwm.readers.recording import Recording
+from gmwm.readers.turning import block_means
+
+_GRAVITY = factor("g", SI_UNIT["accel"])
+_DEGREE = factor("deg/s", SI_UNIT["gyro"])
+_ACCEL_UNITS = ("m/s^2", "g", "mg", "ug", "cm/s^2")
+_GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+_LEAST_COUNT = {
+    "gyro": _DEGREE,
+    "accel": 1.0,
+}  # 1 deg/s and 1 m/s^2: no sensor's last bit is larger
+
+
+def rest_notices(
+    recording: Recording,
+    unit_of: Mapping[str, str],
+    given: Mapping[str, str],
+    *,
+    are_columns_given: bool,
+    has_layout: bool,
+) -> tuple[Notice, ...]:
+    """Notices where means or noise contradict the units or the columns.
+
+    An accelerometer without gravity is fine (gravity may have been subtracted), and so is a gyro
+    that turns.
+
+    unit_of: Unit of each channel in the file.
+    given: Units that the user gave, by channel or sensor.
+    are_columns_given: Whether the user said which column is which channel.
+    has_layout: Whether the scales are those of a binary layout, where gravity has to show.
+    Raises InputError if the unit of the accelerometer, the columns or the layout are wrong, and
+        the user did not give them.
+    """
+    rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
+    swapped = _swapped(recording.source, rate, force, are_columns_given)
+    if swapped:
+        return swapped
+    counts = _counts(recording, unit_of)
+    are_counts = {notice.where for notice in counts}
+    others = (*_gravity(recording, force, given, has_layout), *_gyro(rate))
+    rest = [each for each in others if each.severity == "bad" or each.where not in are_counts]
+    return (*counts, *rest)
+
+
+class _Sensor:
+    """Mean and noise of a sensor whose axes have one unit.
+
+    unit: Unit in the file.
+    size: Length of the mean vector, SI.
+    size_error: Its standard deviation from the fast noise, SI.
+    usual: Median length of the means of a second, SI; motion hardly changes it.
+    scatter: Standard deviation of the fast noise of the noisiest axis, SI.
+    density: White noise of the noisiest axis, SI/sqrt(Hz): the smaller one of samples and of means
+        of a second, so that neither a filter's band nor a drift counts.
+    """
+
+    def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:
+        self.unit = unit
+        self.size = float(np.linalg.norm([np.nanmean(values) for values in axes]))
+        second = max(round(1.0 / dt), 1)
+        means = block_means(axes, second)
+        lengths = known_of(np.linalg.norm(means, axis=1))
+        self.usual = median(lengths) if lengths.size else self.size
+        fast, slow = _noise_of(axes), _noise_of(means.T)
+        self.scatter = float(np.max(fast))
+        self.density = float(
+            np.max(np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt)))
+        )
+        self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
+
+    @classmethod
+    def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
+        """None if axes are absent, empty (an accelerometer needs all three) or differ in unit."""
+        names = [name for axis in AXES if (name := f"{sensor}_{axis}") in recording]
+        units = {unit_of[name] for name in names if name in unit_of}
+        axes = [recording[name].values for name in names]
+        axes = [values for values in axes if not np.all(np.isnan(values))]
+        if len(axes) < (1 if sensor == "gyro" else len(AXES)) or len(units) > 1:
+            return None
+        found = cls(units.pop(), axes, recording.dt)
+        return found if found.size > 0.0 else None
+
+
+def _noise_of(axes: Sequence[FloatArray] | FloatArray) -> FloatArray:
+    """Robust standard deviation of white noise of each axis from differences; 0 if unknown."""
+    found = np.zeros(len(axes))
+    for axis, values in enumerate(axes):
+        steps = np.diff(values)
+        known = known_of(np.abs(steps, out=steps))
+        if known.size:
+            found[axis] = median(known, overwrite=True) / (QUARTILE * math.sqrt(2.0))
+    return found
+
+
+def _is_gravity(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> bool:
+    return abs(length / _GRAVITY - 1.0) < tolerance
+
+
+def _gravity_units(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> list[str]:
+    """Units in which a number of the file is gravity, the nearest first."""
+    sizes = {unit: length * factor(unit, SI_UNIT["accel"]) for unit in _ACCEL_UNITS}
+    likely = [unit for unit, size in sizes.items() if _is_gravity(size, tolerance)]
+    return sorted(likely, key=lambda unit: abs(sizes[unit] - _GRAVITY))
+
+
+def _swapped(
+    source: str, rate: _Sensor | None, force: _Sensor | None, are_columns_given: bool
+) -> tuple[Notice, ...]:
+    """Gravity in the gyro's columns, and none in the accelerometer's."""
+    if rate is None or force is None:
+        return ()
+    in_file = rate.size / factor(rate.unit, SI_UNIT["gyro"])
+    units = _gravity_units(in_file, tuning.GRAVITY_SURE)
+    other = force.size / factor(force.unit, SI_UNIT["accel"])
+    if not units or _gravity_units(other) or rate.scatter > tuning.GRAVITY_NOISE * rate.size:
+        return ()
+    text = (
+        f"the mean of the gyro columns is {in_file:.4g} long, which is gravity in {units[0]}; the "
+        f"mean of the accelerometer columns, {other:.4g}, is not: the two are swapped"
+    )
+    if not are_columns_given:
+        hint = 'give the columns, e.g. channels={"accel_x": 0, "gyro_x": 3}'
+        raise InputError(f"{source}: {text}", "channels-swapped", hint)
+    values = {"gyro": rate.size, "accel": force.size, "likely": units[0]}
+    return (Notice("swapped", "bad", "", text, values, "check which column is which channel"),)
+
+
+def _gravity(
+    recording: Recording, force: _Sensor | None, given: Mapping[str, str], has_layout: bool
+) -> tuple[Notice, ...]:
+    """A mean that is gravity in another unit than the one used, or has a wrong scale."""
+    if force is None or _is_gravity(force.size):
+        return ()
+    in_file = force.size / factor(force.unit, SI_UNIT["accel"])
+    likely = _gravity_units(in_file)
+    is_given = any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES)))
+    if not likely:
+        return _scale(recording, force, must_show=has_layout and not is_given)
+    text = (
+        f"the mean of the accelerometer is {in_file:.4g} {force.unit} long, which is gravity in "
+        f"{likely[0]}"
+    )
+    if not is_given:
+        raise InputError(
+            f"{recording.source}: {text}",
+            "accel-unit-missing",
+            f'give the unit, units={{"accel": "{likely[0]}"}}',
+            {"unit": likely[0]},
+        )
+    values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
+    hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
+    return (Notice("gravity", "bad", "accel", text, values, hint),)
+
+
+def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[Notice, ...]:
+    """A length that is gravity in no unit, and too large for an accelerometer without gravity."""
+    ratio, values = force.usual / _GRAVITY, {"norm": force.size}
+    text = f"the accelerometer reads {force.usual:.4g} m/s^2, {ratio:.3g} times gravity"
+    if must_show and not 0.5 < ratio < 2.0:
+        raise InputError(
+            f"{recording.source}: {text}: the file has another layout",
+            "layout",
+            'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity',
+        )
+    if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
+        text += ", gravity over one sampling interval: increments of velocity, not accelerations"
+        hint = "divide the increments, and those of the gyro, by the sampling interval"
+        return (Notice("gravity", "bad", "", text, values, hint),)
+    is_absent = (
+        force.usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * force.usual
+    )
+    if is_absent or abs(ratio - 1.0) < tuning.SCALE_AGREES:
+        return ()
+    text += ": neither gravity nor an accelerometer without it"
+    hint = "check its scale and range, and that the numbers are not counts"
+    return (Notice("gravity", "warning", "accel", text, values, hint),)
+
+
+def _gyro(rate: _Sensor | None) -> tuple[Notice, ...]:
+    """Noise or a mean rate that no gyro has at rest, or a mean rate that few have."""
+    if rate is None:
+        return ()
+    if not _is_plausible(rate.density, rate.size):
+        return (_gyro_unit(rate),)
+    if rate.size - tuning.SURE_MEAN * rate.size_error < tuning.USUAL_BIAS:
+        return ()
+    text = (
+        f"a mean rate of {rate.size / _DEGREE:.3g} deg/s is more than the bias of most gyros: "
+        "the sensor turned all the time, or is a cheap gyro that was not calibrated"
+    )
+    hint = "make sure that it was at rest"
+    return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, hint),)
+
+
+def _gyro_unit(rate: _Sensor) -> Notice:
+    """Noise or a mean rate that is too large, and the units in which it is not."""
+    ratios = {
+        unit: factor(unit, SI_UNIT["gyro"]) / factor(rate.unit, SI_UNIT["gyro"])
+        for unit in _GYRO_UNITS
+    }
+    likely = [
+        unit
+        for unit, ratio in ratios.items()
+        if ratio < 0.9 and _is_plausible(rate.density * ratio, rate.size * ratio)
+    ]
+    # Units that differ by less than gyros do cannot be told apart.
+    near = [
+        unit
+        for unit in likely
+        if abs(math.log(ratios[unit] / ratios[likely[0]])) < math.log(tuning.UNITS_APART)
+    ]
+    if rate.density > tuning.NOISIEST_GYRO:
+        text = f"white noise of {rate.density / _DEGREE:.3g} deg/s/sqrt(Hz)"
+    else:
+        text = f"a mean rate of {rate.size / _DEGREE:.3g} deg/s"
+    values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
+    hint = "check the unit and the sampling rate"
+    if near:
+        values["likely"] = near[0]
+        hint += f": {' or '.join(near)}, not {rate.unit}, would explain it"
+    text += " is more than gyros at rest have"
+    return Notice("gyro-unit", "warning", "gyro", text, values, hint)
+
+
+def _is_plausible(density: float, mean: float) -> bool:
+    return density < tuning.NOISIEST_GYRO and mean < tuning.LARGEST_BIAS
+
+
+def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, ...]:
+    """Whole numbers with noise of several, in a unit in which no sensor's last bit is one."""
+    notices = []
+    for sensor, largest in _LEAST_COUNT.items():
+        units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
+        sizes = {name: factor(unit, SI_UNIT[sensor]) for name, unit in units.items()}
+        found = [
+            name
+            for name, size in sizes.items()
+            if size >= largest and _is_counted(recording[name].values, size)
+        ]
+        if not found:
+            continue
+        noise = float(np.max(_noise_of([recording[name].values / sizes[name] for name in found])))
+        text = (
+            f"{', '.join(found)}: every sample is a whole number, with a noise of {noise:.3g}: "
+            f"counts of the converter, not {units[found[0]]}"
+        )
+        hint = "multiply them by the size of a count from the data sheet"
+        notices.append(Notice("counts", "bad", sensor, text, {"noise": noise}, hint))
+    return tuple(notices)
+
+
+def _is_counted(values: FloatArray, size: float) -> bool:
+    """Whether samples are multiples of a size, and their noise is several times that size."""
+    for part in (values[: tuning.ROWS_OF_COUNTS], values):
+        numbers = known_of(part) / size
+        off = np.abs(numbers - np.rint(numbers))
+        if not numbers.size or np.max(off) > 1e-6:
+            return False
+    return bool(_noise_of([values])[0] > tuning.NOISE_OF_COUNTS * size)
