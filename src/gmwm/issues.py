@@ -518,21 +518,56 @@ _SELECTION = (
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    Issue("bounded-error", "{text}", topic="filter"),
-    Issue("estimate-it", "{text}", severity="warning", topic="filter"),
-    Issue("fast-peak-left-out", "{text}", topic="filter"),
-    Issue("less-white-noise", "{text}", topic="filter"),
-    Issue("line-left-out", "{text}", severity="warning", topic="filter"),
-    Issue("loose-form", "{text}", topic="filter"),
-    Issue("more-than-random-walk", "{text}", topic="filter"),
-    Issue("more-than-white-noise", "{text}", topic="filter"),
-    Issue("no-navigation-filter", "{text}", topic="filter"),
-    Issue("not-predicted", "{text}", topic="filter"),
-    Issue("optimistic", "{text}", topic="filter"),
-    Issue("other-units", "{text}", severity="warning", topic="filter"),
-    Issue("ramp-as-constant", "{text}", severity="warning", topic="filter"),
-    Issue("turn-on-left-out", "{text}", topic="filter"),
-    Issue("uncertainty-not-covered", "{text}", topic="filter"),
+    Issue("bounded-error",
+          "a {cause} moves the first integral by a bounded amount: its N, which is enough at any "
+          "time, is {factor:.2g} times too large after {horizon:g} s", topic="filter"),
+    Issue("estimate-it",
+          "larger numbers are a poor substitute for {cause}: N times {N_factor:.3g}, K times "
+          "{K_factor:.3g}", "estimate it as a state, or calibrate it", "warning", "filter"),
+    Issue("fast-peak-left-out",
+          "only the low-frequency density{also} of the {label} counts: it lies above {fast:.3g} Hz "
+          "and averages out", topic="filter"),
+    Issue("less-white-noise",
+          "N is {share:.3g} times that of the error model: use N and K as a pair, for outages of "
+          "the given lengths", topic="filter"),
+    Issue("line-left-out",
+          {"": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
+           "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow "
+                   "for this horizon, and errors are larger than the numbers say"}, topic="filter"),
+    Issue("loose-form",
+          "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true ones; "
+          "with {tightest}, {with_state:.3g} times", topic="filter"),
+    Issue("more-than-random-walk",
+          {"": "the model has no random walk: K covers {parts}",
+           "more": "K is {times:.3g} times that of the model's random walk: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("more-than-white-noise",
+          {"": "the model has no white noise: N covers {parts}",
+           "more": "N is {times:.3g} times that of the model's white noise: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("no-navigation-filter", "the INS/GNSS filter is left out: {reason}", topic="filter"),
+    Issue("not-predicted", "the consistency is not predicted: {reason}", topic="filter"),
+    Issue("optimistic",
+          {"bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
+           "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such "
+                     "numbers are consistent at all times and on all axes that share them",
+           "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than "
+                     "the numbers are for"}, "estimate it as a state, or remove it from the data",
+          "warning", "filter"),
+    Issue("other-units",
+          "N in use is {factor:.3g} times that of the error model: it may be in other units",
+          "give it in {unit}/sqrt(Hz)", "warning", "filter"),
+    Issue("ramp-as-constant",
+          "the {label} counts as a constant of standard deviation {size}: |R| times the horizon",
+          "a filter that lasts longer needs a state for it", "warning", "filter"),
+    Issue("turn-on-left-out",
+          "the start bias leaves out the turn-on bias, which a recording at rest cannot show",
+          "add its variance", topic="filter"),
+    Issue("uncertainty-not-covered",
+          {"": "the uncertainty of the fitted parameters is not covered", "why": "{reason}"},
+          topic="filter"),
 )  # fmt: skip
 
 _INS = (
@@ -552,12 +587,17 @@ _INS = (
     Issue("fixes-left-out", "{text}", topic="navigation"),
     Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
     Issue("heading", "{text}", topic="navigation"),
-    Issue("judged-on-loiter", "{text}", topic="navigation"),
+    Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
+          "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
     Issue("levelled", "{text}", topic="navigation"),
     Issue("lost", "{text}", severity="bad", topic="navigation"),
     Issue("no-time-stamps", "{text}", topic="navigation"),
     Issue("not-white", "{text}", severity="bad", topic="navigation"),
-    Issue("outside-linearity", "{text}", severity="warning", topic="navigation"),
+    Issue("outside-linearity",
+          "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
+          "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
+          "are too small",
+          "check them by runs, as gmwm navigate does", "warning", "navigation"),
     Issue("positions-at-zero", "{text}", severity="warning", topic="navigation"),
     Issue("resolution", "{text}", topic="navigation"),
     Issue("samples-filled", "{text}", severity="warning", topic="navigation"),

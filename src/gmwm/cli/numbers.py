@@ -167,8 +167,8 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     Example:
       gmwm budget out/calibration.json --times 1,10,60
     """
-    from gmwm.budget import error_budget
     from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import error_budget
 
     calibration = Calibration.load(file)
     click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))

@@ -1,4 +1,4 @@
-"""What of an error model the numbers of a small filter dominate, and what they leave out."""
+"""The part of an error model that the numbers of a small filter dominate, and the rest."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, evaluated
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class RequiredSpectrum:
     """The part of an error model that is dominated.
 
     terms: Those that count with their spectrum.
-    weights: How far each does: one, or less where its peak is fast, by the rest of which its
-        density is that at low frequencies.
-    feet: Of each, these rests, u^2/Hz.
-    constant_sd: Of ramps over the horizon, u.
+    weights: Share of each spectrum that counts: one, or less where its peak is fast.
+    feet: Low-frequency density of the rest of each term, u^2/Hz.
+    constant_sd: Standard deviation of the constant that stands for ramps, u.
     dt, horizon: Sampling interval and horizon, s.
     lowest: Frequency below which nothing changes, Hz.
     floor: Frequency above which a spectrum without a limit is bounded in time: that of the horizon.
@@ -43,8 +42,8 @@ class Target:
     notices: tuple[Notice, ...]
 
     @classmethod
-    def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> Target:
-        """Sort the terms of a model with given parameters; the unit is for what notices say.
+    def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> RequiredSpectrum:
+        """Sort the terms of a model with given parameters; the unit is for notices.
 
         Raises InputError if a term is known by simulation only, or nothing is left.
         """
@@ -65,9 +64,17 @@ class Target:
                 )
             if term.is_drift:
                 constant = abs(term.drift_rate()) * horizon
-                notices.append(_ramp(label, term.drift_rate(), constant, unit))
+                values = {"R": term.drift_rate(), "sd": constant}
+                size = readable(constant, unit)
+                notices.append(notice("ramp-as-constant", "", values, label=label, size=size))
             elif term.is_line:
-                notices += [_line(label, f, a, passing, unit) for f, a in term.lines()]
+                for f, amplitude in term.lines():
+                    values = {"frequency": f, "amplitude": amplitude}
+                    slow = f < passing
+                    notices.append(notice(
+                        "line-left-out", "", values, severity="warning" if slow else "note",
+                        variant="slow" if slow else "", label=label, size=readable(amplitude, unit),
+                    ))  # fmt: skip
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
@@ -107,7 +114,7 @@ class Target:
 
     @property
     def foot(self) -> float:
-        """Density at low frequencies of what counts by no more, u^2/Hz."""
+        """Low-frequency density of terms counted only there, u^2/Hz."""
         return sum(self.feet)
 
     @property
@@ -120,40 +127,40 @@ class Target:
         return sum((density for _, density in self.densities(f)), np.full_like(f, self.foot))
 
     def densities(self, f: FloatArray) -> Iterator[tuple[Process, FloatArray]]:
-        """Of each term that counts, as far as it does."""
+        """Density of each term that counts, times its weight."""
         for term, weight in zip(self.terms, self.weights, strict=True):
             yield term, weight * term.psd(f, self.dt)
 
     def allan_variance(self, tau: FloatArray) -> FloatArray:
-        """At averaging times (s), u^2."""
+        """Allan variance at averaging times (s), u^2."""
         pairs = zip(self.terms, self.weights, strict=True)
         curves = (2.0 * weight * term.haar_variance(tau, self.dt) for term, weight in pairs)
         return sum(curves, self.foot / tau)
 
     @property
     def white(self) -> float:
-        """Density of its white terms and of the feet of peaks, u^2/Hz."""
+        """Density of its white terms and of the feet, u^2/Hz."""
         one = np.ones(1)
         return self.foot + sum(float(term.psd(one, 1.0)[0]) for term in self.terms if term.is_white)
 
     @property
     def walk(self) -> float:
-        """K^2 of the walk that its spectrum is in the limit of zero frequency, u^2/s."""
+        """K^2 of the random walk in the limit of zero frequency, u^2/s."""
         if self.slope < 2.0 - tuning.RISING:
             return 0.0
         return float((2.0 * np.pi * self.lowest) ** 2 * self.psd(np.array([self.lowest]))[0])
 
     def frequencies(self, points: int, of_peak: int = tuning.PEAK_POINTS) -> FloatArray:
-        """From the lowest to 1/(2 dt), some a decade, and more where a resonance is (Hz)."""
+        """Frequencies up to 1/(2 dt), some a decade, and more around resonances; Hz."""
         # Below the lowest there are only limits, which are as good as reached.
         below = self.lowest * np.array([1e-3, 1e-2, 1e-1])
         f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points, of_peak)
         return np.unique(np.append(below, f))
 
     def slow_variance(self, stationary: Model) -> float:
-        """Variance of what lies above a stationary spectrum and is not a random walk, u^2.
+        """Variance of the part above a stationary spectrum, random walks excluded, u^2.
 
-        What has no variance counts from the frequency of the horizon on.
+        A term without a variance counts from the frequency of the horizon on.
         """
         f = self.frequencies(tuning.CHECKED_POINTS)
         total = self.foot - stationary.psd(f, self.dt)
@@ -169,7 +176,7 @@ class Target:
 def _frequencies(
     terms: Sequence[Process], low: float, high: float, points: int, of_peak: int
 ) -> FloatArray:
-    """Some a decade, and more where a resonance is."""
+    """Some frequencies a decade, and more around resonances."""
     own = [
         np.linspace(0.9, 1.1, of_peak) * (term.values[p.name] or 0.0)
         for term in terms
@@ -209,37 +216,15 @@ def _has_variance(term: Process, dt: float) -> bool:
     return True
 
 
-def _ramp(label: str, rate: float, sd: float, unit: str) -> Notice:
-    text = (
-        f"the {label} counts as a constant of standard deviation {readable(sd, unit)}: |R| times "
-        "the horizon"
-    )
-    hint = "a filter that lasts longer needs a state for it"
-    return Notice("ramp-as-constant", "warning", "", text, {"R": rate, "sd": sd}, hint)
-
-
-def _line(label: str, frequency: float, amplitude: float, fast: float, unit: str) -> Notice:
-    slow = frequency < fast
-    text = f"the {label} at {frequency:.4g} Hz, amplitude {readable(amplitude, unit)}, is left out"
-    values = {"frequency": frequency, "amplitude": amplitude}
-    if slow:
-        text += ": it is slow for this horizon, and errors are larger than the numbers say"
-    return Notice("line-left-out", "warning" if slow else "note", "", text, values)
-
-
 def _peak(label: str, f: FloatArray, density: FloatArray, weight: float, fast: float) -> Notice:
     place = float(f[int(np.argmax(density))])
     high = f >= fast
     variance = 2.0 * _integral((density * f)[high], np.log(f[high]))
     also = f" and {brief(100.0 * weight)} % of the peak" if weight > tuning.FADED else ""
-    text = (
-        f"the {label} is left out but for its density at low frequencies{also}: it lies above "
-        f"{fast:.3g} Hz and averages out"
-    )
     values = {
         "density": float(density[0]), "frequency": place, "variance": variance, "share": weight,
     }  # fmt: skip
-    return Notice("fast-peak-left-out", "note", "", text, values)
+    return notice("fast-peak-left-out", "", values, also=also, label=label, fast=fast)
 
 
 def _integral(y: FloatArray, x: FloatArray) -> float:

@@ -17,7 +17,7 @@ from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.dominance import Problem, columns_of, limits, solved
-from gmwm.filter_numbers.spectra.target import Target
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.process import Model
 
 _STEP = 1e-3  # standard errors
@@ -36,7 +36,7 @@ class Estimated:
 
     @classmethod
     def of(cls, fit: Fit) -> Estimated:
-        """That of a fit: amplitudes at upper bounds and rate ramps count as known."""
+        """Of a fit: amplitudes at upper limits and rate ramps count as known."""
         drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
         known = drifts | set(fit.upper_bounds)
         free = [i for i, key in enumerate(fit.keys) if key not in known]
@@ -49,8 +49,8 @@ def standard_errors(
 ) -> dict[str, float]:
     """Standard errors of the amplitudes of a bound, by their keys.
 
-    model: That dominates it.
-    estimates: One a target, independent of each other.
+    model: The bound.
+    estimates: One for each target, independent of each other.
     """
     terms = [term.with_amplitude(1.0) for term in model.terms]
     columns = columns_of(problem, terms)
@@ -80,7 +80,9 @@ def standard_errors(
     }
 
 
-def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolArray) -> FloatArray:
+def _changes(
+    target: RequiredSpectrum, estimate: Estimated, f: FloatArray, is_white: BoolArray
+) -> FloatArray:
     """Change of the logarithm of the density for a step along each independent error, (n, p)."""
     model, keys = estimate.model, estimate.keys
     values = np.array([float(model.params[key] or 0.0) for key in keys])
@@ -110,8 +112,8 @@ def _changes(target: Target, estimate: Estimated, f: FloatArray, is_white: BoolA
     return np.column_stack(columns) if columns else np.zeros((f.size, 0))
 
 
-def _densities(target: Target, f: FloatArray, is_white: BoolArray) -> FloatArray:
-    """Of all terms at frequencies, and of the white ones where only these count."""
+def _densities(target: RequiredSpectrum, f: FloatArray, is_white: BoolArray) -> FloatArray:
+    """Density of all terms, or of the white ones where only these count."""
     return sum(
         (
             np.where(is_white & (not term.is_white), 0.0, density)

@@ -63,10 +63,7 @@ def calibration():
 
 def test_the_units_on_data_sheets():
     # 0.3 deg/sqrt(h) over an hour; 60 ug/sqrt(Hz) is 0.0353 m/s/sqrt(h).
-    models = {
-        "gyro_z": WhiteNoise(0.3 * DEG / 60.0),
-        "accel_z": WhiteNoise(60e-6 * G),
-    }
+    models = {"gyro_z": WhiteNoise(0.3 * DEG / 60.0), "accel_z": WhiteNoise(60e-6 * G)}
     found = error_budget(models, [3600.0], dt=DT)
     assert np.degrees(found.total("gyro_z")["attitude"]) == pytest.approx([0.3], rel=1e-6)
     assert found.total("accel_z")["velocity"] == pytest.approx([60e-6 * G * 60.0], rel=1e-6)

@@ -1,11 +1,10 @@
-"""Numbers in use: files of programs, and what people write."""
+"""Numbers in use, from files of programs."""
 
 import numpy as np
 import pytest
 
-from gmwm import GaussMarkov, InputError, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm import InputError
 from gmwm.export import read_numbers
-from gmwm.filter_numbers.given import in_use
 
 F = 200.0
 NUMBERS = {"gyro": (2e-4, 3e-6), "accel": (3e-3, 4e-5)}
@@ -72,28 +71,3 @@ def test_files_that_cannot_be_used(tmp_path, content, message):
         read_numbers(path)
     with pytest.raises(InputError, match="cannot be read"):
         read_numbers(tmp_path / "missing.yaml")
-
-
-def test_numbers_by_axis_or_kind():
-    found = in_use({"gyro": (1e-4, 1e-6), "gyro_x": (2e-4, 2e-6)}, "gyro_x", "gyro", 60.0, 3e-5)
-    assert (found.form, found.N, found.K) == ("N+K", 2e-4, 2e-6)
-    assert (found.horizon, found.initial_sd, found.method) == (60.0, 3e-5, "given")
-    assert in_use({"gyro": (1e-4, 1e-6)}, "gyro_z", "gyro", 60.0, 0.0).N == 1e-4
-    assert in_use((1e-4, 1e-6), "", "", 60.0, 0.0).K == 1e-6
-    model = WhiteNoise(1e-4) + RandomWalk(1e-6) + GaussMarkov(1e-5, 10.0)
-    assert in_use(model, "", "", 60.0, 0.0).form == "N+K+GM"
-    assert in_use(found, "gyro_x", "gyro", 10.0, 0.0) is found
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"accel": (1e-4, 1e-6)}, "no numbers for gyro_x: give them by axis, or for gyro"),
-        ({"gyro": (1e-4, -1e-6)}, "N and K of gyro_x = -1e-06"),
-        ({"gyro": 1e-4}, "not what a filter believes"),
-        ({"gyro": WhiteNoise(1e-4) + QuantizationNoise(1e-4)}, "form = 'N'"),
-    ],
-)
-def test_numbers_that_cannot_be_used(given, message):
-    with pytest.raises(InputError, match=message):
-        in_use(given, "gyro_x", "gyro", 60.0, 0.0)

@@ -1,10 +1,8 @@
 """Repeated time integrals of an error process: how their root mean square grows.
 
 A sample is held until the next one, as a navigation computer does that multiplies it by dt, and
-what is integrated is this staircase. Over one interval h the integrals of first, second and third
-order then follow ``I <- C(h) I + g(h) y`` with C the powers h^k/k! below the diagonal and
-g = (h, h^2/2, h^3/6): an exact linear recursion, whose covariance is propagated over n steps by
-squaring the transition about log2(n) times. A process without states is integrated by its spectrum.
+what is integrated is this staircase: an exact linear recursion, propagated by squaring as in
+`gmwm.filter_numbers.propagation`. A process without states is integrated by its spectrum.
 """
 
 from __future__ import annotations
@@ -17,17 +15,11 @@ from scipy.special import gamma
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process import (
-    BiasInstability,
-    Process,
-    RateRamp,
-    StateSpace,
-    evaluated,
-    legendre,
-)
+from gmwm.filter_numbers.propagation import held, integrated
+from gmwm.process import BiasInstability, Process, RateRamp, StateSpace, evaluated, legendre
 
 ORDERS = 3
-"""Integrals that are given: once, twice and three times."""
+"""Integrals: once, twice and three times."""
 
 _WHOLE = 1e-6  # of a step: a time that close to a multiple of dt is one
 _CANCELS = 3e-3  # 2 pi f t below which the difference of the two parts of a gain is all rounding
@@ -40,9 +32,6 @@ _STEEP_OCTAVES = 20  # below 1/t, the band that must not matter ...
 _STEEP_SHARE = 0.01  # ... to more than this share of the variance
 
 ComplexArray = npt.NDArray[np.complex128]
-
-Moments = tuple[FloatArray, FloatArray]
-"""Mean (p + 3,) and covariance (p + 3, p + 3) of the states and the integrals."""
 
 
 def integral_rms(
@@ -106,53 +95,24 @@ def integral_rms(
 # -- by states ------------------------------------------------------------------------------------
 
 
-def _chain(h: float) -> tuple[FloatArray, FloatArray]:
-    """C(h) and g(h) of the integrals over an interval in which the input is held."""
-    step = np.array([[1.0, 0.0, 0.0], [h, 1.0, 0.0], [h * h / 2.0, h, 1.0]])
-    return step, np.array([h, h * h / 2.0, h**3 / 6.0])
-
-
-def _augmented(form: StateSpace, dt: float) -> tuple[FloatArray, FloatArray]:
-    """Transition and noise covariance of the states and the integrals over one step."""
-    p = form.n_states
-    chain, gain = _chain(dt)
-    transition = np.zeros((p + ORDERS, p + ORDERS))
-    transition[:p, :p] = form.transition
-    transition[p:, :p] = np.outer(gain, form.output)
-    transition[p:, p:] = chain
-    noise = np.zeros_like(transition)
-    noise[:p, :p] = form.process_noise
-    noise[p:, p:] = form.measurement_noise * np.outer(gain, gain)
-    return transition, noise
-
-
 def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> FloatArray:
-    p = form.n_states
-    mean = np.concatenate([form.initial_mean, np.zeros(ORDERS)])
+    mean = np.concatenate([np.zeros(ORDERS), form.initial_mean])
     covariance = np.zeros((mean.size, mean.size))
     if not known:
-        covariance[:p, :p] = form.initial_covariance
+        covariance[ORDERS:, ORDERS:] = form.initial_covariance
     counts, rests = _steps(t, dt)
-    doublings = [_augmented(form, dt)]
+    doublings = [integrated(form, dt, ORDERS)]
     while 2 ** len(doublings) <= max(counts):
         step, noise = doublings[-1]
         doublings.append((step @ step, step @ noise @ step.T + noise))
     result = np.empty((ORDERS, t.size))
     for i, (count, rest) in enumerate(zip(counts, rests, strict=True)):
-        moments: Moments = mean, covariance
-        for bit, doubling in enumerate(doublings):
-            if count >> bit & 1:
-                moments = _carried(moments, doubling)
-        if rest > 0.0:
-            moments = _carried(moments, _augmented(form, rest))
-        variance = np.diag(moments[1])[p:]
-        result[:, i] = np.sqrt(moments[0][p:] ** 2 + np.maximum(variance, 0.0))
+        chosen = [each for bit, each in enumerate(doublings) if count >> bit & 1]
+        m, P = mean, covariance
+        for step, noise in [*chosen, *([integrated(form, rest, ORDERS)] if rest > 0.0 else [])]:
+            m, P = step @ m, step @ P @ step.T + noise
+        result[:, i] = np.sqrt(m[:ORDERS] ** 2 + np.maximum(np.diag(P)[:ORDERS], 0.0))
     return result
-
-
-def _carried(moments: Moments, step: tuple[FloatArray, FloatArray]) -> Moments:
-    (mean, covariance), (transition, noise) = moments, step
-    return transition @ mean, transition @ covariance @ transition.T + noise
 
 
 def _steps(t: FloatArray, dt: float) -> tuple[list[int], FloatArray]:
@@ -235,14 +195,14 @@ def _squared_gain(
     ``moment`` is what the input k dt gives: the gain's first derivative at zero frequency.
     """
     turn = 2j * np.pi * frequency
-    held = np.expm1(turn)
-    held[held == 0.0] = 1.0  # zero frequency itself is taken from the expansion below
-    chain, gain = _chain(dt)
+    ratio = np.expm1(turn)
+    ratio[ratio == 0.0] = 1.0  # zero frequency itself is taken from the expansion below
+    chain, gain = held(dt, ORDERS)
     moving = np.zeros((ORDERS, frequency.size), dtype=complex)
     for row in range(ORDERS):
-        moving[row] = (gain[row] + _times(chain[row : row + 1, :row], moving[:row])[0]) / held
-    left = _times(_chain(count * dt + rest)[0], moving)
-    last_chain, last_gain = _chain(rest)
+        moving[row] = (gain[row] + _times(chain[row : row + 1, :row], moving[:row])[0]) / ratio
+    left = _times(held(count * dt + rest, ORDERS)[0], moving)
+    last_chain, last_gain = held(rest, ORDERS)
     moving = _times(last_chain, moving) + last_gain[:, None]
     total = count * dt + rest
     constant = np.array([total, total**2 / 2.0, total**3 / 6.0])[:, None]
