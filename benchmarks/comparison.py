@@ -10,9 +10,9 @@ import argparse
 import numpy as np
 
 from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise
-from gmwm.comparison import AxisComparison, AxisNumbers, Equality
-from gmwm.comparison.compare import _holm
 from gmwm.estimate import estimate
+from gmwm.population import AxisComparison, AxisNumbers, Equality
+from gmwm.population.compare import _holm
 
 DT, N = 0.01, 30_000
 TRUTHS = {

@@ -11,7 +11,7 @@ import warnings
 import numpy as np
 
 import gmwm
-from gmwm.calibration.stationarity.steadiness import steadiness_notice
+from gmwm.calibration.steadiness import steadiness_notice
 
 DT, SIZE = 0.01, 360_000
 TIME = DT * np.arange(SIZE)

@@ -42,8 +42,7 @@ from fleets import QUICK
 from gmwm._core.runs import do_runs
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
-from gmwm.export import TARGETS, export
-from gmwm.filter_numbers import read_numbers
+from gmwm.export import TARGETS, export, read_numbers
 from gmwm.ins.field import Measured
 from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log

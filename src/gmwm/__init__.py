@@ -15,9 +15,19 @@ from types import ModuleType
 
 import lazy_loader
 
-__version__ = "0.1.0"
+from gmwm._core import __version__ as __version__
+from gmwm._core.pages import provide as _provide
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def _load_pages() -> None:
+    """Import what writes pages of results, which stand below the room of pages."""
+    from gmwm.report import calibration, navigated, validation  # noqa: F401
+    from gmwm.report.several import compared, fleet  # noqa: F401
+
+
+_provide(_load_pages)
 
 # Functions that use the package go to other processes with it, by name. Only plain modules do so by
 # themselves, and this one guards functions from modules of their name.

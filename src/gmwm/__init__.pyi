@@ -10,7 +10,6 @@ from .calibration import (
     load as load,
     without_departures as without_departures,
 )
-from .comparison import SensorComparison as SensorComparison, compare as compare
 from .diagnosis import (
     Health as Health,
     Still as Still,
@@ -50,7 +49,12 @@ from .filter_numbers import (
     certify as certify,
     reduce as reduce,
 )
-from .fleet import Fleet as Fleet, fleet as fleet
+from .population import (
+    Fleet as Fleet,
+    SensorComparison as SensorComparison,
+    compare as compare,
+    fleet as fleet,
+)
 from .process import (
     AR as AR,
     ARIMA as ARIMA,

@@ -1,1 +1,3 @@
-"""Tools of every room: checks of what was given, files, units, types, words."""
+"""What several rooms share."""
+
+__version__ = "0.1.0"

@@ -116,7 +116,7 @@ def digest_of(package: Path) -> bytes:
     texts = {file: file.read_bytes() for file in sorted(package.rglob("*.py"))}
     loops = {file: text for file, text in texts.items() if b"@compiled" in text}
     named = set(_CONSTANT.findall(b"".join(loops.values())))
-    digest = hashlib.sha256(texts[package / "__init__.py"])
+    digest = hashlib.sha256(texts[package / "_core" / "__init__.py"])
     for file, text in texts.items():
         defined = _CONSTANT.findall(b" ".join(_DEFINED.findall(text)))
         if file in loops or not named.isdisjoint(defined):

@@ -5,30 +5,134 @@ from __future__ import annotations
 import json
 import math
 import os
-from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
 
 from gmwm._core import checks
 from gmwm._core.files import opened, written
-from gmwm.errors import InputError
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError, printable
 
 if TYPE_CHECKING:
+    from pydantic import TypeAdapter, ValidationError
+
     from gmwm._core.forms import Form
 
 _LARGEST = 1 << 25
 """Bytes of a document: forty times those of six channels; read, it needs thirty times as many."""
 
+_being_adapted: ContextVar[type | None] = ContextVar("_being_adapted", default=None)
+"""The class of documents whose adapter is made."""
+
+_ASYMMETRY = 1e-6  # of correlations: what is left by rounding in a computed covariance
+_NEGATIVE = -1e-4  # eigenvalue of correlations; all but redundant parameters leave rounding errors
+
 _DEEPEST = 32
 """Levels of lists and mappings in a document; what is saved has 12 at most."""
+
+
+class NoneIs:
+    """Mark of a field whose number is stored as null where it is not finite.
+
+    missing: The number that null stands for.
+    """
+
+    def __init__(self, missing: float) -> None:
+        self.missing = missing
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_wrap_validator_function(
+            lambda value, inner: self.missing if value is None else inner(value),
+            handler(source),
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value: value if math.isfinite(value) else None
+            ),
+        )
+
+
+class _IsArray:
+    """Mark of a field that is an array of numbers, stored as nested lists with null for NaN."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return plain_schema(_array_of, _lists_of)
+
+
+class _IsText:
+    """Mark of a text from a file: at most so long, and printed on one line."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        text = core_schema.str_schema(strict=True, max_length=10_000)
+        return core_schema.no_info_after_validator_function(printable, text)
+
+
+Text = Annotated[str, _IsText()]
+Positive = Annotated[float, Gt(0.0)]
+NotNegative = Annotated[float, Ge(0.0)]
+Fraction = Annotated[float, Gt(0.0), Lt(1.0)]
+Samples = Annotated[int, Ge(1), Le(checks.MOST_SAMPLES)]
+Rate = Annotated[float, Ge(1.0 / checks.LONGEST_INTERVAL), Le(1.0 / checks.SHORTEST_INTERVAL)]
+Interval = Annotated[float, Ge(checks.SHORTEST_INTERVAL), Le(checks.LONGEST_INTERVAL)]
+OrNaN = Annotated[float, NoneIs(math.nan)]
+"""A number that may be unknown."""
+OrInfinity = Annotated[float, NoneIs(math.inf)]
+"""A number that may be infinite."""
+Array = Annotated[FloatArray, _IsArray()]
+
+
+def _array_of(value: Any) -> FloatArray:
+    """An array of one or two dimensions from nested lists.
+
+    Raises ValueError if an element is no number or rows have unequal lengths.
+    """
+    if isinstance(value, np.ndarray):
+        return value
+    rows = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    if not all(isinstance(row, list) and all(map(_is_element, row)) for row in rows):
+        raise ValueError("not a list of numbers")
+    return np.array(value, dtype=float)  # None becomes NaN
+
+
+def _is_element(value: Any) -> bool:
+    return value is None or checks.is_number(value)
+
+
+def _lists_of(array: FloatArray) -> list[Any]:
+    if np.all(np.isfinite(array)):
+        return array.tolist()
+    plain = array.astype(object)
+    plain[~np.isfinite(array)] = None
+    return plain.tolist()
+
+
+def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> Any:
+    """What pydantic asks a class for: how it is read from JSON types and written to them.
+
+    A class that is a field of documents gives it in ``__get_pydantic_core_schema__``.
+    """
+    from pydantic_core import core_schema
+
+    return core_schema.no_info_plain_validator_function(
+        read, serialization=core_schema.plain_serializer_function_ser_schema(write)
+    )
 
 
 class Document:
     """A result that can be saved, and comes back from its file by `load_document`.
 
-    A subclass names its ``SCHEMA`` and gives ``content``, ``document_form`` and ``from_content``.
+    A subclass is a frozen dataclass that names its ``SCHEMA``. Its fields are the document:
+    pydantic reads and writes them by their annotations, with `OrNaN`, `OrInfinity` and `Array`
+    where JSON has no such value. A field that is another document is stored as one.
     """
 
     SCHEMA: ClassVar[str] = ""
@@ -41,21 +145,51 @@ class Document:
         if "SCHEMA" in vars(cls):
             Document._kinds[cls.SCHEMA] = cls
 
-    @abstractmethod
     def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
+        """The fields in JSON types, with what is `derived` from them."""
+        kind: Any = type(self)
+        fields: dict[str, Any] = _adapter(kind).dump_python(self, mode="json", by_alias=True)
+        return fields | self.derived()
+
+    def derived(self) -> dict[str, Any]:
+        """Keys of the document that are no fields, for readers of the file."""
+        return {}
+
+    def check_content(self) -> None:
+        """Raise ValueError if fields of a document do not belong together."""
 
     @classmethod
-    @abstractmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`, checked by `document_form`; other errors are those of Python."""
+        """Inverse of `content`.
+
+        Raises InputError with the place of the first value that cannot be used.
+        """
+        from pydantic import ValidationError
+
+        try:
+            # Strict: lists become tuples, and mappings dataclasses, only if they come from JSON.
+            kind: Any = cls
+            found: Self = _adapter(kind).validate_json(json.dumps(content), strict=True)
+        except ValidationError as error:
+            raise InputError(validation_sentence(error)) from None
+        found.check_content()
+        return found
 
     @classmethod
-    def document_form(cls) -> type[Form]:
-        """What each key of the content must hold."""
-        from gmwm._core.forms import Form
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
+        """Schema of a field that is a document; that of the class itself has its fields."""
+        if cls is _being_adapted.get():
+            return handler(source)
+        return plain_schema(cls._restored, lambda document: document.to_dict())
 
-        return Form
+    @classmethod
+    def _restored(cls, value: Any) -> Self:
+        return value if isinstance(value, cls) else cls.from_dict(value)
+
+    @classmethod
+    def document_form(cls) -> type[Form] | None:
+        """What each key of the content must hold, where the fields do not say it."""
+        return None
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
@@ -80,7 +214,8 @@ class Document:
                 f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
             )
         try:
-            return cls.from_content(cls.document_form().checked(content))
+            form = cls.document_form()
+            return cls.from_content(form.checked(content) if form else content)
         except InputError as error:
             raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
         except (
@@ -114,6 +249,51 @@ class Document:
             json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
             stream.write("\n")
         return Path(path)
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    """What pydantic makes of the fields of a class of documents."""
+    from pydantic import TypeAdapter
+
+    token = _being_adapted.set(kind)
+    try:
+        return TypeAdapter(kind)
+    finally:
+        _being_adapted.reset(token)
+
+
+def validation_sentence(error: ValidationError) -> str:
+    """The place of the first wrong value, and what is wrong with it."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "content"
+    if first["type"] == "missing":
+        return f"there is no {place}"
+    if first["type"] == "value_error":
+        return f"{place}: {first['ctx']['error']}"
+    return f"{place} = {checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
+
+
+def check_covariance(matrix: Any, size: int, name: str = "covariance") -> None:
+    """Check a covariance: square, symmetric, without a negative variance.
+
+    Raises ValueError if it is none.
+    """
+    if len(matrix) != size or any(len(row) != size for row in matrix):
+        raise ValueError(f"{name} is not {size} x {size}")
+    array = np.array(matrix, dtype=float).reshape(size, size)
+    scale = np.sqrt(np.maximum(np.diag(array), 0.0))
+    bound = np.outer(scale, scale)
+    if np.any(np.diag(array) < 0.0) or np.any((bound == 0.0) & (array != 0.0)):
+        raise ValueError(f"{name} has a variance that is not positive")
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlation = array / np.where(bound > 0.0, bound, 1.0)
+        asymmetry = np.abs(correlation - correlation.T)
+    if np.any(asymmetry > _ASYMMETRY):
+        raise ValueError(f"{name} is not symmetric")
+    too_large = not np.all(np.isfinite(correlation))
+    if too_large or (size and np.min(np.linalg.eigvalsh(correlation)) < _NEGATIVE):
+        raise ValueError(f"{name} is not positive semi-definite")
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:

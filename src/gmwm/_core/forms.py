@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from gmwm._core import checks
-from gmwm._core.notices import SEVERITIES
+from gmwm._core.documents import check_covariance, validation_sentence
 from gmwm.errors import InputError, printable
-
-_ASYMMETRY = 1e-6  # of correlations: what is left by rounding in a computed covariance
-_NEGATIVE = -1e-4  # eigenvalue of correlations; all but redundant parameters leave rounding errors
+from gmwm.issues import SEVERITIES
 
 
 class Form(BaseModel):
@@ -36,17 +33,7 @@ class Form(BaseModel):
         try:
             return cls.model_validate(dict(content)).model_dump()
         except ValidationError as error:
-            raise InputError(_sentence(error)) from None
-
-
-def _sentence(error: ValidationError) -> str:
-    first = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in first["loc"]) or "content"
-    if first["type"] == "missing":
-        return f"there is no {place}"
-    if first["type"] == "value_error":
-        return f"{place}: {first['ctx']['error']}"
-    return f"{place} = {checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
+            raise InputError(validation_sentence(error)) from None
 
 
 Text = Annotated[str, Field(max_length=10_000), AfterValidator(printable)]
@@ -63,28 +50,6 @@ Interval = Annotated[float, Field(ge=checks.SHORTEST_INTERVAL, le=checks.LONGEST
 Keys = Annotated[Sequence[Text], Field(max_length=1000)]
 Model = Annotated[Sequence[dict[str, Any]], Field(min_length=1, max_length=1000)]
 """Terms as `gmwm.process` writes them, and reads them with checks of its own."""
-
-
-def covariance(matrix: Sequence[Sequence[float]], size: int, name: str = "covariance") -> None:
-    """Check a covariance: square, symmetric, without a negative variance.
-
-    Raises ValueError if it is none.
-    """
-    if len(matrix) != size or any(len(row) != size for row in matrix):
-        raise ValueError(f"{name} is not {size} x {size}")
-    array = np.array(matrix, dtype=float).reshape(size, size)
-    scale = np.sqrt(np.maximum(np.diag(array), 0.0))
-    bound = np.outer(scale, scale)
-    if np.any(np.diag(array) < 0.0) or np.any((bound == 0.0) & (array != 0.0)):
-        raise ValueError(f"{name} has a variance that is not positive")
-    with np.errstate(over="ignore", invalid="ignore"):
-        correlation = array / np.where(bound > 0.0, bound, 1.0)
-        asymmetry = np.abs(correlation - correlation.T)
-    if np.any(asymmetry > _ASYMMETRY):
-        raise ValueError(f"{name} is not symmetric")
-    too_large = not np.all(np.isfinite(correlation))
-    if too_large or (size and np.min(np.linalg.eigvalsh(correlation)) < _NEGATIVE):
-        raise ValueError(f"{name} is not positive semi-definite")
 
 
 def _severity(text: str) -> str:
@@ -106,3 +71,5 @@ class NoticeForm(Form):
 
 
 Notices = Annotated[Sequence[NoticeForm], Field(max_length=100_000)]
+
+covariance = check_covariance

@@ -5,8 +5,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 from html import escape
-from importlib import import_module
-from typing import Any
 
 from gmwm._core.units import factor
 
@@ -21,14 +19,6 @@ class Printed:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
-
-
-def made_by(function: str, result: Any, *args: Any, **options: Any) -> Any:
-    """What a function of `gmwm.report` makes of a result: a file, or a piece of HTML.
-
-    By name: the room of pages knows all results, and none of these knows it.
-    """
-    return getattr(import_module("gmwm.report"), function)(result, *args, **options)
 
 
 def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:

@@ -2,16 +2,16 @@
 
 from gmwm.calibration.calibration import Calibration as Calibration, load as load
 from gmwm.calibration.channel import AMBIGUITY as AMBIGUITY
-from gmwm.calibration.entrance import calibrate as calibrate
-from gmwm.calibration.judgement import LONGEST_PART as LONGEST_PART
-from gmwm.calibration.screening import SCREENING as SCREENING
-from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
-from gmwm.calibration.stationarity.departures import (
+from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,
     departures as departures,
 )
-from gmwm.calibration.stationarity.removal import without_departures as without_departures
+from gmwm.calibration.entrance import calibrate as calibrate
+from gmwm.calibration.judgement import LONGEST_PART as LONGEST_PART
+from gmwm.calibration.removal import without_departures as without_departures
+from gmwm.calibration.screening import SCREENING as SCREENING
+from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
 from gmwm.calibration.summary import (
     Level as Level,
     floor as floor,

@@ -12,7 +12,8 @@ from gmwm._core.documents import Document, load_document
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.notices import Notice
-from gmwm._core.text import made_by, wrapped
+from gmwm._core.pages import make
+from gmwm._core.text import wrapped
 from gmwm.calibration.summary import sentence
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
@@ -112,7 +113,7 @@ class Calibration(Mapping[str, Fit], Document):
         return f"<Calibration of {self.source or 'a recording'}: {', '.join(channels)}>"
 
     def _repr_html_(self) -> str:
-        html: str = made_by("fragment", self)
+        html: str = make("fragment", self)
         return html
 
     def __str__(self) -> str:
@@ -126,7 +127,7 @@ class Calibration(Mapping[str, Fit], Document):
             lines += wrapped(text, first=f"{name:<{width}}  {verdict:<9}  ", indent=2)
         for name, notice in self.skipped.items():
             lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
-        health = made_by("verdict", self)
+        health = make("verdict", self)
         return "\n".join([*lines, *wrapped(f"{health['word']}: {health['text']}.", indent=2)])
 
     def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
@@ -219,8 +220,8 @@ class Calibration(Mapping[str, Fit], Document):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write the self-contained HTML report; see `gmwm.report.write_report`."""
-        written: Path = made_by(
-            "write_report", self, path, recording, datasheet=datasheet, provenance=provenance
+        written: Path = make(
+            "page", self, path, recording, datasheet=datasheet, provenance=provenance
         )
         return written
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 from gmwm._core.notices import Notice
 from gmwm.calibration.calibration import Calibration
+from gmwm.calibration.departures import Departure, departures, with_departures
 from gmwm.calibration.stages import stage
-from gmwm.calibration.stationarity.departure_notices import with_departures
-from gmwm.calibration.stationarity.departures import Departure, departures
-from gmwm.calibration.stationarity.steadiness import steadiness_notice
+from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.calibration.unresolved import unresolved_notice, with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
@@ -86,10 +85,9 @@ def channel_model(
                 found = _fitted(parts[0] if len(parts) == 1 else parts, model, extra)
             with stage("departures"):
                 there = [departures(found.fit, part) for part in parts]
-            evident = [tuple(each for each in some if each.is_evident) for some in there]
-            if not left or not any(evident):
+            if not left or not any(there):
                 break
-            removed = [gone + more for gone, more in zip(removed, evident, strict=True)]
+            removed = [gone + more for gone, more in zip(removed, there, strict=True)]
     except InputError as error:
         return Notice(error.code or "not-estimable", "bad", name, str(error))
     curves = list(zip(before, parts, strict=True))
@@ -97,7 +95,7 @@ def channel_model(
     with stage("departures"):
         changes = [
             replace(notice, source=source if len(sources) > 1 else "")
-            for part, known, source in zip(parts, evident, sources, strict=True)
+            for part, known, source in zip(parts, there, sources, strict=True)
             if (notice := steadiness_notice(found.fit, part, known)) is not None
         ]
     return replace(found, fit=replace(fit, notices=(*fit.notices, *changes)))

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
-from gmwm._core.runs import (
+from gmwm._core.jobs import (
     PROCESSES,
-    beside,
+    during_startup,
+    extra_workers,
     one_blas_thread,
     shared,
-    spare,
-    while_beginning,
+    worker_pool,
 )
+from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
@@ -31,6 +31,7 @@ from gmwm.calibration.channel import (
     mostly_missing,
 )
 from gmwm.calibration.judgement import judged, with_one_remedy
+from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
     Screened,
@@ -39,7 +40,6 @@ from gmwm.calibration.screening import (
     with_outcomes,
 )
 from gmwm.calibration.stages import Stopwatch, current, stage
-from gmwm.calibration.stationarity.removal import variance_without
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
@@ -113,8 +113,10 @@ def calibrate(
     given = _recordings(recording)
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
-    others = spare(jobs, max(len(each.inertial) for each in given))
-    with beside(others if size > tuning.WORTH_PROCESSES else 0, "gmwm.estimate:compile_search"):
+    others = extra_workers(jobs, max(len(each.inertial) for each in given))
+    with worker_pool(
+        others if size > tuning.WORTH_PROCESSES else 0, "gmwm.estimate:compile_search"
+    ):
         return _calibrated(given, model, screening, still, remove_departures, progress)
 
 
@@ -148,7 +150,7 @@ def _calibrated(
         _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
         for name, parts in alive.items()
     ]
-    while_beginning(compile_steps)
+    during_startup(compile_steps)
     found = _models_found(channels, progress)
     issues = [
         replace(notice, source=each.recording.source) if len(given) > 1 else notice

@@ -31,7 +31,6 @@ _ADVICE = (
     "abrupt-end",
     "temperature",
     "variance",
-    "resets",
 )
 
 

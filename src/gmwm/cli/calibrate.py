@@ -56,16 +56,6 @@ _OF_RECORDING = (
 """Codes of notices of a fit that are those of the recording."""
 
 
-_EXPORTED = {
-    "basalt": "basalt.json", "gazebo": "gazebo.sdf", "glim": "glim.json",
-    "gnss-ins-sim": "gnss_ins_sim.py", "gtsam": "gtsam_imu.py", "gtsam-cpp": "gtsam_imu.h",
-    "kalibr": "imu.yaml", "kfgins": "kf-gins.yaml", "matlab": "imu_noise.m",
-    "openvins": "kalibr_imu_chain.yaml", "px4": "px4.params", "pyins": "pyins_imu.py",
-    "state-space": "state-space.json",
-}  # fmt: skip
-"""Names of the files of programs that want something else than NAME.yaml."""
-
-
 _FILES = ("calibration.json", "report.html", "imu.yaml")
 
 
@@ -133,10 +123,10 @@ def calibrate(
       gmwm calibrate static.bag --export kalibr -o out
     """
     if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
-        from gmwm._core.runs import beside, spare
+        from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
-        others = beside(spare(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
     from gmwm._core.memory import limited
@@ -149,7 +139,7 @@ def calibrate(
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
-        replaceable(output / _EXPORTED.get(target, f"{target}.yaml"))
+        replaceable(output / TARGETS[target].file_name)
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"), limited(memory):
             recordings = [read_recording(file, **reading) for file in files]
@@ -326,7 +316,7 @@ def write_files(
     if "imu.yaml" not in names and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
     if target is not None and not (target == "kalibr" and "imu.yaml" in names):
-        path = folder / _EXPORTED.get(target, f"{target}.yaml")
+        path = folder / TARGETS[target].file_name
         with stage("exports"):
             export(result, target, path=path)
         lines.append(f"wrote {path} for {target}")

@@ -98,7 +98,8 @@ def certify(
 def _numbers(
     imu: Path | None, white: str | None, walk: str | None, calibration: Calibration
 ) -> Any:
-    from gmwm.filter_numbers import SensorNumbers, read_numbers
+    from gmwm.export import read_numbers
+    from gmwm.filter_numbers import SensorNumbers
 
     if (imu is None) == (white is None and walk is None):
         raise InputError("the numbers in use: give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")

@@ -56,7 +56,7 @@ def compare(
       gmwm compare monday/calibration.json friday/calibration.json -o compare.html
       gmwm compare unit-*/calibration.json --datasheet imu.yaml -o compare.html
     """
-    from gmwm.comparison import compare as run, labelled
+    from gmwm.population import compare as run, labelled
     from gmwm.report import read_datasheet
 
     if datasheet is not None:  # what is wrong with it is known before the work

@@ -75,7 +75,7 @@ def fleet(
     """
     from gmwm.calibration import SCREENING
     from gmwm.errors import InputError
-    from gmwm.fleet import fleet as run
+    from gmwm.population import fleet as run
 
     try:
         with nullcontext() if quiet else progress_bar("fleet", "units") as bar:

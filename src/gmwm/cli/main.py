@@ -13,7 +13,7 @@ from io import StringIO, TextIOWrapper
 
 import click
 
-from gmwm import __version__
+from gmwm._core import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.calibrate import calibrate
 from gmwm.cli.certify import certify

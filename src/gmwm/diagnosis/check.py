@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.jobs import one_blas_thread, shared
 from gmwm._core.notices import Notice, Severity, worst_first
-from gmwm._core.runs import one_blas_thread, shared
 from gmwm._core.text import per_cent
 from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
 from gmwm.diagnosis import tuning
@@ -19,10 +19,9 @@ from gmwm.diagnosis.contamination import (
     contamination,
     contamination_notice,
     heavy_tails,
-    light_tails_notice,
     tails_notice,
 )
-from gmwm.diagnosis.drift import drift_notice, reset_notice, variance_notice
+from gmwm.diagnosis.drift import drift_notice, variance_notice
 from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
 from gmwm.diagnosis.innovations import Innovations, Signal, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
@@ -33,7 +32,6 @@ from gmwm.diagnosis.samples import (
     abrupt_end_notice,
     dead_notice,
     gap_notices,
-    hole_notice,
     length_notice,
     repeated_value_notice,
     saturation_notice,
@@ -261,23 +259,16 @@ def _examined(channel: Channel, motion: Motion) -> _Examined:
         held = 0.0  # most of what is held is held in a few places
     is_even = held > 0.0 and not leaves_runs(values)
     noise = known_of(quiet)
-    ended = (
-        saturation_notice(signal, present, noise)
-        or abrupt_end_notice(signal, noise)
-        or hole_notice(signal, noise)
-    )
     found = [
         held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
-        ended,
+        saturation_notice(signal, present, noise) or abrupt_end_notice(signal, noise),
         repeated_value_notice(signal, present),
         event_notice(signal, values, motion.outside(events, dt)),
         contamination_notice(name, outliers),
         tails_notice(name, errors, tails),
-        light_tails_notice(name, errors) if ended is None else None,
         rounding_notice(signal, noise, smallest),
         variance_notice(signal, errors, usable, is_heavy=tails is not None),
         drift_notice(signal, quiet),
-        reset_notice(signal, quiet),
     ]
     notices = [one for one in found if one is not None]
     standardized = _standardized(errors, usable)

@@ -213,29 +213,6 @@ def tails_notice(name: str, errors: Innovations, tails: Tails | None) -> Notice 
     )
 
 
-def light_tails_notice(name: str, errors: Innovations) -> Notice | None:
-    """Say that large errors are missing, as where samples were compressed.
-
-    An error is a sum of the samples before it, which is nearer to Gaussian noise than they are. Not
-    looked at where the noise hides in the rounding.
-
-    name: Of the channel.
-    """
-    least = -tuning.LIGHT - tuning.LIGHT_ERRORS * np.sqrt(24.0 / np.count_nonzero(errors.known))
-    is_hidden = errors.rounding > tuning.ROUNDING_OF_BODY * errors.level or not errors.level > 0.0
-    if is_hidden or (kurtosis := _excess_kurtosis(errors)) > least:
-        return None
-    return Notice(
-        "light-tails",
-        "note",
-        name,
-        f"the noise has lighter tails than Gaussian noise, with an excess kurtosis of "
-        f"{kurtosis:.2g}: large samples were compressed, or are sums of few rounding errors",
-        {"kurtosis": kurtosis},
-        "if compressed, N comes out too small: use a wider range",
-    )
-
-
 def _excess_kurtosis(errors: Innovations) -> float:
     there = errors.known & (errors.scale > 0.0)  # none where the channel is dead in part
     square = (errors.values[there] / errors.scale[there]) ** 2

@@ -9,7 +9,7 @@ import numpy as np
 from gmwm._core.distributions import chi2, fisher, norm
 from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, per_cent, readable
-from gmwm._core.typing import QUARTILE, BoolArray, FloatArray, IntArray, inner, median
+from gmwm._core.typing import BoolArray, FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Innovations, Signal
 
@@ -17,19 +17,11 @@ from gmwm.diagnosis.innovations import Innovations, Signal
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
     """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
-    return _present_means(*_sums(values[: size * parts], size), least * size)
-
-
-def _sums(values: FloatArray, size: int) -> tuple[FloatArray, IntArray]:
-    """Sums of the samples that are present in parts of a size, and their numbers."""
-    rows = values[: values.size // size * size].reshape(-1, size)
+    rows = values[: size * parts].reshape(-1, size)
     known = ~np.isnan(rows)
-    return np.sum(rows, axis=1, where=known), np.count_nonzero(known, axis=1)
-
-
-def _present_means(total: FloatArray, count: IntArray, fewest: float) -> FloatArray:
-    """Of parts by their sums; NaN where no more than so many samples are present."""
-    return np.where(count > fewest, total / np.maximum(count, 1), np.nan)
+    count = np.count_nonzero(known, axis=1)
+    total = np.sum(rows, axis=1, where=known)
+    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
 def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
@@ -87,87 +79,6 @@ def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
     )
     hint = "estimated as random walk or slow Gauss-Markov process"
     return Notice("drift", "note", name, text, numbers, hint)
-
-
-def reset_notice(signal: Signal, values: FloatArray) -> Notice | None:
-    """Find a level that steps at equal times, as where a sensor takes off its mean now and then.
-
-    Differences of means with one between, where a step may be, are added up, squared and bounded,
-    period by period and place by place. Noise has none that are much larger at one place of a
-    period than at all others, so that their sum is none of chi-square, allowing for all places.
-
-    values: (n,), samples, NaN where missing.
-    """
-    found, groups = (1.0, 0.0, 0), 0
-    size = values.size // tuning.PARTS
-    times_shortest = size * signal.dt * tuning.PARTS_OF_RESET[0] / tuning.SHORTEST_RESET
-    if times_shortest < 1.0:
-        return None
-    halvings = int(np.log2(times_shortest))
-    unit = size >> halvings + 1  # half of the shortest part
-    if unit == 0:
-        return None
-    sums = _sums(values, unit)
-    for power in range(halvings + 1):
-        merged = 2 << power
-        for first in (0, merged // 2):
-            count = min((sums[0].size - first) // merged, tuning.MOST_PARTS)
-            total, known = (
-                np.sum(each[first : first + count * merged].reshape(count, merged), axis=1)
-                for each in sums
-            )
-            means = _present_means(total, known, 0.5 * merged * unit)
-            chance, period, times = _most_regular(means[2:] - means[:-2])
-            found = min(found, (chance, period * merged * unit * signal.dt, times))
-            groups += 1
-    chance, period, times = found
-    if chance * max(groups, 1) > tuning.CHANCE_OF_RESETS:
-        return None
-    text = f"the level steps at equal times, every {period:.3g} s at least, {times} times"
-    hint = "switch off what resets it: slow terms of a model are those of what it leaves"
-    values_of = {"period": period, "times": float(times)}
-    return Notice("resets", "warning", signal.name, text, values_of, hint)
-
-
-def _most_regular(steps: FloatArray) -> tuple[float, float, int]:
-    """How likely noise has such steps at equal times, their period in places, and their number."""
-    from scipy.special import gammaincc
-
-    known = ~np.isnan(steps)
-    fewest, most = (
-        tuning.PARTS_OF_RESET[0],
-        min(tuning.PARTS_OF_RESET[1], steps.size / tuning.FEWEST_RESETS),
-    )
-    scale = median(np.abs(steps[known]), overwrite=True) / QUARTILE
-    if not (scale > 0.0 and most > fewest):
-        return 1.0, 0.0, 0
-    squares = np.where(known, np.minimum((steps / scale) ** 2, tuning.LARGEST_SQUARE), 0.0)
-    # From one to the next, the last place moves by half of one.
-    count = int(np.log(most / fewest) / np.log1p(0.5 / steps.size))
-    period = np.geomspace(fewest, most, count)[:, None]
-    wide, place = int(np.ceil(most)), np.arange(steps.size) % period
-    at = (place.astype(np.intp) + wide * np.arange(count)[:, None]).ravel()
-    total, times = (
-        np.bincount(at, np.tile(each, count), wide * count).reshape(count, wide)
-        for each in (squares, known)
-    )
-    mean = np.where(times >= tuning.FEWEST_RESETS, total / np.maximum(times, 1.0), 0.0)
-    best = np.argmax(mean, axis=1)[:, None]
-    places = np.arange(wide)
-    distance = np.abs(places - best)
-    others = (np.minimum(distance, np.ceil(period) - distance) > 2) & (places < period)
-    second = np.max(mean, axis=1, where=others, initial=0.0)
-    rest = np.sum(total, axis=1, where=others) / np.maximum(
-        np.sum(times, axis=1, where=others), 1.0
-    )
-    row = np.arange(count)
-    largest, number = mean[row, best[:, 0]], times[row, best[:, 0]]
-    rest = np.maximum(rest, 1.0)
-    chance = gammaincc(0.5 * number, 0.5 * number * largest / rest)
-    is_small = largest < tuning.ABOVE_REST * rest
-    chance[is_small | (largest < tuning.ABOVE_OTHERS * second)] = 1.0
-    i = int(np.argmin(chance))
-    return float(chance[i]) * float(np.sum(period)), float(period[i, 0]), int(number[i])
 
 
 def variance_notice(

@@ -88,8 +88,8 @@ class Health(Document, Printed):
         "rows-copied", "infinite", "size", "stuck", "held", "saturation", "abrupt-end",
         "value-repeated",
         "repeated-samples", "interpolated", "filled", "event",
-        "outliers", "heavy-tails", "light-tails", "rounding", "line", "resonance",
-        "drift", "resets", "variance", "temperature", "crosstalk" and "clean".
+        "outliers", "heavy-tails", "rounding", "line", "resonance",
+        "drift", "variance", "temperature", "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -297,62 +296,12 @@ def abrupt_end_notice(signal: Signal, values: FloatArray) -> Notice | None:
     )
 
 
-def hole_notice(signal: Signal, values: FloatArray) -> Notice | None:
-    """Find steps that never come among others that often do, as where a bit of a word is stuck.
-
-    Noise thins out towards a gap between two of its levels. Beside a hole the numbers of samples do
-    not fall, and the steps on both sides come without a gap: lattices that lie in each other, as
-    of two offsets, have gaps all over.
-
-    values: (n,), samples, none missing.
-    """
-    step, scatter = signal.step, signal.scatter
-    if not values.size or step == 0.0 or step > scatter:
-        return None
-    lowest = float(np.min(values))
-    if np.ptp(values) > tuning.MOST_STEPS * step:
-        return None
-    counts = np.bincount(np.rint((values - lowest) / step).astype(np.intp))
-    there = np.flatnonzero(counts)
-    found = [
-        (int(below), int(above))
-        for below, above in pairwise(there)
-        if above - below > tuning.LEAST_HOLE
-        and all(
-            edge.size == tuning.LEAST_HOLE
-            and np.min(edge) >= tuning.FEWEST_AT_END
-            and 2 * edge[0] >= np.max(edge)
-            for edge in (
-                counts[below - tuning.LEAST_HOLE + 1 : below + 1][::-1],
-                counts[above : above + tuning.LEAST_HOLE],
-            )
-        )
-    ]
-    if not found:
-        return None
-    below, above = max(found, key=lambda pair: pair[1] - pair[0])
-    ends = [lowest + place * step for place in (below, above)]
-    width = ends[1] - ends[0]
-    where = " and ".join(readable(end, signal.unit, digits=5) for end in ends)
-    return Notice(
-        "abrupt-end",
-        "bad" if width > tuning.WIDE_HOLE * scatter else "warning",
-        signal.name,
-        f"no sample lies between {where}, where those beside come often: a bit is stuck, or codes "
-        "of the converter are missing",
-        {"lowest": ends[0], "highest": ends[1], "holes": float(len(found))},
-        "look at the bits of the words between the sensor and the file",
-    )
-
-
 def repeated_value_notice(signal: Signal, values: FloatArray) -> Notice | None:
     """Find a value that comes far more often than the ones next to it, in many places.
 
     Noise above its step has no such value: the two values on either side come nearly as often. A
     driver that puts zero where the sensor did not answer, or a dead band, makes one. Runs of equal
-    samples count once: what stays is stuck. Numbers cut towards zero, as by a conversion to
-    integers, have twice as many zeros: the fall from zero to one step is larger then than from one
-    to two, where that of noise is smaller, and of a Laplace law the same.
+    samples count once: what stays is stuck.
 
     values: (n,), samples in their order, none missing.
     """
@@ -368,7 +317,7 @@ def repeated_value_notice(signal: Signal, values: FloatArray) -> Notice | None:
     share = count / values.size
     usual = tuning.BESIDE_REPEATED * np.max(near)
     if counts[most] - usual < max(tuning.FALSE_ALARM * values.size, tuning.LONG_RUN):
-        return _cut_to_zero_notice(signal.name, values, signal.step)
+        return None
     is_much = share > tuning.MUCH_REPEATED
     text = (
         f"{count:,} samples ({share:.2g} of all) are "
@@ -383,30 +332,6 @@ def repeated_value_notice(signal: Signal, values: FloatArray) -> Notice | None:
         {"value": float(levels[most]), "samples": float(count), "share": share},
         "if it stands for no answer or a dead band, make such samples missing (NaN)",
     )
-
-
-def _cut_to_zero_notice(name: str, values: FloatArray, step: float) -> Notice | None:
-    """Find twice as many zeros as noise has beside what lies around them."""
-    if step == 0.0:
-        return None
-    zeros, *others = (
-        int(np.count_nonzero(np.abs(np.abs(values) - k * step) < 0.25 * step)) for k in range(3)
-    )
-    one, two = (0.5 * count for count in others)
-    if min(zeros, one, two) < tuning.FEWEST_AT_END:
-        return None
-    error = np.sqrt(1.0 / zeros + 2.0 / one + 0.5 / two)
-    if np.log(zeros * two / one**2) - 3.0 * error < np.log(tuning.CUT_TO_ZERO):
-        return None
-    share = zeros / values.size
-    text = (
-        f"zero comes twice as often ({share:.2g} of all) as the values around it explain: samples "
-        "were cut towards zero, not rounded"
-    )
-    values_of = {"value": 0.0, "samples": float(zeros), "share": share}
-    severity: Severity = "bad" if share > tuning.MUCH_REPEATED else "warning"
-    hint = "round to the nearest step before the conversion to integers"
-    return Notice("value-repeated", severity, name, text, values_of, hint)
 
 
 def _slowest_fall(near: int, far: int) -> float:

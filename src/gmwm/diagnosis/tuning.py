@@ -86,11 +86,6 @@ LONG_RUN = 32
 FEWEST_AT_END = 8
 """Samples at the end of the scale from which saturation is looked for."""
 
-LEAST_HOLE, WIDE_HOLE, MOST_STEPS = 3, 0.5, 1e6
-"""Steps that never come, beside as many that do each time, from which they are a hole; its width in
-standard deviations of the noise, above which the channel is not valid (a hole of two of them makes
-N 1.45 times as large, of a half 1.05 times); range in steps, beyond which there is no counting."""
-
 FEWEST_OF_LEVEL, FEWEST_WIDE = 20, 0.01
 """Samples on a level whose neighbours do not stay empty by chance (2e-9); part of the samples on
 levels that are further apart than others, from which their step counts."""
@@ -99,10 +94,6 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
-
-CUT_TO_ZERO = 1.1
-"""Zeros times those two steps off over the square of those one step off: at most one of noise, that
-of a Laplace law in small steps; 2 to 1.26 of Gaussian noise cut in steps up to 0.7 of it."""
 
 LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
 """Part of the samples, and samples at least, next to an extreme in which the fall of the density is
@@ -171,15 +162,6 @@ SHORT_MEAN = 64
 RAMP = 20.0
 """Change over the record, in rms of the wander: 1 of 1000 random walks has more (200,000
 simulated)."""
-
-SHORTEST_RESET, PARTS_OF_RESET, MOST_PARTS, FEWEST_RESETS = 30.0, (8.0, 16.0), 512, 6
-"""s, of steps at equal times; parts in the time between two of them, whose means are compared;
-parts at most, the first ones; and steps of a record at least."""
-
-LARGEST_SQUARE, ABOVE_OTHERS, ABOVE_REST, CHANCE_OF_RESETS = 9.0, 2.0, 3.0, 1e-4
-"""Of a step of the level, in variances, so that few are not taken for many; how many times larger
-steps are at equal times than at any other place between (of a slow period as large at two), and
-than in the mean of these; and the chance of noise: a real accelerometer that wanders has 6e-4."""
 
 TENTHS = 10
 """Parts of the record among which the loudest is looked for."""
@@ -311,10 +293,6 @@ OCTAVES_OF_TAIL = 8
 ROUNDING_OF_BODY = 1.0
 """Standard deviations that rounding may add to a prediction error; the bins are no longer those of
 the noise beyond (a step of an eighth of the noise, with an autoregression of order 16)."""
-
-LIGHT, LIGHT_ERRORS = 0.2, 5.0
-"""Excess kurtosis below none, in addition to its standard errors: of samples compressed so much
-(tanh of a fifth of them) N is 3 % too small."""
 
 LEAST_SHAPE = {"student": 2.0, "power": 0.5}
 """Shapes of the laws above which they are those of noise: Student's t has a variance, and the

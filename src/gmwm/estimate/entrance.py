@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.runs import one_blas_thread
+from gmwm._core.jobs import one_blas_thread
 from gmwm._core.typing import FloatArray
 from gmwm.errors import FitWarning, InputError
 from gmwm.estimate.likelihood import EM, MLE, Whittle

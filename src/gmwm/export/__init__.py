@@ -1,13 +1,22 @@
-"""Numbers for filters in the files that other programs read, one file per consumer or format."""
+"""Numbers for filters in the files that other programs read.
+
+A consumer is one class in `gmwm.export.programs`, listed once in `TARGETS`, and described in
+docs/export.md. The class declares its keys once: they write the file and read it back.
+"""
 
 import sys
 from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from gmwm.export.export import TARGETS as TARGETS, export as export
-from gmwm.export.found import axis_of as axis_of, imu_of as imu_of
-from gmwm.export.imu import SENSORS as SENSORS, Axis as Axis, Imu as Imu, Triad as Triad
+from gmwm.export.export import TARGETS as TARGETS, export as export, read_numbers as read_numbers
+from gmwm.export.imu import (
+    SENSORS as SENSORS,
+    Axis as Axis,
+    ImuNumbers as ImuNumbers,
+    Triad as Triad,
+)
+from gmwm.export.numbers import axis_of as axis_of, imu_of as imu_of
 from gmwm.export.target import ImuFile as ImuFile, Target as Target
 
 

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from gmwm._core.units import si_parameter_unit
-from gmwm.export.imu import Axis, Imu, Triad
+from gmwm.export.imu import Axis, ImuNumbers, Triad
 
 WIDTH = 72
 """Columns of a line of comment, 80 with the marks of the languages around it."""
@@ -14,7 +14,7 @@ WIDTH = 72
 _LONGEST = 500  # characters of one remark or name
 
 _HOW = {
-    "bound": "the smallest that are never too optimistic for the error models",
+    "bound": "the smallest that are never overconfident for the error models",
     "reduce": "those whose filter has the right errors at the horizon, see gmwm.reduce",
     "given": "given, not from a recording",
 }
@@ -26,13 +26,20 @@ _COLUMNS = {
 
 
 def plain(text: str) -> str:
-    """A text that is not ours on one line, without characters that a parser might stop at.
+    """A foreign text on one line, without characters that a parser might stop at.
 
     Line ends of every kind become blanks; other control characters, and a backslash, which
     continues a C++ comment on the next line, become question marks.
     """
     line = " ".join(text.split())[:_LONGEST]
     return "".join(c if c.isprintable() and c != "\\" else "?" for c in line)
+
+
+def wrapped(text: str) -> list[str]:
+    """A text in lines that are at most 80 columns wide in every file."""
+    return textwrap.wrap(
+        text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def comment(lines: Sequence[str], mark: str) -> list[str]:
@@ -43,103 +50,98 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
     return [f"{mark} {line}".rstrip() for line in lines]
 
 
-def above(imu: Imu, name: str) -> list[str]:
-    """What stands above the numbers: their source, the program, and what they are for."""
-    lines = [line for source in imu.sources for line in wrapped(plain(source))]
-    lines += wrapped(name)
-    lines += wrapped(f"{imu.form} for {imu.horizon:g} s without aiding, explained below")
+def above(imu: ImuNumbers, name: str) -> list[str]:
+    """Lines above the numbers: their source, the program, and what they are for."""
+    texts = [plain(source) for source in imu.sources]
+    texts += [name, f"{imu.form} for {imu.horizon:g} s without aiding, explained below"]
     if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
-        lines += wrapped(
+        texts.append(
             f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "
             "below is the higher, of a message that holds both"
         )
-    return [*lines, *(line for caution in imu.cautions for line in wrapped(plain(caution)))]
+    texts += [plain(caution) for caution in imu.cautions]
+    return [line for text in texts for line in wrapped(text)]
 
 
-def below(imu: Imu, convention: str) -> list[str]:
-    """What stands below the numbers: convention, values by axis, consistency."""
+def below(imu: ImuNumbers, convention: str) -> list[str]:
+    """Lines below the numbers: convention, values by axis, consistency."""
     lines = wrapped(f"{convention}; {_HOW[imu.method]}")
     for triad in imu.triads:
         lines += _table(imu, triad)
+    texts = []
     if any(triad.shared_nees is not None for triad in imu.triads):
-        lines += wrapped(
+        texts.append(
             "shared: for all axes of a sensor, which this file holds; the others: of each axis by "
             "itself, which it does not hold"
         )
         if any(_is_traded(triad) for triad in imu.triads):
-            lines += wrapped(
-                "where an axis has more of N or K than all share it has less of the other: a "
-                "larger K pays for a smaller N, and neither pair is too optimistic"
+            texts.append(
+                "where an axis has more of N or K than all share it has less of the other: use N "
+                "and K as a pair, neither pair is overconfident"
             )
-    shown = [axis.nees for triad in imu.triads for axis in triad.axes]
-    shown += [nees for triad in imu.triads for nees in (triad.shared_nees or {}).values()]
-    if any(shown):
-        lines += wrapped(
-            "NEES: predicted error squared over what a filter with these numbers believes, after "
-            "that time without aiding; 1 is consistent, below 1 cautious, above 1 too optimistic"
+    known = [axis.nees for triad in imu.triads for axis in triad.axes]
+    known += [nees for triad in imu.triads for nees in (triad.shared_nees or {}).values()]
+    if any(known):
+        texts.append(
+            "NEES: expected error squared over the filter's covariance with these numbers, after "
+            "that time without aiding; 1 is consistent, below 1 conservative, above 1 overconfident"
         )
-    if imu.method != "given" and not all(shown):
-        lines += wrapped(
+    if imu.method != "given" and not all(known):
+        texts.append(
             "NEES is not known where the file holds other numbers than were found for an axis, "
             "without its error model: export the calibration"
         )
     for triad in imu.triads:
         by_horizon = imu.outlook.get(triad.quantity, {})
-        values = [f"{t:g} s: {n:.3e}, {_walk(k, triad)}" for t, (n, k) in by_horizon.items()]
+        # Models without a random walk have the file's upper limit.
+        limit = f"< {triad.K:.3e}" if triad.is_upper("K") else None
+        values = [
+            f"{t:g} s: {n:.3e}, {limit if limit and k <= 0.0 else f'{k:.3e}'}"
+            for t, (n, k) in by_horizon.items()
+        ]
         if values:
-            title = f"{triad.quantity} N, K for all axes by horizon"
-            lines += wrapped(f"{title}: {'; '.join(values)}")
-    for remark in imu.remarks:
-        lines += wrapped(plain(remark))
-    return lines
+            texts.append(f"{triad.quantity} N, K for all axes by horizon: {'; '.join(values)}")
+    texts += [plain(remark) for remark in imu.remarks]
+    return [*lines, *(line for text in texts for line in wrapped(text))]
 
 
-def _table(imu: Imu, triad: Triad) -> list[str]:
+def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
     """The numbers of each axis under those that a file holds for all, with their consistency."""
     columns = [*_COLUMNS[imu.form], ("start", "u")]
-    units = [f"{key} [{_unit(unit, triad.quantity)}]" for key, unit in columns]
+    keys = [key for key, _ in columns]
     times = sorted({time for axis in triad.axes for time in axis.nees})
     shared = triad.shared_nees
-    kinds = ["own"] if shared is None else ["shared", "own"]
-    names = [f"{plain(axis.name)}" for axis in triad.axes]
-    rows = [_values(axis, axis.upper, columns) for axis in triad.axes]
-    for row, axis in zip(rows, triad.axes, strict=True):
+    rows = []
+    if shared is not None:
+        upper = frozenset(key for key in keys if triad.is_upper(key))
+        rows.append(["shared", *_values(triad, upper, keys), *[""] * 2 * len(times)])
+    for axis in triad.axes:
+        row = [plain(axis.name), *_values(axis, axis.upper, keys)]
         for time in times:
             row += [] if shared is None else [_nees(shared.get(axis.name, {}), time)]
             row.append(_nees(axis.nees, time))
-    if shared is not None:
-        names.insert(0, "shared")
-        upper = frozenset(key for key, _ in columns if triad.is_upper(key))
-        rows.insert(0, [*_values(triad, upper, columns), *[""] * len(kinds) * len(times)])
-    widths = [11] * len(columns) + [6] * len(kinds) * len(times)
-    first = max(map(len, names))
-
-    def line(name: str, cells: Sequence[str]) -> str:
-        return f"{name:<{first}}" + "".join(
-            f" {cell:>{width}}" for cell, width in zip(cells, widths, strict=True)
-        )
-
-    lines = [f"{triad.quantity}: {', '.join(units)}"]
-    heads = [key for key, _ in columns]
-    if shared is None:
-        heads += [f"NEES {time:g} s" for time in times]
-        widths[len(columns) :] = [max(6, len(head)) for head in heads[len(columns) :]]
-    else:
-        over = f" {'':<{first + sum(widths[: len(columns)]) + len(columns) - 1}}"
-        span = 7 * len(kinds)
-        lines.append((over + "".join(f"{f'NEES {time:g} s':>{span}}" for time in times)).rstrip())
-        heads += kinds * len(times)
-    return [
-        *lines,
-        *(line(name, row).rstrip() for name, row in zip(["", *names], [heads, *rows], strict=True)),
+        rows.append(row)
+    first = max(len(row[0]) for row in rows)
+    heads = [f"NEES {time:g} s" for time in times]
+    lines = [
+        f"{triad.quantity}: {', '.join(f'{k} [{_unit(u, triad.quantity)}]' for k, u in columns)}"
     ]
+    if shared is None:
+        widths = [first, *[11] * len(keys), *(max(6, len(head)) for head in heads)]
+    else:
+        over = " " * (first + 12 * len(keys))
+        lines.append((over + "".join(f"{head:>14}" for head in heads)).rstrip())
+        heads = ["shared", "own"] * len(times)
+        widths = [first, *[11] * len(keys), *[6] * len(heads)]
+    for name, *cells in [["", *keys, *heads], *rows]:
+        line = " ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
+        lines.append(f"{name:<{first}} {line}".rstrip())
+    return lines
 
 
-def _values(
-    of: Axis | Triad, upper: frozenset[str], columns: Sequence[tuple[str, str]]
-) -> list[str]:
-    """Numbers as they are shown; upper bounds have a sign before them."""
-    values = {key: of.initial_sd if key == "start" else getattr(of, key) for key, _ in columns}
+def _values(of: Axis | Triad, upper: frozenset[str], keys: Sequence[str]) -> list[str]:
+    """Numbers as they are shown; upper limits have a sign before them."""
+    values = {key: of.initial_sd if key == "start" else getattr(of, key) for key in keys}
     return [f"{'< ' if key in upper else ''}{value:.3e}" for key, value in values.items()]
 
 
@@ -157,20 +159,6 @@ def _is_traded(triad: Triad) -> bool:
     )
 
 
-def _walk(K: float, triad: Triad) -> str:
-    """A random walk; where the models have none, its upper bound if the file has that."""
-    return f"< {triad.K:.3e}" if K <= 0.0 and triad.is_upper("K") else f"{K:.3e}"
-
-
 def _unit(unit: str, quantity: str) -> str:
-    return (
-        si_parameter_unit(unit, quantity)
-        .replace("rad/s/s/", "rad/s^2/")
-        .replace("m/s^2/s/", "m/s^3/")
-    )
-
-
-def wrapped(text: str) -> list[str]:
-    """A text in lines that are at most 80 columns wide in every file."""
-    return textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_long_words=False,
-                         break_on_hyphens=False)  # fmt: skip
+    text = si_parameter_unit(unit, quantity)
+    return text.replace("rad/s/s/", "rad/s^2/").replace("m/s^2/s/", "m/s^3/")

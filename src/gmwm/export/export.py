@@ -1,36 +1,51 @@
-"""Numbers for a filter as the file of the program that runs it."""
+"""Numbers for a filter as the file of the program that runs it, and back."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.files import writable_file
 from gmwm.calibration import Calibration
-from gmwm.export.programs.gtsam import GTSAM
-from gmwm.export.programs.json_targets import JSON_TARGETS
+from gmwm.errors import InputError
+from gmwm.export.keys import Entries, Keys, Pair
+from gmwm.export.programs.gtsam import Gtsam, GtsamCpp
+from gmwm.export.programs.json_files import Basalt, Glim
 from gmwm.export.programs.keyed import KEYED
-from gmwm.export.programs.kfgins import KFGINS
-from gmwm.export.programs.matlab import MATLAB
-from gmwm.export.programs.ros import ROS
-from gmwm.export.programs.simulators import SIMULATORS
-from gmwm.export.programs.state_space import STATE_SPACE
+from gmwm.export.programs.kfgins import KfGins
+from gmwm.export.programs.ros import Ros
+from gmwm.export.programs.simulators import Gazebo, GnssInsSim, Matlab, PyIns
+from gmwm.export.programs.state_space import StateSpaceFile
 from gmwm.export.target import Target
 from gmwm.filter_numbers import SensorNumbers
+from gmwm.process import Model
 
-TARGETS: Mapping[str, Target] = MappingProxyType(
-    {
-        target.name: target
-        for target in (
-            *KEYED, *GTSAM, ROS, MATLAB, STATE_SPACE, *SIMULATORS, KFGINS,
-            *JSON_TARGETS,
-        )
-    }
-)  # fmt: skip
+_CONSUMERS: tuple[type[Target], ...] = (
+    *KEYED,
+    Gtsam,
+    GtsamCpp,
+    Ros,
+    Matlab,
+    StateSpaceFile,
+    Gazebo,
+    PyIns,
+    GnssInsSim,
+    KfGins,
+    Basalt,
+    Glim,
+)
+
+TARGETS: Mapping[str, Target] = MappingProxyType({each.name: each() for each in _CONSUMERS})
 """Every consumer by name."""
+
+_RATES = ("update_rate", "IMU.Frequency")
+"""Keys of the rate of the IMU in files."""
 
 
 def export(
@@ -77,3 +92,43 @@ def export(
     if path is None:
         return chosen.export(given, horizon, form)
     return chosen.save(writable_file(path), given, horizon, form)
+
+
+def read_numbers(
+    path: str | os.PathLike[str], rate: float | None = None
+) -> dict[str, Pair | Model]:
+    """The numbers of gyro and accelerometer in a program's file.
+
+    path: Of a program of `TARGETS` that has keys: Kalibr, OpenVINS, GTSAM, PX4 and others.
+    rate: Of the IMU, Hz, for programs whose numbers depend on it; by default the file's own.
+    Returns: "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
+        (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
+    Raises InputError if the file cannot be read, has no known keys, or its numbers need a rate.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error}): check the path") from None
+    values = Entries.of(text)
+    layouts: dict[Keys, None] = {each.keys: None for each in TARGETS.values() if each.keys}
+    keys = next((each for each in layouts if any(name in values for name in each.names)), None)
+    if keys is None:
+        known = "; ".join(", ".join(each.names[:2]) for each in layouts)
+        raise InputError(
+            f"{path}: has no noise parameters by names known here ({known}): give N and K"
+        )
+    for name in keys.names:
+        if name not in values:
+            raise InputError(f"{path}: {name} is missing: add it")
+        if not np.all(values[name] > 0.0):
+            raise InputError(f"{path}: {name} = {values[name][0]:g}: give a positive number")
+    own_rate = next((float(values[key][0]) for key in _RATES if key in values), 0.0)
+    try:
+        found = keys.read(values, rate or own_rate)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return {
+        f"{kind}_{letter}" if letter else kind: item
+        for kind, items in zip(("gyro", "accel"), found, strict=True)
+        for letter, item in zip("xyz" if len(items) == 3 else ("",), items, strict=True)
+    }

@@ -23,7 +23,7 @@ LETTERS = "xyz"
 
 @dataclass(frozen=True)
 class Axis:
-    """The numbers of one axis.
+    """The numbers of one axis in a file.
 
     name: Of its channel.
     N, K: u/sqrt(Hz) and u/s/sqrt(Hz).
@@ -31,8 +31,8 @@ class Axis:
     initial_sd: Of the bias at the start, u.
     nees: Predicted normalised error squared by time without aiding.
     rate: Of its samples, Hz; NaN if it is not known.
-    upper: Which of the numbers are upper bounds of a term that was not found.
-    notices: What there is to know of them.
+    upper: Which of the numbers are upper limits of a term that was not found.
+    notices: Those of its filter numbers.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Axis:
 
     @property
     def model(self) -> Model:
-        """What a filter believes that has these numbers."""
+        """The error model that a filter with these numbers has."""
         slow = GaussMarkov(self.sigma, self.tau) if self.tau > 0.0 else RandomWalk(self.K)
         return WhiteNoise(self.N) + slow
 
@@ -100,7 +100,7 @@ class Triad:
         return all(letter in axis.upper for axis in self.axes)
 
     def _for_all(self, letter: str) -> float:
-        """The bound over the axes; the largest of their upper bounds if no axis has the term."""
+        """The bound over the axes; the largest of their upper limits if no axis has the term."""
         if self.common is not None and not self.is_upper(letter):
             return float(getattr(self.common, letter))
         found = [axis for axis in self.axes if letter not in axis.upper]
@@ -126,7 +126,7 @@ class Triad:
 
 
 @dataclass(frozen=True)
-class Imu:
+class ImuNumbers:
     """Gyros and accelerometers, and what the numbers are for.
 
     Attributes
@@ -160,7 +160,7 @@ class Imu:
     cautions: tuple[str, ...] = ()
     topic: str = ""
 
-    def by_axis(self) -> Imu:
+    def by_axis(self) -> ImuNumbers:
         """The same for a file that has the numbers of each axis."""
         gyro, accel = (replace(each, common=None, shared_nees=None) for each in self.triads)
         return replace(self, gyro=gyro, accel=accel)

@@ -1,26 +1,31 @@
-"""A consumer of the numbers, and how its file is put together."""
+"""A consumer of the numbers: what its file holds, and how the file is put together."""
 
 from __future__ import annotations
 
+import json
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 from gmwm._core import checks
 from gmwm._core.files import written
 from gmwm.errors import InputError
-from gmwm.export import tuning
 from gmwm.export.comments import above, below, comment, wrapped
-from gmwm.export.found import imu_of
-from gmwm.export.imu import Imu
+from gmwm.export.imu import ImuNumbers
+from gmwm.export.keys import Keys
+from gmwm.export.numbers import imu_of
 from gmwm.filter_numbers import FORMS
 
+OUTAGE = 60.0
+"""s without aiding: a tunnel or an underpass for an INS/GNSS filter."""
 
-@dataclass(frozen=True)
+KEYFRAME = 1.0
+"""s between the keyframes or scans that visual and lidar odometry relate to each other."""
+
+
 class Target(ABC):
-    """A file that some program reads.
+    """A file that some program reads; a subclass sets the class attributes.
 
     name: As users write it.
     title: The program.
@@ -30,23 +35,31 @@ class Target(ABC):
     form: The form of the numbers that it holds.
     horizon: Time without aiding unless another is given, s.
     warnings: What to know before use.
+    file_name: How `gmwm calibrate` calls the file; by default name.yaml.
+    keys: By which the numbers are read back; None if they cannot be.
     """
 
-    name: str
-    title: str
-    file: str
-    convention: str
-    source: str
-    _: KW_ONLY
-    form: str = "N+K"
-    horizon: float = tuning.HORIZON
-    warnings: tuple[str, ...] = ()
+    name: ClassVar[str]
+    title: ClassVar[str]
+    file: ClassVar[str]
+    convention: ClassVar[str]
+    source: ClassVar[str]
+    form: ClassVar[str] = "N+K"
+    horizon: ClassVar[float] = OUTAGE
+    warnings: ClassVar[tuple[str, ...]] = ()
+    file_name: ClassVar[str] = ""
+    keys: ClassVar[Keys | None] = None
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "name" in vars(cls) and not cls.file_name:
+            cls.file_name = f"{cls.name}.yaml"
 
     @abstractmethod
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         """The file of calibrations or of numbers.
 
-        Raises InputError if they do not hold what it needs.
+        Raises InputError if they lack something that the file needs.
         """
 
     def save(
@@ -63,34 +76,34 @@ class Target(ABC):
         return text
 
 
-@dataclass(frozen=True)
 class ImuFile(Target):
     """Numbers of gyros and accelerometers, between comments that say what they are.
 
-    body: Lines between the comments, of an `Imu`; of files in JSON, the object.
     shared: Whether the axes of a sensor have one value.
     one_tau: Whether all axes have one correlation time.
     mark: What a comment begins with.
     head: Lines that must stand first.
     """
 
-    body: Callable[[Imu], Any]
-    _: KW_ONLY
-    shared: bool = False
-    one_tau: bool = False
-    mark: str = "#"
-    head: tuple[str, ...] = ()
+    shared: ClassVar[bool] = False
+    one_tau: ClassVar[bool] = False
+    mark: ClassVar[str] = "#"
+    head: ClassVar[tuple[str, ...]] = ()
 
-    def above(self, imu: Imu) -> list[str]:
+    @abstractmethod
+    def body(self, imu: ImuNumbers) -> Any:
+        """Lines between the comments; of files in JSON, the object."""
+
+    def above(self, imu: ImuNumbers) -> list[str]:
         """Lines of comment above the numbers, without the mark."""
         name = f"{self.title}, {self.file}"
         return [*above(imu, name), *(line for text in self.warnings for line in wrapped(text))]
 
-    def below(self, imu: Imu) -> list[str]:
+    def below(self, imu: ImuNumbers) -> list[str]:
         """Lines of comment below the numbers, without the mark."""
         return below(imu, f"{self.convention} ({self.source})")
 
-    def text(self, imu: Imu) -> str:
+    def text(self, imu: ImuNumbers) -> str:
         """The whole file."""
         first, last = (comment(each(imu), self.mark) for each in (self.above, self.below))
         return "\n".join([*self.head, *first, *self.body(imu), "", *last]) + "\n"
@@ -103,3 +116,23 @@ class ImuFile(Target):
         except InputError as error:
             raise InputError(f"{self.title}: {error}", error.code) from None
         return self.text(imu)
+
+
+class JsonFile(ImuFile):
+    """A file in JSON, whose comments are an entry of their own at the end."""
+
+    def text(self, imu: ImuNumbers) -> str:
+        return json_text({**self.body(imu), "comment": [*self.above(imu), *self.below(imu)]}) + "\n"
+
+
+def json_text(value: Any, indent: str = "") -> str:
+    """JSON with an entry, or a line of text, on each line; matrices on one."""
+    inner = indent + "  "
+    if isinstance(value, dict):
+        lines = [
+            f"{inner}{json.dumps(key)}: {json_text(each, inner)}" for key, each in value.items()
+        ]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and value and all(isinstance(each, str) for each in value):
+        return "[\n" + ",\n".join(inner + json.dumps(each) for each in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False)

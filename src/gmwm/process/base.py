@@ -78,6 +78,13 @@ class Process:
     is_line: ClassVar[bool] = False
     """Whether all of its variance is in spectral lines."""
 
+    is_textbook: ClassVar[bool] = False
+    """Whether it is one of the kinds whose sums follow almost any noise: first weights of a fit
+    and the candidates of a selection are made of them."""
+
+    is_exponential: ClassVar[bool] = False
+    """Whether ``sigma`` and ``tau`` are those of an autocovariance ``sigma^2 exp(-lag / tau)``."""
+
     has_finite_state_space: ClassVar[bool] = True
     """Whether `state_space`, where there is one, is exact."""
 

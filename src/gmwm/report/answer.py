@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration, floor
@@ -87,6 +88,7 @@ def _causes(calibration: Calibration) -> dict[str, list[str]]:
     return causes
 
 
+@page_of(Calibration, "verdict")
 def verdict(calibration: Calibration) -> dict[str, str]:
     """The health of sensor and recording in one line, and what of it no channel's validity says."""
     found = findings(calibration)

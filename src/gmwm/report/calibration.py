@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from gmwm._core.files import writable_file, written
+from gmwm._core.jobs import shared
 from gmwm._core.notices import worst_first
-from gmwm._core.runs import shared
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
@@ -46,6 +47,7 @@ from gmwm.report.text import duration_text, needed
 _AIM = 0.1  # relative standard error
 
 
+@page_of(Calibration)
 def write_report(
     calibration: Calibration,
     path: str | os.PathLike[str],
@@ -114,6 +116,7 @@ def page(
     )
 
 
+@page_of(Calibration, "fragment")
 def fragment(calibration: Calibration) -> str:
     """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
     found = verdict(calibration)

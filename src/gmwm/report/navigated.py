@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
 from gmwm._core.text import readable
 from gmwm._core.units import SI_UNIT
 from gmwm.ins.field import Comparison, Navigated, outage_pictures
@@ -14,6 +15,7 @@ from gmwm.report.text import duration_text, model_text
 from gmwm.report.validation import svg
 
 
+@page_of(Navigated)
 def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
     """Write the report of a solution as one HTML file that needs no network.
 
@@ -45,6 +47,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
     )
 
 
+@page_of(Comparison)
 def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
     """Write the report of a comparison of sensor models as one HTML file.
 

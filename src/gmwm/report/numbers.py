@@ -9,7 +9,7 @@ import yaml
 
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export import SENSORS, TARGETS, Axis, Imu, ImuFile, Triad, axis_of, imu_of
+from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, ImuNumbers, Triad, axis_of, imu_of
 from gmwm.filter_numbers import bound
 
 HORIZONS = (1.0, 10.0, 60.0, 600.0)
@@ -61,8 +61,8 @@ def certified(
 
 
 def _at(
-    calibration: Calibration, horizon: float, before: Imu | None
-) -> tuple[Certified, Imu | None]:
+    calibration: Calibration, horizon: float, before: ImuNumbers | None
+) -> tuple[Certified, ImuNumbers | None]:
     """The numbers for a horizon, and the IMU that they make; ``before`` is that of another."""
     axes: dict[str, Axis] = {}
     problem, notes = "", []
@@ -89,8 +89,8 @@ def _at(
 
 
 def _imu(
-    calibration: Calibration, names: tuple[str, ...], horizon: float, before: Imu | None
-) -> tuple[Imu | None, str]:
+    calibration: Calibration, names: tuple[str, ...], horizon: float, before: ImuNumbers | None
+) -> tuple[ImuNumbers | None, str]:
     """The IMU of some channels, or why there is none."""
     fits = {name: calibration[name] for name in names if calibration[name].wv.quantity in SENSORS}
     outlook = None if before is None else before.outlook
@@ -101,7 +101,7 @@ def _imu(
         return None, str(error)
 
 
-def _files(imu: Imu) -> dict[str, str]:
+def _files(imu: ImuNumbers) -> dict[str, str]:
     texts = {}
     for name, title in _TITLES.items():
         target = TARGETS[name]

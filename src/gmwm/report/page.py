@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import gmwm
+from gmwm._core import __version__
 from gmwm._core.files import written
 from gmwm.errors import printable
 
@@ -66,7 +66,7 @@ def _environment() -> Environment:
         loader=PackageLoader("gmwm", "report"), autoescape=True, undefined=StrictUndefined
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    environment.globals |= {"style": resource("report.css"), "version": gmwm.__version__}
+    environment.globals |= {"style": resource("report.css"), "version": __version__}
     return environment
 
 
@@ -74,7 +74,7 @@ def origin(known: Mapping[str, str], what: str, sheet: Datasheet | None) -> dict
     """What is known of where the numbers come from, versions and the date of ``what``."""
     known = dict(known) if sheet is None else {**known, "data sheet": sheet.name}
     return {printable(key): printable(value) for key, value in known.items()} | {
-        "versions": f"gmwm {gmwm.__version__}, numpy {np.__version__}, "
+        "versions": f"gmwm {__version__}, numpy {np.__version__}, "
         f"Python {platform.python_version()}",
         what: datetime.now(UTC).strftime("%Y-%m-%d (UTC)"),
     }

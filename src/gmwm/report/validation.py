@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
 from gmwm.ins.montecarlo import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
 from gmwm.report.text import model_text
@@ -24,6 +25,7 @@ _GROUPS = ("horizontal", "vertical", "position", "velocity", "attitude", "sensor
 _COVERED = ("horizontal", "vertical")
 
 
+@page_of(Validation)
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
     """Write the report of a validation as one HTML file that needs no network.
 

@@ -183,7 +183,7 @@ def _filters(
 
 def _digest(recording: Recording) -> str:
     """Of what a calibration depends on: the samples, and the version of the program."""
-    from gmwm import __version__
+    from gmwm._core import __version__
 
     digest = hashlib.sha256(f"{__version__} {recording.source} {recording.dt!r}".encode())
     for axis in AXES:

@@ -22,7 +22,7 @@ from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
-from gmwm.variance.analysis import as_channel, checked_samples
+from gmwm.variance.series import as_channel, checked_samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

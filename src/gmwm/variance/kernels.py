@@ -16,10 +16,10 @@ _ROW = 1 << FINE  # shortest averaging time of the other levels
 _PIECE = 256
 
 # Sums in any order, so that they run on vector registers.
-_ANY_ORDER = {"reassoc", "contract", "nsz"}
+ANY_ORDER = {"reassoc", "contract", "nsz"}
 
 
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def summed_with_moments(
     out: FloatArray, first: FloatArray, second: FloatArray
 ) -> tuple[float, float]:
@@ -40,7 +40,7 @@ def summed(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
         out[i] = first[i] + second[i]
 
 
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def _second_differences(
     first: FloatArray, second: FloatArray, third: FloatArray
 ) -> tuple[float, float]:
@@ -203,7 +203,7 @@ def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
         result[i + 1] = total
 
 
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def slope(values: FloatArray, parts: NDArray[np.int64]) -> float:
     """Of the least-squares lines of one slope through the samples of the parts, per sample.
 
@@ -228,7 +228,7 @@ def slope(values: FloatArray, parts: NDArray[np.int64]) -> float:
     return product / square if square > 0.0 else 0.0
 
 
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     """Number, and sums of the second and fourth powers, of first differences that exist."""
     count, square, fourth = 0, 0.0, 0.0
@@ -242,7 +242,7 @@ def difference_powers(values: FloatArray) -> tuple[int, float, float]:
     return count, square, fourth
 
 
-@compiled(fastmath=_ANY_ORDER)
+@compiled(fastmath=ANY_ORDER)
 def survey(values: FloatArray) -> tuple[int, float, float, float]:
     """Number of missing samples; sum, smallest and largest of the others."""
     missing, total = 0, 0.0

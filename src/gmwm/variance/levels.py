@@ -15,7 +15,8 @@ from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import wavelet as known_wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.gaps.effects import (
+from gmwm.variance.filling import Filling, levels_apart
+from gmwm.variance.gaps import (
     GapEffects,
     Gaps,
     Runs,
@@ -24,7 +25,6 @@ from gmwm.variance.gaps.effects import (
     window_centres,
     window_count,
 )
-from gmwm.variance.gaps.filling import Filling, levels_apart
 from gmwm.variance.kernels import (
     FINE,
     coarse_moments,

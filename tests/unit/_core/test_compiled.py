@@ -86,7 +86,7 @@ def test_a_loop_is_compiled_anew_after_what_it_calls_changed(tmp_path, monkeypat
 
 def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants_that_one_names(tmp_path):
     texts = {
-        "__init__.py": "1", "a.py": "@compiled()\ndef f():\n    return tuning.LEAST * HALF",
+        "_core/__init__.py": "1", "a.py": "@compiled()\ndef f():\n    return tuning.LEAST * HALF",
         "b/tuning.py": "MOST, LEAST = 2, 1", "b/half.py": "_ALL = 4\nHALF: float = _ALL / 2",
         "b/other.py": "OTHER = 1\ny = HALF",
     }  # fmt: skip

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm._core.runs import do_runs, runs as engine
+from gmwm._core import runs as engine
+from gmwm._core.runs import do_runs
 
 STUDY = {"name": "squares", "seed": 1}
 
@@ -105,7 +106,7 @@ def test_runs_of_another_study_are_not_mixed_in(tmp_path, change, other):
 
 def test_nor_those_of_another_version(tmp_path, monkeypatch):
     do_runs(squares, 2, STUDY, folder=tmp_path)
-    monkeypatch.setattr("gmwm.__version__", "0.0.0")
+    monkeypatch.setattr("gmwm._core.__version__", "0.0.0")
     with pytest.raises(InputError, match=r"other version"):
         do_runs(squares, 2, STUDY, folder=tmp_path)
 

@@ -7,7 +7,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import gmwm
-from gmwm._core.runs import one_blas_thread
+from gmwm._core.jobs import one_blas_thread
 
 
 def numbers():

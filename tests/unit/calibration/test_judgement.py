@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gmwm.calibration.stationarity.departures import Departure
+from gmwm.calibration.stationarity.removal import _independent, _without
 
 import gmwm
 from gmwm import Channel, WhiteNoise
 from gmwm._core.notices import Notice
 from gmwm.calibration.channel import ChannelModel, mostly_missing
 from gmwm.calibration.judgement import judged, with_one_remedy
-from gmwm.calibration.stationarity.departures import Departure
-from gmwm.calibration.stationarity.removal import _independent, _without
 
 NAMES = ("gyro_x", "accel_y")
 FITS = {

@@ -4,18 +4,15 @@ from statistics import variance
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, kurtosis, norm
+from scipy.stats import chi2, kurtosis
 
-from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, Resonance, WhiteNoise
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.drift import (
     _change_notice,
-    _most_regular,
     _unsteadiness,
     drift_notice,
     part_means,
-    reset_notice,
     variance_notice,
 )
 from gmwm.diagnosis.innovations import Innovations, Signal
@@ -159,81 +156,3 @@ def test_unsteady_noise_is_as_unlikely_as_the_variance_of_means_of_its_parts(
     known = np.ones(512, dtype=bool)
     unsteady = _unsteadiness(0.01, Innovations(size, known, np.ones(512), 0.0), known, False)
     assert (unsteady is not None) is found
-
-
-def test_steps_at_equal_times_are_measured_by_the_mean_of_the_others():
-    """Ten large steps, ten places apart; of five far from them, two are larger than the others."""
-    quartile = norm.isf(0.25)
-
-    def over_expected(larger):
-        steps = np.ones((10, 10))
-        steps[:, 0] = 10.0  # counts as nine variances
-        steps[:, [4, 6]] = np.sqrt(larger) / quartile
-        chance, period, times = _most_regular(steps.ravel())
-        assert period == pytest.approx(10.0, abs=0.1) and times == 10
-        rest = max((3.0 * quartile**2 + 2.0 * larger) / 5.0, 1.0)
-        return chance / chi2.sf(10 * 9.0 / rest, 10)
-
-    places = over_expected(0.5)  # at which there could be steps
-    assert over_expected(3.0) == pytest.approx(places, rel=1e-6)
-    assert over_expected(4.4) == pytest.approx(places, rel=1e-6)
-
-
-def reset(values, every, mean, rate=50.0):
-    """Of which the mean of some seconds is taken off again and again."""
-    values, every, mean = values.copy(), round(every * rate), round(mean * rate)
-    for start in range(0, values.size, every):
-        values[start : start + every] -= np.mean(values[start : start + mean])
-    return values
-
-
-WALK = WhiteNoise(1e-4) + RandomWalk(2e-6)
-
-
-@pytest.mark.parametrize(
-    ("every", "seed", "gap"),
-    [(60.0, 1, False), (60.0, 2, True), (120.0, 3, True), (300.0, 2, False)],
-)
-def test_resets_at_equal_times(every, seed, gap):
-    values = reset(WALK.simulate(180_000, 0.02, seed), every, 1.0)
-    if gap:
-        values[70_000:75_000] = np.nan
-    notice = reset_notice(Signal("gyro_x", "rad/s", 0.02), values)
-    assert notice.severity == "warning"
-    ratio = notice.values["period"] / every
-    assert ratio == pytest.approx(round(ratio), rel=0.03)
-    assert 6 <= notice.values["times"] <= 3600.0 / every
-
-
-@pytest.mark.parametrize(
-    "model",
-    [
-        WhiteNoise(1e-4), WALK, WhiteNoise(1e-4) + GaussMarkov(1e-4, 10.0),
-        WhiteNoise(1e-5) + QuantizationNoise(1e-5), WhiteNoise(1e-4) + Resonance(5e-5, 0.02, 0.02),
-    ],
-)  # fmt: skip
-def test_noise_is_not_reset(model):
-    for seed in range(5):
-        assert reset_notice(Signal("", "", 0.02), model.simulate(180_000, 0.02, seed)) is None
-
-
-@pytest.mark.parametrize("kind", ["sine", "steps", "swells", "knocks", "telegraph"])
-def test_what_is_no_reset_either(kind):
-    time = 0.02 * np.arange(180_000)
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        white = WhiteNoise(1e-4).simulate(time.size, 0.02, seed)
-        ends = np.sort(rng.uniform(0.0, 3600.0, 8))
-        values = {
-            "sine": white + 1e-3 * np.sin(2.0 * np.pi * time / 200.0),
-            "steps": white + 1e-4 * rng.normal(size=9)[np.searchsorted(ends, time)],
-            "swells": white * (1.0 + 0.8 * np.sin(time / 500.0)),
-            "knocks": white + 0.02 * (rng.random(time.size) < 1e-4),
-            "telegraph": white + 1e-4 * (np.cumsum(rng.random(time.size) < 0.02 / 300.0) % 2),
-        }[kind]
-        assert reset_notice(Signal("", "", 0.02), values) is None
-
-
-def test_a_short_or_constant_record_has_no_resets():
-    for values in (np.zeros(180_000), np.full(180_000, np.nan), np.arange(1000.0)):
-        assert reset_notice(Signal("", "", 0.02), values) is None

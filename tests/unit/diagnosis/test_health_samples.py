@@ -6,8 +6,7 @@ import pytest
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.samples import abrupt_end_notice, hole_notice
-from marks import slow
+from gmwm.diagnosis.samples import abrupt_end_notice
 
 SEEDS = range(60)
 
@@ -136,50 +135,3 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     assert ends(x[x < 1.45]) == ("bad", near(1.45, abs=0.06), near(1.45, abs=0.06))
     # Samples that are sorted out beyond 2.2 deviations make the noise a tenth smaller at most.
     assert ends(x[x < 2.25])[0] == "warning"
-
-
-@pytest.mark.parametrize(("bit", "severity"), [(2, "warning"), (3, "bad"), (4, "bad")])
-@pytest.mark.parametrize("value", [0, 1])
-def test_a_stuck_bit_is_named(bit, severity, value):
-    codes = np.rint((white(100_000, 3) + 0.7) / 0.1).astype(int)
-    stuck = codes | 1 << bit if value else codes & ~(1 << bit)
-    found = hole_notice(Signal("gyro_x", "u", step=0.1, scatter=1.0), 0.1 * stuck)
-    assert found.severity == severity
-    assert found.values["highest"] - found.values["lowest"] == pytest.approx(0.1 * (2**bit + 1))
-
-
-def test_no_sample_has_no_stuck_bit():
-    assert hole_notice(Signal("gyro_x", "u", step=0.1, scatter=1.0), np.zeros(0)) is None
-
-
-def test_gaps_between_steps_are_no_stuck_bit():
-    noise = white(100_000, 3)
-    half = np.arange(noise.size) < 50_000
-    cases = [
-        (np.rint(noise / 0.1), 0.1),
-        (np.rint(noise / 0.37) * 5.0 + half, 0.074),  # two lattices
-        (np.rint(np.rint(noise / 0.1) * 1.25), 0.08),  # rounded twice
-        (np.rint((noise + 40.0 * half) / 0.1), 0.1),  # a step
-        (np.rint((noise + 40.0 * (np.arange(noise.size) // 5 % 2)) / 0.1), 0.1),
-    ]
-    for places, step in cases:
-        assert hole_notice(Signal("gyro_x", "u", step=step, scatter=1.0), places * step) is None
-
-
-@pytest.mark.parametrize(("step", "severity"), [(0.1, "bad"), (0.02, "warning"), (0.5, "bad")])
-@pytest.mark.parametrize("law", ["normal", slow("laplace")])
-def test_samples_cut_towards_zero_are_named_and_rounded_ones_are_not(step, severity, law):
-    scale = {"normal": 1.0, "laplace": 0.6}[law]
-    noise = getattr(np.random.default_rng(3), law)(0.0, scale, size=200_000)
-    channels = {"gyro_x": np.trunc(noise / step) * step, "gyro_y": np.rint(noise / step) * step}
-    rec = gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "deg/s"})
-    (notice,) = gmwm.health(rec).of(code="value-repeated")
-    assert (notice.where, notice.severity) == ("gyro_x", severity)
-
-
-def test_samples_cut_towards_a_value_far_away_are_sound():
-    noise = np.random.default_rng(4).normal(9.0, 1.0, size=50_000)
-    rec = gmwm.Recording.from_arrays(
-        {"gyro_x": np.trunc(noise / 0.4) * 0.4}, 100.0, {"gyro": "deg/s"}
-    )
-    assert not gmwm.health(rec).of(code="value-repeated")

@@ -10,7 +10,6 @@ from gmwm.diagnosis.innovations import Signal
 from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
 from gmwm.diagnosis.samples import (
     gap_notices,
-    hole_notice,
     is_dithered,
     length_notice,
     repeated_value_notice,
@@ -120,34 +119,6 @@ def test_both_ends_are_counted():
 
 
 @pytest.mark.parametrize(
-    ("counts", "found"),
-    [
-        ([5, 20, 40, 0, 0, 0, 40, 20, 9], False),  # edges of three
-        ([9, 20, 40, 0, 0, 0, 40, 20, 9], True),
-        ([9, 20, 40, 0, 0, 0, 40, 20, 8], True),
-        ([9, 20, 40, 0, 0, 0, 40, 20, 7], False),
-        ([9, 20, 40, 0, 0, 40, 20, 9], False),  # a hole of two
-        ([9, 41, 20, 0, 0, 0, 40, 20, 9], False),  # falls towards it
-        ([9, 40, 20, 0, 0, 0, 40, 20, 9], True),
-        ([9, 20, 0, 40, 0, 0, 0, 40, 20, 9], False),
-    ],
-)
-def test_steps_that_never_come(counts, found):
-    values = shuffled(counts, first=-3)
-    notice = hole_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=3.0), values)
-    assert (notice is not None) is found
-    if found:
-        assert notice.values == {"lowest": -1.0, "highest": 3.0, "holes": 1.0}
-        assert notice.severity == "bad"
-        assert (
-            hole_notice(Signal("x", "rad/s", step=1.0, scatter=8.5), values).severity == "warning"
-        )
-        assert hole_notice(Signal("x", "rad/s", step=1.0, scatter=1.0), values) is not None
-        assert hole_notice(Signal("x", "rad/s", step=1.0, scatter=0.99), values) is None
-        assert hole_notice(Signal("x", "rad/s", step=0.0, scatter=3.0), values) is None
-
-
-@pytest.mark.parametrize(
     ("most", "severity"), [(431, None), (433, "warning"), (600, "bad"), (1500, "bad")]
 )
 def test_a_value_that_comes_far_more_often_than_those_beside_it(most, severity):
@@ -167,19 +138,6 @@ def test_a_value_that_comes_far_more_often_than_those_beside_it(most, severity):
         assert notice.values["value"] == 4.0
         assert notice.values["samples"] == most
         assert notice.severity == ("bad" if most > 0.05 * values.size else "warning")
-
-
-@pytest.mark.parametrize(("zeros", "found"), [(1000, False), (1300, False), (2000, True)])
-def test_numbers_cut_towards_zero(zeros, found):
-    # Of a wide law: one step hardly falls, zero comes twice.
-    counts = [300, 600, 900, 1000, zeros, 1000, 900, 600, 300]
-    values = shuffled(counts, first=-4)
-    notice = repeated_value_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=2.0), values)
-    assert (notice is not None) is found
-    if found:
-        share = zeros / values.size
-        assert notice.values == pytest.approx({"value": 0.0, "samples": zeros, "share": share})
-        assert "cut towards zero" in notice.text and notice.severity == "bad"
 
 
 @pytest.mark.parametrize(("times", "first"), [(2, 0), (2, 1), (3, 2), (5, 0)])

@@ -9,7 +9,7 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, WhiteNoise
 from gmwm.export.comments import above, below, comment, plain, wrapped
-from gmwm.export.imu import Axis, Imu, Triad
+from gmwm.export.imu import Axis, ImuNumbers, Triad
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.process import as_model
 from imu_numbers import RATE, numbers
@@ -25,7 +25,7 @@ def axis(letter, N, K, sensor="gyro", **options):
 def imu(**options):
     gyro = Triad("gyro", (axis("x", 1e-3, 2e-5), axis("y", 3e-3, 1e-5), axis("z", 2e-3, 3e-5)))
     accel = Triad("accel", (axis("x", 1e-2, 2e-4, "accel"), axis("y", 2e-2, 1e-4, "accel")))
-    return Imu(gyro, accel, "N+K", 60.0, "bound", ("a.csv, 60 s static",), **options)
+    return ImuNumbers(gyro, accel, "N+K", 60.0, "bound", ("a.csv, 60 s static",), **options)
 
 
 def test_a_triad_has_the_largest_numbers_of_its_axes():
@@ -78,27 +78,27 @@ def test_slow_processes_of_several_times_are_bounded_at_the_middle_one():
 
 def test_a_message_of_both_has_the_higher_rate():
     fast = Triad("accel", (axis("x", 1.0, 1.0, "accel", rate=250.0),))
-    given = Imu(imu().gyro, fast, "N+K", 60.0, "bound")
+    given = ImuNumbers(imu().gyro, fast, "N+K", 60.0, "bound")
     assert given.rate == 250.0
     lines = " ".join(above(given, "for x"))
     assert "gyros at 100 Hz, accelerometers at 250 Hz" in lines
     assert "gyros at" not in " ".join(above(imu(), "for x"))
     unknown = Triad("gyro", (axis("x", 1.0, 1.0, rate=NAN),))
     with pytest.raises(InputError, match="no sampling rate"):
-        _ = Imu(unknown, unknown, "N+K", 60.0, "given").rate
+        _ = ImuNumbers(unknown, unknown, "N+K", 60.0, "given").rate
 
 
 def test_a_table_of_each_axis_and_its_consistency():
     gyro = Triad("gyro", (
         axis("x", 1e-3, 2e-5, nees={10.0: 0.5, 60.0: 1.0}), axis("y", 3e-3, 1e-5, nees={60.0: 2.0}),
     ))  # fmt: skip
-    lines = below(Imu(gyro, imu().accel, "N+K", 60.0, "bound"), "spectral densities")
+    lines = below(ImuNumbers(gyro, imu().accel, "N+K", 60.0, "bound"), "spectral densities")
     start = lines.index("gyro: N [rad/s/sqrt(Hz)], K [rad/s^2/sqrt(Hz)], start [rad/s]")
     assert lines[start + 1].split() == ["N", "K", "start", "NEES", "10", "s", "NEES", "60", "s"]
     assert lines[start + 2].split() == ["gyro_x", "1.000e-03", "2.000e-05", "1.000e-04", "0.5", "1"]
     assert lines[start + 3].split() == ["gyro_y", "3.000e-03", "1.000e-05", "3.000e-04", "-", "2"]
     text = " ".join(lines)
-    assert "NEES: predicted error squared" in text and "shared:" not in text
+    assert "NEES: expected error squared" in text and "shared:" not in text
     assert "NEES is not known" in text  # of the accelerometers
 
 
@@ -108,7 +108,7 @@ def test_a_table_with_shared_numbers():
         axis(c, n, 1e-5, nees={60.0: 0.9}, upper=upper) for c, n in (("x", 1e-3), ("y", 3e-3))
     )
     shared = {"gyro_x": {60.0: 0.25}, "gyro_y": {60.0: 0.75}}
-    given = Imu(Triad("gyro", axes, None, shared), imu().accel, "N+K", 60.0, "bound")
+    given = ImuNumbers(Triad("gyro", axes, None, shared), imu().accel, "N+K", 60.0, "bound")
     lines = below(given, "spectral densities")
     start = next(k for k, line in enumerate(lines) if line.startswith("gyro: N"))
     assert lines[start + 1].split() == ["NEES", "60", "s"]
@@ -123,8 +123,8 @@ def test_a_table_with_shared_numbers():
 def test_an_axis_with_more_of_a_number_is_explained(more, traded):
     common = SimpleNamespace(N=1e-3, K=1e-5, initial_sd=1e-4)
     axes = (axis("x", 1e-3 * more, 0.5e-5), axis("y", 1e-3, 1e-5))
-    given = Imu(Triad("gyro", axes, common, {}), imu().accel, "N+K", 60.0, "bound")
-    assert ("larger K pays for a smaller N" in " ".join(below(given, "x"))) is traded
+    given = ImuNumbers(Triad("gyro", axes, common, {}), imu().accel, "N+K", 60.0, "bound")
+    assert ("use N and K as a pair" in " ".join(below(given, "x"))) is traded
 
 
 def test_other_horizons_and_remarks():

@@ -13,8 +13,7 @@ import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.notices import Notice
-from gmwm.export import TARGETS
-from gmwm.export.found import axis_of
+from gmwm.export import TARGETS, axis_of
 from gmwm.process import as_model
 from imu_numbers import numbers
 
@@ -141,10 +140,10 @@ def test_each_value_has_its_unit_beside_it(text):
 
 def test_a_walk_that_was_not_found_is_called_an_upper_bound(text):
     # Only where the model has no slow term.
-    assert "upper bound" in block_of(text, "accelerometer_random_walk")
+    assert "upper limit" in block_of(text, "accelerometer_random_walk")
     assert "no random walk was found" in block_of(text, "accelerometer_random_walk")
-    assert "upper bound" not in block_of(text, "gyroscope_random_walk")
-    assert "upper bound" not in block_of(text, "accelerometer_noise_density")
+    assert "upper limit" not in block_of(text, "gyroscope_random_walk")
+    assert "upper limit" not in block_of(text, "accelerometer_noise_density")
 
 
 @pytest.mark.parametrize("seed", [0, marks.slow(1), marks.slow(2)])
@@ -250,7 +249,7 @@ def test_slow_terms_count_as_a_random_walk(slow, horizon):
         model = slow[f"{quantity}_x"].params
         assert 0.5 * model["sigma"] * np.sqrt(2.0 / model["tau"]) < one.K
     text = gmwm.export(slow, "kalibr", horizon=horizon)
-    assert "upper bound" not in text
+    assert "upper limit" not in text
 
 
 def test_comments_hold_consistency_and_other_horizons(slow):

@@ -6,8 +6,7 @@ import pytest
 
 import gmwm
 from gmwm import InputError
-from gmwm.export import TARGETS
-from gmwm.filter_numbers import read_numbers
+from gmwm.export import TARGETS, read_numbers
 from imu_numbers import FORMS, RATE, K, N, numbers
 from places import GOLDEN, REPOSITORY
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, InputError, QuantizationNoise, RandomWalk, WhiteNoise
-from gmwm.filter_numbers import read_numbers
+from gmwm.export import read_numbers
 from gmwm.filter_numbers.given import in_use
 
 F = 200.0

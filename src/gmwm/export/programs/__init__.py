@@ -1,1 +1,1 @@
-"""One file a program, or a form that several programs share: keys, values, units."""
+"""Consumers of filter numbers, a class each."""

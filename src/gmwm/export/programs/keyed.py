@@ -1,19 +1,18 @@
 """Files of keys and values: the programs differ in names, units and a power of the rate only.
 
-Each target names the file and function of the program that define what its value means; the tests
-put the values through that equation.
+Each class names the file and function of the program that define what its value means; the tests
+put the values through that equation. To add one like these: a class here, its name in `KEYED`, a
+line in docs/export.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import sqrt
+from collections.abc import Mapping
+from typing import ClassVar
 
-from gmwm.export import tuning
-from gmwm.export.imu import Axis, Imu, Triad
-from gmwm.export.target import ImuFile
-from gmwm.filter_numbers import EKF2_INTERVAL
+from gmwm.export.imu import ImuNumbers
+from gmwm.export.keys import WalkKeys
+from gmwm.export.target import KEYFRAME, OUTAGE, ImuFile
 
 _UNITS = {
     ("gyro", "N"): "rad/s/sqrt(Hz)",
@@ -21,237 +20,232 @@ _UNITS = {
     ("accel", "N"): "m/s^2/sqrt(Hz)",
     ("accel", "K"): "m/s^3/sqrt(Hz)",
 }
-
-_SQUARED = {
-    ("gyro", "N"): "(rad/s)^2",
-    ("gyro", "K"): "(rad/s^2)^2",
-    ("accel", "N"): "(m/s^2)^2",
-    ("accel", "K"): "(m/s^3)^2",
-}
-
-_PER_SAMPLE = {
-    ("gyro", "N"): "rad/s",
-    ("gyro", "K"): "rad/s^2",
-    ("accel", "N"): "m/s^2",
-    ("accel", "K"): "m/s^3",
-}
-
-
-def _same(value: float, letter: str, rate: float) -> float:
-    return value
-
-
-@dataclass(frozen=True)
-class Keys:
-    """How N and K are called and converted.
-
-    names: Key, quantity, and "N" or "K".
-    convert: Of a value, its letter and the rate in Hz.
-    units: (quantity, letter) -> unit of the value.
-    before, after: Lines around the values; ``{rate}`` and ``{topic}`` stand for the rate and the
-        topic.
-    indent, prefix: Before the key.
-    separator: Between key and value.
-    ending: After the value, before the unit.
-    """
-
-    names: Sequence[tuple[str, str, str]]
-    convert: Callable[[float, str, float], float] = _same
-    units: dict[tuple[str, str], str] | None = None
-    before: tuple[str, ...] = ()
-    after: tuple[str, ...] = ()
-    indent: str = ""
-    prefix: str = ""
-    separator: str = ": "
-    ending: str = "  # {unit}"
-
-    @property
-    def needs_rate(self) -> bool:
-        """Whether the file depends on the rate of the IMU."""
-        return self.convert in (_two_ends, _variance) or any(
-            "{rate}" in line for line in (*self.before, *self.after)
-        )
-
-    def __call__(self, imu: Imu) -> list[str]:
-        units = self.units or _UNITS
-        rate = imu.rate if self.needs_rate else float("nan")
-        topic = imu.topic or "/imu0  # set to the topic of your bag"
-        lines = [line.format(rate=_decimal(rate), topic=topic) for line in self.before]
-        for key, quantity, letter in self.names:
-            triad = imu.gyro if quantity == "gyro" else imu.accel
-
-            def value(of: Axis | Triad, letter: str = letter) -> float:
-                return self.convert(getattr(of, letter), letter, rate)
-
-            ending = self.ending.format(unit=units[quantity, letter])
-            lines.append(
-                f"{self.indent}{self.prefix}{key}{self.separator}{value(triad):.6e}{ending}"
-            )
-            if triad.is_upper(letter):
-                what = "white noise" if letter == "N" else "random walk"
-                lines.append(f"{self.indent}#   no {what} was found: this is the largest 95 % "
-                             "upper bound")  # fmt: skip
-        return [*lines, *(line.format(rate=_decimal(rate), topic=topic) for line in self.after)]
-
-
-def _decimal(rate: float) -> str:
-    """With a point, since OpenCV distinguishes whole numbers from others."""
-    text = f"{rate:.9g}"
-    return text if "." in text or "e" in text else f"{text}.0"
-
-
-def _named(gyro_noise: str, accel_noise: str, gyro_walk: str, accel_walk: str
-           ) -> tuple[tuple[str, str, str], ...]:  # fmt: skip
-    return (
-        (accel_noise, "accel", "N"),
-        (accel_walk, "accel", "K"),
-        (gyro_noise, "gyro", "N"),
-        (gyro_walk, "gyro", "K"),
-    )
-
-
-_KALIBR = _named(
-    "gyroscope_noise_density", "accelerometer_noise_density",
-    "gyroscope_random_walk", "accelerometer_random_walk",
-)  # fmt: skip
+_PER_SAMPLE = {key: unit.removesuffix("/sqrt(Hz)") for key, unit in _UNITS.items()}
+_SQUARED = {key: f"({unit})^2" for key, unit in _PER_SAMPLE.items()}
 
 _CONTINUOUS = "N and K for all axes, continuous time"
-
 _IDENTITY = ("    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]")
 _ZERO = ("    - [0.0, 0.0, 0.0]",) * 3
-_POSE = (
-    "    - [1.0, 0.0, 0.0, 0.0]",
-    "    - [0.0, 1.0, 0.0, 0.0]",
-    "    - [0.0, 0.0, 1.0, 0.0]",
-    "    - [0.0, 0.0, 0.0, 1.0]",
-)
 
 
-def _two_ends(value: float, letter: str, rate: float) -> float:
-    """A step takes the mean of two samples as independent, and walks by the value times dt."""
-    return value * sqrt(2.0 * rate) if letter == "N" else value * sqrt(rate)
+class KeyedFile(ImuFile):
+    """N and K of gyros and accelerometers, a key each.
+
+    keys: How they are called and converted.
+    units: (quantity, letter) -> unit of the value.
+    before, after: Lines around the values, with places for {rate} and {topic}.
+    indent, prefix, separator, ending: Before the key, between it and the value, and after it.
+    """
+
+    shared = True
+    horizon = KEYFRAME
+    keys: ClassVar[WalkKeys]
+    units: ClassVar[Mapping[tuple[str, str], str]] = _UNITS
+    before: ClassVar[tuple[str, ...]] = ()
+    after: ClassVar[tuple[str, ...]] = ()
+    indent: ClassVar[str] = ""
+    prefix: ClassVar[str] = ""
+    separator: ClassVar[str] = ": "
+    ending: ClassVar[str] = "  # {unit}"
+
+    def body(self, imu: ImuNumbers) -> list[str]:
+        keys = self.keys
+        has_rate = any("{rate}" in line for line in (*self.before, *self.after))
+        rate = imu.rate if keys.needs_rate or has_rate else float("nan")
+        shown = f"{rate:.9g}"
+        # With a point, since OpenCV distinguishes whole numbers from others.
+        shown = shown if "." in shown or "e" in shown else f"{shown}.0"
+        topic = imu.topic or "/imu0  # set to the topic of your bag"
+        before, after = (
+            [line.format(rate=shown, topic=topic) for line in lines]
+            for lines in (self.before, self.after)
+        )
+        gyro_noise, gyro_walk, accel_noise, accel_walk = keys.names
+        lines = []
+        for name, triad, letter in (
+            (accel_noise, imu.accel, "N"),
+            (accel_walk, imu.accel, "K"),
+            (gyro_noise, imu.gyro, "N"),
+            (gyro_walk, imu.gyro, "K"),
+        ):
+            value = keys.written(letter, getattr(triad, letter), rate)
+            ending = self.ending.format(unit=self.units[triad.quantity, letter])
+            lines.append(f"{self.indent}{self.prefix}{name}{self.separator}{value:.6e}{ending}")
+            if triad.is_upper(letter):
+                what = "white noise" if letter == "N" else "random walk"
+                lines.append(
+                    f"{self.indent}#   no {what} was found: this is the largest 95 % upper limit"
+                )
+        return [*before, *lines, *after]
 
 
-def _variance(value: float, letter: str, rate: float) -> float:
-    """A step adds variance times dt^2."""
-    return value**2 * rate
+class Kalibr(KeyedFile):
+    name, title, file = "kalibr", "Kalibr", "imu.yaml"
+    convention = f"{_CONTINUOUS}; zeros are rejected"
+    source = (
+        "kalibr_common/ConfigReader.py: ImuParameters.getAccelerometerStatistics, "
+        "getGyroStatistics; IccSensors.py: addBiasMotionTerms"
+    )
+    keys = WalkKeys(
+        (
+            "gyroscope_noise_density",
+            "gyroscope_random_walk",
+            "accelerometer_noise_density",
+            "accelerometer_random_walk",
+        )
+    )
+    after = ("rostopic: {topic}", "update_rate: {rate}  # Hz")
+    file_name = "imu.yaml"
 
 
-def _ekf2(value: float, letter: str, rate: float) -> float:
-    """A step of the filter, not of the IMU, adds (value times dt)^2."""
-    return value / sqrt(EKF2_INTERVAL)
+class OpenVins(KeyedFile):
+    name, title, file = "openvins", "OpenVINS", "kalibr_imu_chain.yaml"
+    convention = f"{_CONTINUOUS}; scale, misalignment and g-sensitivity are those of an ideal IMU"
+    source = "ov_msckf/src/state/Propagator.cpp: predict_and_compute; core/VioManagerOptions.h"
+    keys = Kalibr.keys
+    head = ("%YAML:1.0",)
+    before = (
+        "imu0:",
+        "  T_i_b:",
+        "    - [1.0, 0.0, 0.0, 0.0]",
+        "    - [0.0, 1.0, 0.0, 0.0]",
+        "    - [0.0, 0.0, 1.0, 0.0]",
+        "    - [0.0, 0.0, 0.0, 1.0]",
+    )
+    indent = "  "
+    after = (
+        "  rostopic: {topic}",
+        "  time_offset: 0.0",
+        "  update_rate: {rate}  # Hz",
+        '  model: "kalibr"',
+        "  Tw:",
+        *_IDENTITY,
+        "  R_IMUtoGYRO:",
+        *_IDENTITY,
+        "  Ta:",
+        *_IDENTITY,
+        "  R_IMUtoACC:",
+        *_IDENTITY,
+        "  Tg:",
+        *_ZERO,
+    )
+    file_name = "kalibr_imu_chain.yaml"
 
 
-KALIBR = ImuFile(
-    "kalibr", "Kalibr", "imu.yaml",
-    f"{_CONTINUOUS}; zeros are refused",
-    "kalibr_common/ConfigReader.py: ImuParameters.getAccelerometerStatistics, getGyroStatistics; "
-    "IccSensors.py: addBiasMotionTerms",
-    Keys(_KALIBR, after=("rostopic: {topic}",
-                         "update_rate: {rate}  # Hz")),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
+class Vins(KeyedFile):
+    name, title = "vins", "VINS-Mono and VINS-Fusion"
+    file = "the IMU block of the configuration"
+    convention = (
+        "N sqrt(2 f), since the mid-point step takes the two samples at its ends as independent, "
+        "and K sqrt(f), f the rate of the IMU; for all axes"
+    )
+    source = "vins_estimator/src/factor/integration_base.h: IntegrationBase, midPointIntegration"
+    keys = WalkKeys(("gyr_n", "gyr_w", "acc_n", "acc_w"), white=2.0, walk=1.0)
+    units = _PER_SAMPLE
 
-OPENVINS = ImuFile(
-    "openvins", "OpenVINS", "kalibr_imu_chain.yaml",
-    f"{_CONTINUOUS}; scale, misalignment and g-sensitivity are those of an ideal IMU",
-    "ov_msckf/src/state/Propagator.cpp: predict_and_compute; core/VioManagerOptions.h",
-    Keys(
-        _KALIBR, indent="  ", before=("imu0:", "  T_i_b:", *_POSE),
-        after=(
-            "  rostopic: {topic}",
-            "  time_offset: 0.0",
-            "  update_rate: {rate}  # Hz",
-            '  model: "kalibr"',
-            "  Tw:", *_IDENTITY,
-            "  R_IMUtoGYRO:", *_IDENTITY,
-            "  Ta:", *_IDENTITY,
-            "  R_IMUtoACC:", *_IDENTITY,
-            "  Tg:", *_ZERO,
-        ),
-    ),
-    horizon=tuning.KEYFRAME, shared=True, head=("%YAML:1.0",),
-)  # fmt: skip
 
-VINS = ImuFile(
-    "vins", "VINS-Mono and VINS-Fusion", "the IMU block of the configuration",
-    "N sqrt(2 f), since the mid-point step takes the two samples at its ends as independent, and "
-    "K sqrt(f), f the rate of the IMU; for all axes",
-    "vins_estimator/src/factor/integration_base.h: IntegrationBase, midPointIntegration",
-    Keys(_named("gyr_n", "acc_n", "gyr_w", "acc_w"), _two_ends, _PER_SAMPLE),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
+class OrbSlam3(KeyedFile):
+    name, title, file = "orbslam3", "ORB-SLAM3", "the IMU block of the settings"
+    convention = f"{_CONTINUOUS}; ORB-SLAM3 multiplies and divides by sqrt(IMU.Frequency) itself"
+    source = (
+        "src/Tracking.cc: newParameterLoader (IMU::Calib); src/ImuTypes.cc: IntegrateNewMeasurement"
+    )
+    keys = WalkKeys(("IMU.NoiseGyro", "IMU.GyroWalk", "IMU.NoiseAcc", "IMU.AccWalk"))
+    after = ("IMU.Frequency: {rate}  # Hz",)
 
-ORBSLAM3 = ImuFile(
-    "orbslam3", "ORB-SLAM3", "the IMU block of the settings",
-    f"{_CONTINUOUS}; ORB-SLAM3 multiplies and divides by sqrt(IMU.Frequency) itself",
-    "src/Tracking.cc: newParameterLoader (IMU::Calib); src/ImuTypes.cc: IntegrateNewMeasurement",
-    Keys(_named("IMU.NoiseGyro", "IMU.NoiseAcc", "IMU.GyroWalk", "IMU.AccWalk"),
-         after=("IMU.Frequency: {rate}  # Hz",)),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
 
-FASTLIO = ImuFile(
-    "fastlio", "FAST-LIO2", "the mapping block of the configuration",
-    "N^2 f and K^2 f, variances of one sample at the rate f of the IMU; for all axes",
-    "include/IKFoM_toolkit/esekfom/esekfom.hpp: predict; src/IMU_Processing.hpp: UndistortPcl",
-    Keys(_named("gyr_cov", "acc_cov", "b_gyr_cov", "b_acc_cov"), _variance, _SQUARED,
-         before=("mapping:",), indent="  "),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
+class FastLio(KeyedFile):
+    name, title, file = "fastlio", "FAST-LIO2", "the mapping block of the configuration"
+    convention = "N^2 f and K^2 f, variances of one sample at the rate f of the IMU; for all axes"
+    source = (
+        "include/IKFoM_toolkit/esekfom/esekfom.hpp: predict; src/IMU_Processing.hpp: UndistortPcl"
+    )
+    keys = WalkKeys(("gyr_cov", "b_gyr_cov", "acc_cov", "b_acc_cov"), white=1.0, walk=1.0, power=2)
+    units = _SQUARED
+    before = ("mapping:",)
+    indent = "  "
 
-LIOSAM = ImuFile(
-    "liosam", "LIO-SAM", "the IMU settings of params.yaml", _CONTINUOUS,
-    "src/imuPreintegration.cpp: IMUPreintegration",
-    Keys(_named("imuGyrNoise", "imuAccNoise", "imuGyrBiasN", "imuAccBiasN"),
-         before=("lio_sam:",), indent="  "),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
 
-KIMERA = ImuFile(
-    "kimera", "Kimera-VIO", "noise of ImuParams.yaml", f"{_CONTINUOUS}; zeros are refused",
-    "src/imu-frontend/ImuFrontend.cpp: convertVioImuParamsToGtsam; src/backend/VioBackend.cpp: "
-    "addImuFactor",
-    Keys(_KALIBR, before=("rate_hz: {rate}",)),
-    horizon=tuning.KEYFRAME, shared=True, head=("%YAML:1.0",),
-)  # fmt: skip
+class LioSam(KeyedFile):
+    name, title, file = "liosam", "LIO-SAM", "the IMU settings of params.yaml"
+    convention = _CONTINUOUS
+    source = "src/imuPreintegration.cpp: IMUPreintegration"
+    keys = WalkKeys(("imuGyrNoise", "imuGyrBiasN", "imuAccNoise", "imuAccBiasN"))
+    before = ("lio_sam:",)
+    indent = "  "
 
-OKVIS2 = ImuFile(
-    "okvis2", "OKVIS2", "imu_parameters of the configuration",
-    f"{_CONTINUOUS}; sigma_bg and sigma_ba, the biases at switch-on, are not in a static recording",
-    "okvis_ceres/src/ImuError.cpp: ImuError::propagation; okvis_common/src/ViParametersReader.cpp",
-    Keys(_named("sigma_g_c", "sigma_a_c", "sigma_gw_c", "sigma_aw_c"),
-         before=("imu_parameters:",), indent="    "),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
 
-MAPLAB = ImuFile(
-    "maplab", "maplab", "the IMU in the sensors file", _CONTINUOUS,
-    "map-structure/sensors/src/imu.cc; algorithms/imu-integrator-rk4/include/imu-integrator/"
-    "imu-integrator-inl.h: getCovarianceTransitionDerivativesRungeKutta",
-    Keys(_named("gyro_noise_density", "acc_noise_density",
-                "gyro_bias_random_walk_noise_density", "acc_bias_random_walk_noise_density"),
-         before=("sigmas:",), indent="  "),
-    horizon=tuning.KEYFRAME, shared=True,
-)  # fmt: skip
+class Kimera(KeyedFile):
+    name, title, file = "kimera", "Kimera-VIO", "noise of ImuParams.yaml"
+    convention = f"{_CONTINUOUS}; zeros are rejected"
+    source = (
+        "src/imu-frontend/ImuFrontend.cpp: convertVioImuParamsToGtsam; "
+        "src/backend/VioBackend.cpp: addImuFactor"
+    )
+    keys = Kalibr.keys
+    head = ("%YAML:1.0",)
+    before = ("rate_hz: {rate}",)
 
-PX4 = ImuFile(
-    "px4", "PX4 EKF2", "a parameter file for QGroundControl",
-    "N/sqrt(dt) and K/sqrt(dt) for all axes, dt = "
-    f"{EKF2_INTERVAL:g} s the interval of the filter (EKF2_PREDICT_US), not of the IMU",
-    "src/modules/ekf2/EKF/covariance.cpp: predictCovariance; src/modules/ekf2/module.yaml",
-    Keys(
-        _named("EKF2_GYR_NOISE", "EKF2_ACC_NOISE", "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),
-        _ekf2, prefix="1\t1\t", separator="\t", ending="\t9",
-    ),
-    shared=True,
-    warnings=(
+
+class Okvis2(KeyedFile):
+    name, title, file = "okvis2", "OKVIS2", "imu_parameters of the configuration"
+    convention = (
+        f"{_CONTINUOUS}; sigma_bg and sigma_ba, the biases at switch-on, are not in a static "
+        "recording"
+    )
+    source = (
+        "okvis_ceres/src/ImuError.cpp: ImuError::propagation; "
+        "okvis_common/src/ViParametersReader.cpp"
+    )
+    keys = WalkKeys(("sigma_g_c", "sigma_gw_c", "sigma_a_c", "sigma_aw_c"))
+    before = ("imu_parameters:",)
+    indent = "    "
+
+
+class Maplab(KeyedFile):
+    name, title, file = "maplab", "maplab", "the IMU in the sensors file"
+    convention = _CONTINUOUS
+    source = (
+        "map-structure/sensors/src/imu.cc; algorithms/imu-integrator-rk4/include/imu-integrator/"
+        "imu-integrator-inl.h: getCovarianceTransitionDerivativesRungeKutta"
+    )
+    keys = WalkKeys(
+        (
+            "gyro_noise_density",
+            "gyro_bias_random_walk_noise_density",
+            "acc_noise_density",
+            "acc_bias_random_walk_noise_density",
+        )
+    )
+    before = ("sigmas:",)
+    indent = "  "
+
+
+class Px4(KeyedFile):
+    name, title, file = "px4", "PX4 EKF2", "a parameter file for QGroundControl"
+    interval: ClassVar[float] = 0.01  # s, of a step of EKF2: EKF2_PREDICT_US is 10000 by default
+    convention = (
+        "N/sqrt(dt) and K/sqrt(dt) for all axes, dt = "
+        f"{interval:g} s the interval of the filter (EKF2_PREDICT_US), not of the IMU"
+    )
+    source = "src/modules/ekf2/EKF/covariance.cpp: predictCovariance; src/modules/ekf2/module.yaml"
+    keys = WalkKeys(
+        ("EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE", "EKF2_ACC_NOISE", "EKF2_ACC_B_NOISE"),
+        white=1.0,
+        walk=1.0,
+        rate=1.0 / interval,
+    )
+    horizon = OUTAGE
+    prefix, separator, ending = "1\t1\t", "\t", "\t9"
+    file_name = "px4.params"
+    warnings = (
         "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench "
         "does not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer "
         "0.35 m/s^2) stand for it. Record in flight, or keep the larger of the two. PX4 takes "
         "gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, and bias "
         "noise up to 0.01.",
-    ),
-)  # fmt: skip
+    )
 
-KEYED = (KALIBR, OPENVINS, VINS, ORBSLAM3, FASTLIO, LIOSAM, KIMERA, OKVIS2, MAPLAB, PX4)
+
+KEYED = (Kalibr, OpenVins, Vins, OrbSlam3, FastLio, LioSam, Kimera, Okvis2, Maplab, Px4)
+"""All of them, in the order in which they are listed."""

@@ -10,41 +10,51 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import sqrt
 
-from gmwm._core.units import factor
-from gmwm.export.imu import Axis, Imu
+from gmwm.export.imu import Axis, ImuNumbers
+from gmwm.export.keys import ARW, DEG_H, MemoryKeys
 from gmwm.export.target import ImuFile
 
 _MGAL = 1e-5  # m/s^2
 _HOUR = 3600.0
 
 
-def _body(imu: Imu) -> list[str]:
-    gyro, accel = (triad.xyz() for triad in imu.triads)
-    per_root_hour, per_hour = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s")
-    return [
-        "imunoise:",
-        f"  arw: {_list(gyro, lambda axis: axis.N / per_root_hour)}  # deg/sqrt(h)",
-        f"  vrw: {_list(accel, lambda axis: axis.N * sqrt(_HOUR))}  # m/s/sqrt(h)",
-        f"  gbstd: {_list(gyro, lambda axis: axis.sigma / per_hour)}  # deg/h",
-        f"  abstd: {_list(accel, lambda axis: axis.sigma / _MGAL)}  # mGal",
-        f"  corrtime: {gyro[0].tau / _HOUR:.6e}  # h",
-        f"initbgstd: {_list(gyro, lambda axis: _start(axis) / per_hour)}  # deg/h",
-        f"initbastd: {_list(accel, lambda axis: _start(axis) / _MGAL)}  # mGal",
-    ]
+class KfGins(ImuFile):
+    """N, sigma and tau in the units of data sheets, and the biases at the start."""
 
+    name = "kfgins"
+    title = "KF-GINS"
+    file = "imunoise of kf-gins.yaml"
+    convention = (
+        "N and sigma of each axis for the one tau of all six, which is the one that costs least"
+    )
+    source = (
+        "src/kf-gins/gi_engine.cpp: GIEngine::GIEngine, insPropagation; src/kf_gins.cpp: loadConfig"
+    )
+    form = "N+GM"
+    one_tau = True
+    warnings = ("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",)
+    file_name = "kf-gins.yaml"
+    keys = MemoryKeys(
+        ("arw", "gbstd", "corrtime", "vrw", "abstd", "corrtime"),
+        (ARW, DEG_H, _HOUR, 1.0 / 60.0, _MGAL, _HOUR),
+    )
 
-def _start(axis: Axis) -> float:
-    return sqrt(axis.sigma**2 + axis.initial_sd**2)
+    def body(self, imu: ImuNumbers) -> list[str]:
+        gyro, accel = (triad.xyz() for triad in imu.triads)
 
+        def start(axis: Axis) -> float:
+            return sqrt(axis.sigma**2 + axis.initial_sd**2)
 
-def _list(axes: Sequence[Axis], value: Callable[[Axis], float]) -> str:
-    return f"[{', '.join(f'{value(axis):.6e}' for axis in axes)}]"
+        def three(axes: Sequence[Axis], value: Callable[[Axis], float]) -> str:
+            return f"[{', '.join(f'{value(axis):.6e}' for axis in axes)}]"
 
-
-KFGINS = ImuFile(
-    "kfgins", "KF-GINS", "imunoise of kf-gins.yaml",
-    "N and sigma of each axis for the one tau of all six, which is the one that costs least",
-    "src/kf-gins/gi_engine.cpp: GIEngine::GIEngine, insPropagation; src/kf_gins.cpp: loadConfig",
-    _body, form="N+GM", one_tau=True,
-    warnings=("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",),
-)  # fmt: skip
+        return [
+            "imunoise:",
+            f"  arw: {three(gyro, lambda axis: axis.N / ARW)}  # deg/sqrt(h)",
+            f"  vrw: {three(accel, lambda axis: axis.N * sqrt(_HOUR))}  # m/s/sqrt(h)",
+            f"  gbstd: {three(gyro, lambda axis: axis.sigma / DEG_H)}  # deg/h",
+            f"  abstd: {three(accel, lambda axis: axis.sigma / _MGAL)}  # mGal",
+            f"  corrtime: {gyro[0].tau / _HOUR:.6e}  # h",
+            f"initbgstd: {three(gyro, lambda axis: start(axis) / DEG_H)}  # deg/h",
+            f"initbastd: {three(accel, lambda axis: start(axis) / _MGAL)}  # mGal",
+        ]

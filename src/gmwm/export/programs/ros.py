@@ -7,9 +7,30 @@ mean that it is not known, -1 in the first place that there is no such measureme
 from __future__ import annotations
 
 from gmwm.errors import InputError
-from gmwm.export import tuning
-from gmwm.export.imu import Imu, Triad
-from gmwm.export.target import ImuFile
+from gmwm.export.imu import ImuNumbers, Triad
+from gmwm.export.target import KEYFRAME, ImuFile
+
+
+class Ros(ImuFile):
+    """The three covariance fields of the message, as YAML."""
+
+    name = "ros-covariance"
+    title = "ROS"
+    file = "covariances of sensor_msgs/Imu"
+    convention = (
+        "N^2 f of each axis, the variance of the white noise of one sample at the rate f, on the "
+        "diagonal of a row-major 3 x 3 matrix; slow errors have no place in it"
+    )
+    source = "common_interfaces/sensor_msgs/msg/Imu.msg"
+    horizon = KEYFRAME
+
+    def body(self, imu: ImuNumbers) -> list[str]:
+        return [
+            *_covariance("angular_velocity_covariance", imu.gyro, "(rad/s)^2"),
+            *_covariance("linear_acceleration_covariance", imu.accel, "(m/s^2)^2"),
+            "orientation_covariance: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"
+            "  # not measured",
+        ]
 
 
 def _covariance(key: str, triad: Triad, unit: str) -> list[str]:
@@ -24,19 +45,3 @@ def _covariance(key: str, triad: Triad, unit: str) -> list[str]:
         f"   0.0, {y}, 0.0,",
         f"   0.0, 0.0, {z}]",
     ]
-
-
-def _body(imu: Imu) -> list[str]:
-    return [
-        *_covariance("angular_velocity_covariance", imu.gyro, "(rad/s)^2"),
-        *_covariance("linear_acceleration_covariance", imu.accel, "(m/s^2)^2"),
-        "orientation_covariance: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]  # not measured",
-    ]
-
-
-ROS = ImuFile(
-    "ros-covariance", "ROS", "covariances of sensor_msgs/Imu",
-    "N^2 f of each axis, the variance of the white noise of one sample at the rate f, on the "
-    "diagonal of a row-major 3 x 3 matrix; slow errors have no place in it",
-    "common_interfaces/sensor_msgs/msg/Imu.msg", _body, horizon=tuning.KEYFRAME,
-)  # fmt: skip

@@ -21,9 +21,8 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.comments import wrapped
-from gmwm.export.found import numbers_of
-from gmwm.export.programs.json_targets import json_text
-from gmwm.export.target import Target
+from gmwm.export.numbers import numbers_of
+from gmwm.export.target import Target, json_text
 from gmwm.filter_numbers import FORMS, SensorNumbers
 from gmwm.process import Model, Process, StateSpace, block_diagonal
 
@@ -31,8 +30,21 @@ Matrices = dict[str, FloatArray]
 """F, G, H, Q, R, mean x0 and covariance P0 of the start."""
 
 
-class StateSpaceTarget(Target):
-    """Needs one sensor at least, holds any model; a form makes the numbers of that form."""
+class StateSpaceFile(Target):
+    """Needs one sensor at least and holds any model; a form makes the numbers of that form."""
+
+    name = "state-space"
+    title = "state space"
+    file = "matrices by channel, JSON or NPZ"
+    convention = (
+        "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
+        "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance "
+        "P0; SI units"
+    )
+    source = "the full model, nothing reduced"
+    form = "full model"
+    warnings = ("the bias at switch-on is in no static recording: add its variance to P0",)
+    file_name = "state-space.json"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         channels = self._channels(given, horizon, form)
@@ -42,7 +54,14 @@ class StateSpaceTarget(Target):
                 for text in (f"{self.title}: {self.convention}", *self.warnings)
                 for line in wrapped(text)
             ],
-            "channels": {name: _plain(each) for name, each in channels.items()},
+            "channels": {
+                name: each
+                | {
+                    kind: each[kind] and {key: v.tolist() for key, v in each[kind].items()}
+                    for kind in ("discrete", "continuous")
+                }
+                for name, each in channels.items()
+            },
         }
         return json_text(content) + "\n"
 
@@ -112,7 +131,7 @@ class StateSpaceTarget(Target):
 
 
 def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> dict[str, Any]:
-    """Matrices of one channel.
+    """Matrices of one channel in discrete and, if there is one, continuous form.
 
     model: With given parameters.
     dt: Sampling interval, s.
@@ -184,22 +203,3 @@ def _driven(transition: FloatArray, noise: FloatArray) -> Matrices:
     """F, and the noise of those states only that have some."""
     driven = np.diag(noise) > 0.0
     return {"F": transition, "G": np.eye(len(noise))[:, driven], "Q": noise[np.ix_(driven, driven)]}
-
-
-def _plain(each: dict[str, Any]) -> dict[str, Any]:
-    def lists(matrices: Matrices | None) -> dict[str, Any] | None:
-        if matrices is None:
-            return None
-        return {key: value.tolist() for key, value in matrices.items()}
-
-    return {**each, "discrete": lists(each["discrete"]), "continuous": lists(each["continuous"])}
-
-
-STATE_SPACE = StateSpaceTarget(
-    "state-space", "state space", "matrices by channel, JSON or NPZ",
-    "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
-    "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance P0; "
-    "SI units",
-    "the full model, nothing reduced", form="full model",
-    warnings=("the bias at switch-on is in no static recording: add its variance to P0",),
-)  # fmt: skip

@@ -13,7 +13,8 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.distributions import norm, student
 from gmwm._core.notices import Notice
-from gmwm._core.text import bullets, made_by, wrapped
+from gmwm._core.pages import make
+from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -180,7 +181,7 @@ class Comparison:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_comparison_report`."""
-        written: Path = made_by("write_comparison_report", self, path)
+        written: Path = make("page", self, path)
         return written
 
     def plot(self) -> Figure:

@@ -13,7 +13,8 @@ import numpy as np
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.notices import Notice, worst_first
-from gmwm._core.text import brief, bullets, made_by, wrapped
+from gmwm._core.pages import make
+from gmwm._core.text import brief, bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -392,7 +393,7 @@ class Navigated:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_navigated_report`."""
-        page: Path = made_by("write_navigated_report", self, path)
+        page: Path = make("page", self, path)
         return page
 
     def plot_track(self) -> Figure:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core.notices import Notice
+from gmwm._core.pages import make
 from gmwm._core.runs import Earlier
-from gmwm._core.text import bullets, made_by, wrapped
+from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -249,7 +250,7 @@ class Validation:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_validation_report`."""
-        written: Path = made_by("write_validation_report", self, path)
+        written: Path = make("page", self, path)
         return written
 
     def plot_track(self) -> Figure:

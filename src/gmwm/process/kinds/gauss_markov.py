@@ -55,6 +55,8 @@ class GaussMarkov(Process):
     label: ClassVar[str] = "Gauss-Markov"
     compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
+    is_textbook: ClassVar[bool] = True
+    is_exponential: ClassVar[bool] = True
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
         super().__init__(sigma, tau)

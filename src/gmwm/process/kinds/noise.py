@@ -33,6 +33,7 @@ class WhiteNoise(Process):
     N: float = parameter("u/sqrt(Hz)", "scale", meaning="white noise")
     label: ClassVar[str] = "white noise"
     is_white: ClassVar[bool] = True
+    is_textbook: ClassVar[bool] = True
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -72,6 +73,7 @@ class QuantizationNoise(Process):
 
     Q: float = parameter("u s", "scale", meaning="quantization noise")
     label: ClassVar[str] = "quantization noise"
+    is_textbook: ClassVar[bool] = True
 
     def __init__(self, Q: float | None = None) -> None:
         super().__init__(Q)
@@ -118,6 +120,7 @@ class RandomWalk(Process):
     K: float = parameter("u/s/sqrt(Hz)", "scale", meaning="random walk")
     label: ClassVar[str] = "random walk"
     is_walk: ClassVar[bool] = True
+    is_textbook: ClassVar[bool] = True
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)

@@ -11,9 +11,10 @@ import numpy as np
 
 from gmwm._core.files import writable_file
 from gmwm._core.notices import worst_first
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief
-from gmwm.comparison import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.estimate import Estimate, Fit
+from gmwm.population import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import origin, write_page
 from gmwm.report.several.multiples import COLOURS, multiple
@@ -32,6 +33,7 @@ _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 
 
+@page_of(SensorComparison)
 def write_sensor_comparison_report(
     comparison: SensorComparison,
     path: str | os.PathLike[str],
@@ -87,8 +89,7 @@ def write_sensor_comparison_report(
 
 def _overall(comparison: SensorComparison) -> str:
     states = {axis.state for axis in comparison.values()}
-    clock = any(notice.code == "clock-ratio" for notice in comparison.notices)
-    return "care" if clock or states & {"differ", "untested"} else "good"
+    return "care" if states & {"differ", "untested"} else "good"
 
 
 def _notices(comparison: SensorComparison) -> list[dict[str, Any]]:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.fleet import (
+from gmwm.population import (
     CONFIDENCE,
     CONTENT,
     DERIVED,
@@ -39,6 +40,7 @@ _STEPS = (1.0, 2.0, 5.0)
 _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 
 
+@page_of(Fleet)
 def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     """Write the report of a fleet as one HTML file that needs no network.
 
@@ -79,6 +81,7 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     )
 
 
+@page_of(Fleet, "fragment")
 def fleet_fragment(fleet: Fleet) -> str:
     """The fleet for a notebook."""
     return f"<pre>{escape(str(fleet))}</pre>"

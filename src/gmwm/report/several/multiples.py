@@ -10,9 +10,9 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.comparison import AxisComparison, Equality
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
+from gmwm.population import AxisComparison, Equality
 from gmwm.report.datasheet import Datasheet
 
 COLOURS = 8

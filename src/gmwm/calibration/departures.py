@@ -1,0 +1,422 @@
+"""Departures from stationary noise: steps, settling after switching on, slow periods.
+
+A random walk follows all of them, so that the chi-square test of a fit passes although the walk has
+the wrong size. They are therefore compared with it: means of blocks of samples are explained by
+white noise beside a random walk, and by these beside the departure, each time by the sizes that
+explain them best. Twice the gain in the logarithm of the likelihood must exceed a limit that
+stationary noise passes in one of a hundred records. Whatever the sensor's slow noise is, a random
+walk that matches it over some blocks is larger than it over many, so that the limit holds for
+Gauss-Markov processes and bias instability too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky_banded, solve_banded
+
+from gmwm._core.distributions import norm
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.text import brief, readable
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.calibration.steadiness import Means
+from gmwm.estimate import Fit
+from gmwm.variance import WaveletVariance
+
+DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
+"""Kinds of departures: the codes of their notices."""
+
+WIDE = float(norm.isf(0.025))
+"""Standard errors of half a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Something that stationary noise does not have.
+
+    kind: Code of its notice: "step", "transient", "drift-at-start" or "slow-period".
+    time: When the step is, the time constant, the end of the drift or the period, and the ends of
+        its 95 % interval, s.
+    size: Height of the step; of the transient or the drift at the start of the record; amplitude of
+        the period; and the ends of its 95 % interval, u.
+    evidence: Stationary noise shows as much in one of so many records.
+    share: Largest fraction of the wavelet variance of the model that it accounts for.
+    phase: Of a period, ``size cos(2 pi t / time - phase)``, rad.
+    """
+
+    kind: str
+    time: tuple[float, float, float]
+    size: tuple[float, float, float]
+    evidence: float
+    share: float
+    phase: float = 0.0
+
+    def curve(self, time: FloatArray) -> FloatArray:
+        """The departure at unit size, at times from the start of the record, s."""
+        length = self.time[0]
+        if self.kind == "step":
+            return np.asarray(time > length, dtype=float)
+        if self.kind == "transient":
+            return np.exp(-time / length)
+        if self.kind == "drift-at-start":
+            return np.maximum(1.0 - time / length, 0.0)
+        return np.cos(2.0 * np.pi * time / length - self.phase)
+
+
+def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departure, ...]:
+    """Find what a recording has that stationary noise does not have.
+
+    They are found one after the other, each beside those before it, and measured beside all others.
+    A straight drift of the whole record competes with them and is none of them: the rate ramp of a
+    model has a test of its own.
+
+    wv: The recording, where the fit is one of several.
+    Returns: clearest first.
+    """
+    means = Means.of(wv or fitted.wv, tuning.MOST_MEANS)
+    fixed = _known_rows(fitted, means)
+    if means.first.size - len(fixed) < tuning.FEWEST_DIFFERENCES:
+        return ()
+    data = means.differences(means.blocks)
+    if np.max(np.abs(data)) <= tuning.NO_INFORMATION * np.nanmax(np.abs(means.blocks)):
+        return ()
+    shapes = _shapes(means)
+    found: list[_Test] = []
+    while len(found) < tuning.MOST_DEPARTURES:
+        noises = _noises(means, [fixed, *(each.neighbours for each in found)])
+        best = max((_tested(shape, data, noises) for shape in shapes), key=lambda test: test.excess)
+        if best.excess <= 0.0:
+            break
+        if best.shape.kind == "drift":
+            fixed = np.vstack([fixed, best.neighbours])
+        else:
+            found.append(best)
+    measured = []
+    for each in found:
+        others = [other.neighbours for other in found if other is not each]
+        again = _tested(each.shape, data, _noises(means, [fixed, *others]))
+        if again.excess > 0.0:
+            measured.append(again.departure(fitted, means))
+    return tuple(measured)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """Departures of one kind that are looked for.
+
+    times: (G,), when, how long or how slow each is, s.
+    curves: (G, r, B), block means at unit size; two of a period, a cosine and a sine.
+    rows: (G, r, D), their differences.
+    limit: Twice the gain in log likelihood that stationary noise has in one of 400 records.
+    """
+
+    kind: str
+    times: FloatArray
+    curves: FloatArray
+    rows: FloatArray
+    limit: float
+
+
+def _shapes(means: Means) -> list[_Shape]:
+    """All departures that are looked for, and a straight drift of the whole record.
+
+    Steps at all edges and middles of blocks; transients with a time constant of one block to a
+    third of the record; straight drifts that end after four blocks to two thirds of it; periods of
+    twice the record to a 24th of it, since faster ones are lines.
+    """
+    count, length = means.blocks.size, float(means.blocks.size)
+    edge = np.arange(count + 1.0)
+    at = 0.5 * np.arange(2.0, 2.0 * count - 1.0)
+    constants, ends = (
+        np.geomspace(low, high, round(np.log(high / low) / np.log(tuning.RATIO_OF_TIMES)) + 1)
+        for low, high in ((1.0, length / 3.0), (4.0, length * 2.0 / 3.0))
+    )
+    periods = length / np.arange(tuning.FEWEST_CYCLES, tuning.MOST_CYCLES, 0.25)
+    tau, end, period = constants[:, None], ends[:, None], periods[:, None]
+    phase = 2.0 * np.pi * edge / period
+    # Block means are differences of the integral.
+    integrals = {
+        "step": (at, [np.maximum(edge - at[:, None], 0.0)]),
+        "transient": (constants, [-tau * np.exp(-edge / tau)]),
+        "drift-at-start": (ends, [-(np.maximum(end - edge, 0.0) ** 2) / (2.0 * end)]),
+        "slow-period": (
+            periods,
+            [each * period / (2.0 * np.pi) for each in (np.sin(phase), -np.cos(phase))],
+        ),
+        "drift": (np.array([length]), [0.5 * edge[None, :] ** 2 / length]),
+    }
+    found = []
+    for kind, (times, parts) in integrals.items():
+        curves = np.diff(np.stack(parts, axis=1))
+        rows = means.differences(curves)
+        found.append(_Shape(kind, times * means.step, curves, rows, tuning.LIMITS[kind]))
+    return found
+
+
+def _known_rows(fitted: Fit, means: Means) -> FloatArray:
+    """Differences of the curves that a model has beside its noise, (k, D)."""
+    curves = [np.empty((0, means.blocks.size))]
+    if any(term.is_drift for term in fitted.model.terms):
+        curves.append(means.time[None, :])
+    for frequency, _ in fitted.model.lines():
+        phase = 2.0 * np.pi * frequency * means.time
+        curves.append(np.array([np.sin(phase), np.cos(phase)]))
+    return means.differences(np.vstack(curves))
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """White noise beside a random walk, in one ratio, with what is known beside it.
+
+    factor: (2, D), Cholesky factor of the tridiagonal covariance of differences, in bands.
+    basis: (k, D), orthonormal, what is known, whitened.
+    log_weight: Logarithm of the likelihood, without what the data give.
+    """
+
+    factor: FloatArray
+    basis: FloatArray
+    log_weight: float
+
+    @classmethod
+    def of(cls, white: float, walk: float, steps: FloatArray, known: FloatArray) -> _Noise:
+        """Noise of two sizes.
+
+        white, walk: Variance of a block mean, and of the walk from one block to the next.
+        steps: (D,), blocks from each that exists to the next that does.
+        known: (k, D), independent rows.
+        """
+        bands = np.full((2, steps.size), walk / 6.0 - white)
+        bands[0] = 2.0 * white + (steps - 1.0 / 3.0) * walk
+        factor = np.asarray(cholesky_banded(bands, lower=True))
+        basis, triangle = np.linalg.qr(_whitened(factor, known).T)
+        weight = np.sum(np.log(factor[0])) + np.sum(np.log(np.abs(np.diag(triangle))))
+        return cls(factor, basis.T, -float(weight))
+
+    def without_known(self, rows: FloatArray) -> FloatArray:
+        """Rows as independent numbers of one size, without what is known."""
+        white = _whitened(self.factor, rows)
+        if len(self.basis):
+            white -= (white @ self.basis.T) @ self.basis
+        return white
+
+
+def _whitened(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    flat = rows.reshape(-1, rows.shape[-1])
+    if not len(flat):
+        return flat
+    return np.ascontiguousarray(solve_banded((1, 0), factor, flat.T).T).reshape(rows.shape)
+
+
+def _noises(means: Means, known: Sequence[FloatArray]) -> list[_Noise]:
+    """White noise alone, with more and more of a random walk, and a random walk alone.
+
+    known: Rows of differences, (k, D), which need not be independent.
+    """
+    rows = np.vstack(known)
+    norms = np.linalg.norm(rows, axis=1)[:, None]
+    _, sizes, spanned = np.linalg.svd(rows / np.where(norms > 0.0, norms, 1.0), full_matrices=False)
+    spanned = spanned[sizes > tuning.SPANNED * np.max(sizes, initial=0.0)]
+    steps = np.diff(np.flatnonzero(~np.isnan(means.blocks))).astype(float)
+    ratios = [(1.0, 0.0), *((1.0, ratio) for ratio in tuning.WALKS), (0.0, 1.0)]
+    return [_Noise.of(white, walk, steps, spanned) for white, walk in ratios]
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """How much better a departure of some shape explains the data.
+
+    gains: (G,), twice the gain in log likelihood of each time.
+    sizes: (r,), of the best one's curves.
+    error: Standard error of a size.
+    """
+
+    shape: _Shape
+    gains: FloatArray
+    sizes: FloatArray
+    error: float
+
+    @property
+    def best(self) -> int:
+        """Which time gains most."""
+        return int(np.argmax(self.gains))
+
+    @property
+    def excess(self) -> float:
+        """The gain above its limit."""
+        return float(self.gains[self.best]) - self.shape.limit
+
+    @property
+    def neighbours(self) -> FloatArray:
+        """Rows of the best time and of those beside it: one between them is about their sum."""
+        near = slice(max(self.best - tuning.NEAR, 0), self.best + tuning.NEAR + 1)
+        return self.shape.rows[near].reshape(-1, self.shape.rows.shape[-1])
+
+    def departure(self, fitted: Fit, means: Means) -> Departure:
+        """The best one, with 95 % intervals."""
+        size = float(self.sizes[0])
+        if self.sizes.size == 2:
+            size = float(np.hypot(*self.sizes))
+        half = WIDE * self.error
+        low = max(size - half, 0.0) if self.sizes.size == 2 else size - half
+        phase = float(np.arctan2(*self.sizes[::-1])) if self.sizes.size == 2 else 0.0
+        # The likelihood of times that are equally likely beforehand.
+        times, weight = self.shape.times, np.exp(0.5 * (self.gains - self.gains[self.best]))
+        order = np.argsort(times)
+        ordered = times[order]
+        edges = np.concatenate([ordered[:1], 0.5 * (ordered[1:] + ordered[:-1]), ordered[-1:]])
+        first, last = np.searchsorted(np.cumsum(weight[order]) / np.sum(weight), [0.025, 0.975])
+        time = (times[self.best], edges[first], edges[min(last, times.size - 1) + 1])
+        return Departure(
+            self.shape.kind,
+            (float(time[0]), float(time[1]), float(time[2])),
+            (size, low, size + half),
+            tuning.EVIDENT * float(np.exp(min(0.5 * self.excess, tuning.LARGEST_LOG))),
+            _share(self.sizes @ self.shape.curves[self.best], means.step, fitted),
+            phase,
+        )
+
+
+def _tested(shape: _Shape, data: FloatArray, noises: Sequence[_Noise]) -> _Test:
+    """Compare the likelihoods with and without each departure, each beside its best noise."""
+    freedom = data.size - len(noises[0].basis)
+    alone, beside, fits = [], [], []
+    for noise in noises:
+        series, curves = noise.without_known(data), noise.without_known(shape.rows)
+        total = float(series @ series)
+        score = curves @ series
+        information = curves @ np.swapaxes(curves, 1, 2)
+        # What is known explains a curve that is part of it.
+        least = tuning.NO_INFORMATION * np.max(np.trace(information, axis1=1, axis2=2))
+        inverse = np.linalg.inv(information + least * np.eye(information.shape[-1]))
+        sizes = (inverse @ score[..., None])[..., 0]
+        left = np.maximum(total - np.sum(score * sizes, axis=1), tuning.NO_INFORMATION * total)
+        alone.append(noise.log_weight - 0.5 * freedom * np.log(total))
+        beside.append(noise.log_weight - 0.5 * freedom * np.log(left))
+        fits.append((sizes, left, inverse))
+    gains = 2.0 * (np.max(beside, axis=0) - np.max(alone))
+    best = int(np.argmax(gains))
+    sizes, left, inverse = fits[int(np.argmax(np.array(beside)[:, best]))]
+    variance = float(np.mean(np.diag(inverse[best]))) * float(left[best])
+    freedom -= shape.rows.shape[1]
+    return _Test(shape, gains, sizes[best], float(np.sqrt(variance / freedom)))
+
+
+def _share(curve: FloatArray, step: float, fitted: Fit) -> float:
+    """Largest fraction of the model's wavelet variance that a curve of block means has."""
+    edges = step * np.arange(curve.size + 1)
+    integral = np.concatenate([[0.0], np.cumsum(curve)]) * step
+    shares = [0.0]
+    for tau, implied in zip(fitted.wv.tau, fitted.implied, strict=True):
+        if step <= tau <= 0.5 * edges[-1] and implied > 0.0:
+            begin = np.linspace(0.0, edges[-1] - 2.0 * tau, tuning.SHARE_POINTS)
+            parts = [np.interp(begin + k * tau, edges, integral) for k in range(3)]
+            coefficient = (parts[2] - 2.0 * parts[1] + parts[0]) / (2.0 * tau)
+            shares.append(float(np.mean(coefficient**2) / implied))
+    return max(shares)
+
+
+# -- notices --------------------------------------------------------------------------------------
+
+
+def with_departures(
+    fitted: Fit,
+    sources: Sequence[str],
+    found: Sequence[Sequence[Departure]],
+    removed: Sequence[Sequence[Departure]],
+    curves: Sequence[Sequence[WaveletVariance]],
+    *,
+    removing: bool = False,
+) -> Fit:
+    """A fit with a notice of each departure; not valid if one accounts for much of the noise.
+
+    sources: Of its recordings; named where there are several.
+    found, removed: What each recording has, and what was subtracted before the fit.
+    curves: Wavelet variances of each recording, before that was subtracted and after.
+    removing: Whether departures were to be subtracted: those that are left cannot be.
+    """
+    unit = fitted.wv.unit
+    notices = [
+        replace(notice, source=source if len(sources) > 1 else "")
+        for source, there, gone, both in zip(sources, found, removed, curves, strict=True)
+        for notice in (
+            *(departure_notice(each, unit, stays=removing) for each in there),
+            *(departure_notice(each, unit, removed=True) for each in gone),
+            *(_removal_notices(gone, *both) if gone else ()),
+        )
+    ]
+    return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+
+
+def departure_notice(
+    found: Departure, unit: str, *, stays: bool = False, removed: bool = False
+) -> Notice:
+    """Say what it is, and whether a fit beside it is valid.
+
+    unit: Of the channel, SI.
+    stays: Whether subtracting it was tried, so that the notice does not advise it.
+    removed: Whether it was subtracted before the fit.
+    """
+    size, low, high = (readable(each, unit, sign=True) for each in found.size)
+    size = f"{size} ({low} .. {high})"
+    time, first, last = (f"{each:.4g}" for each in found.time)
+    when = f"{time} s ({first} .. {last})"
+    text, hint = {
+        "step": (f"a step of {size} at {when}", "calibrate the part before it or after it"),
+        "transient": (
+            f"a transient of {size} at the start with a time constant of {when}",
+            "leave out the first three time constants",
+        ),
+        "drift-at-start": (
+            f"a drift by {size} from the start, which ends at {when}",
+            "leave it out",
+        ),
+        "slow-period": (
+            f"a period of {when} with an amplitude of {size}",
+            "find what varies so, such as the temperature",
+        ),
+    }[found.kind]
+    severity: Severity = "bad" if found.share > tuning.HARMFUL_SHARE else "warning"
+    if removed:
+        severity, hint = "note", "subtracted"
+    else:
+        part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
+        text += f"; it accounts for {part} of the model's wavelet variance: slow noise is too large"
+        hint = hint if stays else f"{hint}, or take it off (remove_departures=True)"
+    names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
+    values: dict[str, Any] = dict(zip(names, (*found.time, *found.size), strict=True))
+    values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
+    values |= {"evident": True, "removable": not stays} | ({"removed": True} if removed else {})
+    return Notice(found.kind, severity, "", text, values, hint)
+
+
+def _removal_notices(
+    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance
+) -> list[Notice]:
+    """Say what a model lacks without what was subtracted, and whether it was noise after all."""
+    levels = min(before.tau.size, after.tau.size)  # what is subtracted leaves gaps
+    rest = after.variance[:levels]
+    ratio = np.divide(before.variance[:levels], rest, out=np.zeros(levels), where=rest > 0.0)
+    lost = np.sqrt(np.maximum(ratio, 0.0))
+    most = int(np.argmax(lost))
+    notices = []
+    if lost[most] ** 2 * (1.0 - tuning.HARMFUL_SHARE) > 1.0:
+        values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
+        text = (
+            f"what was subtracted makes the deviation {brief(values['ratio'])} times as large "
+            f"at tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
+        )
+        hint = "find its cause, or let a slow term of the model describe it"
+        notices.append(Notice("departures-removed", "warning", "", text, values, hint))
+    if len(removed) > tuning.MOST_REMOVED:
+        text = (
+            f"{len(removed)} departures were subtracted: a level that changes so often is noise of "
+            "the sensor"
+        )
+        hint = "fit a slow term in place of it, such as a Gauss-Markov process"
+        values = {"removed": len(removed)}
+        notices.append(Notice("departures-many", "bad", "", text, values, hint))
+    return notices

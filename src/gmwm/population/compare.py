@@ -1,0 +1,309 @@
+"""`compare`: several recordings or units of a sensor side by side."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.distributions import chi2
+from gmwm._core.notices import Notice, Severity
+from gmwm._core.typing import Progress
+from gmwm.calibration import DEPARTURES, Calibration, calibrate
+from gmwm.errors import InputError, printable
+from gmwm.estimate import Fit, JointFit
+from gmwm.population import tuning
+from gmwm.population.comparison import AxisComparison, SensorComparison
+from gmwm.population.curves import Equality
+from gmwm.population.numbers import axis_numbers, curve_inflation, joint_fit, parameter_spreads
+from gmwm.readers import Recording, is_frame
+
+_NOT_NOISE = (
+    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
+    "held", "filled", "value-repeated", "variance", "unsteady", *DEPARTURES,
+)  # fmt: skip
+"""Codes of notices of a fit whose curve is not that of noise."""
+
+_LONGEST_LABEL = 28  # characters
+
+
+def compare(
+    sources: Sequence[Any] | Mapping[str, Any],
+    *,
+    horizon: float = 60.0,
+    progress: Progress | None = None,
+) -> SensorComparison:
+    """Compare calibrations of a sensor on several days, or of several units of a kind.
+
+    Structures of models differ between recordings of one sensor far more than curves do. So curves
+    are tested for equality, level by level with their covariances; one structure is selected for
+    all recordings, and its parameters are compared; and `gmwm.bound` gives N and K for a filter,
+    whatever the structure.
+
+    Parameters
+    ----------
+    sources : sequence or mapping of str to each
+        Two or more: `Calibration`, the path of a saved one, or a `Recording` or DataFrame, which
+        is calibrated first. The keys of a mapping name them.
+    horizon : float, optional
+        Longest outage that the filter numbers are for, s.
+    progress : callable, optional
+        Called as ``progress(done, total, channel)``.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two different recordings, one cannot be used, or they have no
+        channel in common.
+
+    Notes
+    -----
+    The test of a channel is the sum of squares of the cube roots of the wavelet variances about
+    their generalized mean, with the covariances that the models imply: chi-square with (R - 1) J
+    degrees of freedom for R recordings of J levels of the same noise. Channels are tested together
+    at 5 % (Holm 1979). Channels that differ by less than 10 % of the deviation in every part of the
+    curve are called close: with a million samples a change of temperature shows.
+    """
+    horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
+    calibrations, notices = _different(_labelled(sources))
+    names = dict.fromkeys(n for each in calibrations.values() for n in (*each, *each.skipped))
+    members = {name: _members(name, calibrations) for name in names}
+    for name, (_, out) in members.items():
+        notices += [replace(why, where=name, source=label) for label, why in out.items()]
+    shared = [name for name, (fits, _) in members.items() if len(fits) > 1]
+    if not shared:
+        why = next((str(replace(n, hint="")) for n in notices if n.source), "")
+        raise InputError(
+            f"there is nothing to compare: {why or 'they have no channel in common'}; give "
+            "recordings of one rate that have a channel in common"
+        )
+    tests = {name: Equality.of(list(members[name][0].values())) for name in shared}
+    p_values = _holm({name: test.p_value for name, test in tests.items()})
+    axes = {}
+    for done, name in enumerate(names):
+        if progress is not None:
+            progress(done, len(names), name)
+        test = tests.get(name)
+        p_value = p_values.get(name, float("nan"))
+        axes[name], found = _axis(name, members[name], (test, p_value), horizon)
+        notices += found
+    if progress is not None:
+        progress(len(names), len(names), "")
+    notices += [_curves_notice(axis) for axis in axes.values() if axis.state in ("close", "differ")]
+    notices.append(_few_recordings(len(calibrations)))
+    return SensorComparison(calibrations, axes, horizon, tuple(notices))
+
+
+# -- what is compared -----------------------------------------------------------------------------
+
+
+def _labelled(sources: Any) -> dict[str, Calibration]:
+    """Calibrations by the name of the recording."""
+    single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
+    if single or not isinstance(sources, Mapping | Iterable):
+        raise InputError(
+            f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
+        )
+    if isinstance(sources, Mapping):
+        return {printable(str(label)): _calibration(each) for label, each in sources.items()}
+    given = list(sources)
+    paths = [each if isinstance(each, str | os.PathLike) else "" for each in given]
+    return labelled([_calibration(each) for each in given], paths)
+
+
+def _calibration(source: Any) -> Calibration:
+    if isinstance(source, Calibration):
+        return source
+    if isinstance(source, str | os.PathLike):
+        return Calibration.load(source)
+    if isinstance(source, Recording) or is_frame(source):
+        return calibrate(source)
+    raise InputError(
+        f"{checks.shown(source)} is neither a calibration nor a recording: give what "
+        "gmwm.calibrate returns, the path of a saved one, or what gmwm.read returns"
+    )
+
+
+def labelled(
+    calibrations: Sequence[Calibration], paths: Sequence[str | os.PathLike[str]]
+) -> dict[str, Calibration]:
+    """Calibrations by short labels.
+
+    A label is the name of the recording; where recordings have one name, it is what differs between
+    the paths of the files that were given (empty if there is none), or else a number.
+    """
+    names = []
+    for place, each in enumerate(calibrations):
+        stem = PurePath(each.source.replace("\\", "/").split(", ")[0]).name
+        for _ in range(2):
+            stem = stem.rsplit(".", 1)[0] if "." in stem[1:] else stem
+        names.append(printable(stem[:_LONGEST_LABEL]) or f"recording {place + 1}")
+    wanted = list(names)
+    for name in set(names):
+        same = [place for place, each in enumerate(names) if each == name]
+        if len(same) > 1:
+            for place, part in zip(same, _different_parts([paths[k] for k in same]), strict=True):
+                wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
+    found: dict[str, Calibration] = {}
+    for name, calibration in zip(wanted, calibrations, strict=True):
+        label, copy = name, 2
+        while label in found:
+            label, copy = f"{name} ({copy})", copy + 1
+        found[label] = calibration
+    return found
+
+
+def _different_parts(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Each path without the folders at its beginning and end that all have."""
+    parts = [list(PurePath(path).with_suffix("").parts) if str(path) else [] for path in paths]
+    for end in (0, -1):
+        while all(parts) and len({each[end] for each in parts}) == 1:
+            for each in parts:
+                each.pop(end)
+    return ["/".join(each) for each in parts]
+
+
+def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration], list[Notice]]:
+    """Each recording once, and notices of copies."""
+
+    def is_same(a: Calibration, b: Calibration) -> bool:
+        shared = [name for name in a if name in b]
+        return bool(shared) and all(
+            np.array_equal(a[name].wv.variance, b[name].wv.variance) for name in shared
+        )
+
+    kept: dict[str, Calibration] = {}
+    notices = []
+    for label, each in given.items():
+        same = next((other for other, known in kept.items() if is_same(each, known)), None)
+        if same is None:
+            kept[label] = each
+            continue
+        text, values = f"the same recording as {same}", {"other": same}
+        notices.append(Notice("same-recording", "warning", "", text, values, "left out", label))
+    if len(kept) < 2:
+        why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
+        raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
+    return kept, notices
+
+
+def _members(
+    name: str, calibrations: Mapping[str, Calibration]
+) -> tuple[dict[str, Fit], dict[str, Notice]]:
+    """Fits of a channel that can be compared, and why the others cannot."""
+    fits: dict[str, Fit] = {}
+    out: dict[str, Notice] = {}
+    for label, each in calibrations.items():
+        if name in each.skipped:
+            out[label] = Notice("channel-skipped", "warning", "", each.skipped[name].text)
+        elif name not in each:
+            out[label] = Notice("channel-missing", "warning", "", "it has no such channel")
+        else:
+            bad = [n for n in each[name].notices if n.severity == "bad" and n.code in _NOT_NOISE]
+            if bad:
+                out[label] = Notice(
+                    "not-noise", "warning", "", bad[0].text, {"reason": bad[0].code},
+                    "not compared: the curve is not that of noise alone",
+                )  # fmt: skip
+            else:
+                fits[label] = each[name]
+    unlike = _unlike(fits)
+    return {k: fit for k, fit in fits.items() if k not in unlike}, out | unlike
+
+
+def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
+    """Fits of another rate, unit or wavelet than most have."""
+
+    def is_like(a: Fit, b: Fit) -> bool:
+        near = abs(np.log(a.wv.dt / b.wv.dt)) < tuning.SAME_RATE
+        return bool(near and (a.wv.unit, a.wv.wavelet) == (b.wv.unit, b.wv.wavelet))
+
+    if not fits:
+        return {}
+    # A tie is won by the higher rate, so that the order of the recordings changes nothing.
+    usual = max(
+        fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
+    )
+    most = [label for label, fit in fits.items() if is_like(fit, usual)]
+    others = most[0] if len(most) == 1 else "the others"
+    found = {}
+    for label, fit in fits.items():
+        if label in most:
+            continue
+        own, common = 1.0 / fit.wv.dt, 1.0 / usual.wv.dt
+        code, text = "units-differ", f"in {fit.wv.unit}, {others} in {usual.wv.unit}"
+        if fit.wv.unit == usual.wv.unit:
+            code, text = "rates-differ", f"at {own:.6g} Hz, {others} at {common:.6g} Hz"
+        values = {"rate": own, "usual": common}
+        found[label] = Notice(code, "warning", "", text, values, "not compared level by level")
+    return found
+
+
+# -- what is found --------------------------------------------------------------------------------
+
+
+def _axis(
+    name: str,
+    members: tuple[dict[str, Fit], dict[str, Notice]],
+    tested: tuple[Equality | None, float],
+    horizon: float,
+) -> tuple[AxisComparison, list[Notice]]:
+    """A channel: its fits, recordings left out, test and p-value, made into a comparison."""
+    (fits, out), (test, p_value) = members, tested
+    notices: list[Notice] = []
+    joint = None
+    if len(fits) > 1:
+        found = joint_fit(list(fits.values()))
+        if isinstance(found, JointFit):
+            joint = found
+        else:
+            notices.append(found)
+    numbers, problems = axis_numbers(name, fits, joint, horizon)
+    notices += problems
+    for label, fit in fits.items():
+        codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
+        if codes:
+            text, hint = f"its own fit is not valid ({codes})", "the curve is compared all the same"
+            values = {"reasons": codes}
+            notices.append(Notice("fit-not-valid", "note", name, text, values, hint, label))
+    inflation = float("nan")
+    if joint and test and test.tau.size:
+        inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
+    rows = parameter_spreads(joint) if joint else ()
+    return (
+        AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation),
+        notices,
+    )
+
+
+def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
+    """p-values for all tests together (Holm 1979); NaN stays."""
+    known = sorted((p, name) for name, p in p_values.items() if np.isfinite(p))
+    adjusted, largest = dict(p_values), 0.0
+    for place, (p, name) in enumerate(known):
+        largest = max(largest, min(1.0, (len(known) - place) * p))
+        adjusted[name] = largest
+    return adjusted
+
+
+def _curves_notice(axis: AxisComparison) -> Notice:
+    severity: Severity = "warning" if axis.state == "differ" else "note"
+    values = {"p_value": axis.p_value}
+    if axis.main:
+        worst = axis.main[0]
+        values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
+    return Notice(f"curves-{axis.state}", severity, axis.name, axis.sentence, values)
+
+
+def _few_recordings(count: int) -> Notice:
+    """How well so many recordings know their spread."""
+    dof = count - 1
+    tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
+    high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
+    text = f"{count} recordings know the spread within factors of {low:.2g} and {high:.2g} (95 %)"
+    return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})

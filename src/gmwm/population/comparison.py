@@ -1,0 +1,325 @@
+"""The result of `compare`, axis by axis."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gmwm._core.frames import frame
+from gmwm._core.frozen import freeze
+from gmwm._core.notices import Notice, worst_first
+from gmwm._core.pages import make
+from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
+from gmwm._core.units import field_units, si_parameter_unit
+from gmwm.calibration import Calibration
+from gmwm.errors import MissingNameError
+from gmwm.estimate import Fit, JointFit
+from gmwm.estimate.result import plain
+from gmwm.population import tuning
+from gmwm.population.curves import Difference, Equality
+from gmwm.population.numbers import AxisNumbers, ParameterSpread
+
+if TYPE_CHECKING:
+    import pandas
+
+State = Literal["agree", "close", "differ", "untested"]
+
+STATES: dict[State, str] = {
+    "agree": "agree",
+    "close": "differ by less than 10 %",
+    "differ": "differ",
+    "untested": "not compared",
+}
+"""Verdicts in words, the best first."""
+
+_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
+_NAMES = {"short": "short times", "R": "drift"}
+
+
+def _percent(share: float) -> str:
+    """A relative difference; a factor from one on."""
+    return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
+
+
+@dataclass(frozen=True, eq=False)
+class AxisComparison:
+    """One channel in several recordings.
+
+    fits: Recording that is compared -> its own fit.
+    left_out: Recording that is not -> why.
+    equality: Test of the curves; ``None`` where fewer than two recordings are compared.
+    p_value: p-value of that test, adjusted for the number of channels (Holm); NaN without a test.
+    joint: The model recommended for all of them.
+    parameters: Parameters of the joint model.
+    numbers: N and K for a filter.
+    curve_inflation: Factor on the amplitudes of the joint model with which its curve is nowhere
+        below the one of a recording's own model; NaN without a joint model.
+    """
+
+    name: str
+    fits: Mapping[str, Fit]
+    left_out: Mapping[str, Notice]
+    equality: Equality | None
+    p_value: float
+    joint: JointFit | None
+    parameters: tuple[ParameterSpread, ...]
+    numbers: AxisNumbers
+    curve_inflation: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "fits", "left_out")
+
+    @property
+    def quantity(self) -> str:
+        """The kind of sensor: gyro, accel, or nothing."""
+        return next(iter(self.fits.values())).wv.quantity or "" if self.fits else ""
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """Parts of the curves that differ, the most certain one first; none where they agree."""
+        if self.equality is None or not self.p_value < tuning.LEVEL:
+            return ()
+        return self.equality.evident
+
+    @property
+    def state(self) -> State:
+        """Whether the curves agree, or to within 10 % of the deviation, or differ."""
+        if self.equality is None or np.isnan(self.p_value):
+            return "untested"
+        if not self.p_value < tuning.LEVEL:
+            return "agree"
+        is_notable = any(each.extent > tuning.NOTABLE for each in self.differences)
+        return "differ" if is_notable else "close"
+
+    @property
+    def main(self) -> tuple[Difference, ...]:
+        """The differences that a verdict names: at most three, those above 10 % first.
+
+        White noise differs at short times too; N says more.
+        """
+
+        def place(each: Difference) -> tuple[bool, bool]:
+            return each.extent <= tuning.NOTABLE, each.part == "short"
+
+        return tuple(sorted(self.differences, key=place)[:3])
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one line."""
+        reasons = {k: str(n.values.get("reason", n.code)) for k, n in self.left_out.items()}
+        out = ", ".join(f"{k} ({reason.replace('-', ' ')})" for k, reason in reasons.items())
+        if self.equality is None or self.state == "untested":
+            return f"not compared: without {out}" if out else "not compared"
+        if self.state == "agree":
+            known = [d for d in self.equality.differences if d.part in "NK"]
+            shown = [f"{_percent(d.resolution)} in {d.part}" for d in known]
+            tail = f"; {', '.join(shown)} would show" if shown else ""
+            text = f"agree (p = {self.p_value:.2g}{tail})"
+        else:
+            parts = [
+                f"{_NAMES.get(d.part, d.part)} by {_percent(d.extent)} ({brief(d.sigma)} sigma)"
+                for d in self.main
+            ] or [f"shape (p = {self.p_value:.2g})"]
+            words = "differ in" if self.state == "differ" else "differ by less than 10 %:"
+            text = f"{words} {', '.join(parts)}"
+        return f"{text}; without {out}" if out else text
+
+    def number_text(self, letter: str, value: float) -> tuple[str, str]:
+        """An N or a K in the data-sheet unit, and that unit."""
+        known = field_units(_UNITS[letter], self.quantity)
+        unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
+        text = f"{value * (known[0].per_si if known else 1.0):.3g}"
+        return (f"{float(text):,.0f}" if "e+" in text else text), unit
+
+    def to_dict(self) -> dict[str, Any]:
+        """In JSON types, SI."""
+        equality = self.equality
+        return {
+            "state": self.state,
+            "p_value": plain(self.p_value),
+            "recordings": list(self.fits),
+            "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
+            "differences": [
+                {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest,
+                 "extent": d.extent, "sigma": d.sigma, "resolution": d.resolution,
+                 "ratios": [plain(r) for r in d.ratios.tolist()],
+                 "errors": [plain(r) for r in d.errors.tolist()]}
+                for d in (equality.differences if equality else ())
+            ],
+            "joint": None if self.joint is None else self.joint.to_dict(),
+            "equality_p": plain(self.joint.equality_p) if self.joint else None,
+            "parameters": [
+                {"key": each.key, "joint": each.joint.to_dict(), "spread": plain(each.spread),
+                 "p_value": plain(each.p_value),
+                 "each": [None if e is None else e.to_dict() for e in each.each]}
+                for each in self.parameters
+            ],
+            "numbers": {
+                "each": {label: each.row() for label, each in self.numbers.each.items()},
+                "joint": self.numbers.joint.row() if self.numbers.joint else None,
+                "covering": self.numbers.covering.row() if self.numbers.covering else None,
+                "nees": {label: plain(value) for label, value in self.numbers.nees.items()},
+                "upper_bounds": dict(self.numbers.upper),
+                "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
+            },
+            "curve_inflation": plain(self.curve_inflation),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SensorComparison(Mapping[str, AxisComparison], Printed):
+    """Several recordings or units of a sensor compared: a mapping of channels to `AxisComparison`.
+
+    Attributes
+    ----------
+    calibrations : dict of str to Calibration
+        By recording.
+    axes : dict of str to AxisComparison
+    horizon : float
+        Longest outage that the filter numbers are for, s.
+    notices : tuple of Notice
+        What was found: channels that are missing or left out, other rates, too few recordings.
+    """
+
+    calibrations: Mapping[str, Calibration]
+    axes: Mapping[str, AxisComparison]
+    horizon: float
+    notices: tuple[Notice, ...] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        freeze(self, "calibrations", "axes")
+
+    def __getitem__(self, name: str) -> AxisComparison:
+        if name not in self.axes:
+            known = ", ".join(self.axes)
+            raise MissingNameError(f"channel {name!r} was not compared: there are {known}")
+        return self.axes[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.axes)
+
+    def __len__(self) -> int:
+        return len(self.axes)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the recordings, in their order."""
+        return tuple(self.calibrations)
+
+    @property
+    def summary(self) -> str:
+        """How many axes agree."""
+        counts = Counter(axis.state for axis in self.values())
+        parts = []
+        for state, word in STATES.items():
+            verb = word.split()[0]
+            if counts[state] == 1 and state != "untested":
+                word = word.replace(verb, f"{verb}s", 1)
+            if counts[state]:
+                parts.append(f"{counts[state]} {word}")
+        return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
+
+    def __repr__(self) -> str:
+        return f"<SensorComparison of {self.summary}>"
+
+    def __str__(self) -> str:
+        """Verdicts, what was found, and the numbers for a filter; 80 columns."""
+        lines = [self.summary]
+        for place, (label, each) in enumerate(self.calibrations.items(), 1):
+            size = f"{each.duration:,.6g} s at {each.rate:.6g} Hz"
+            lines += wrapped(f"{label}: {size}", first=f"{place:>3}  ", indent=5)
+        width = max(map(len, self), default=0)
+        lines.append("")
+        for name, axis in self.items():
+            lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
+        lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
+        for name, axis in self.items():
+            lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
+        lines += wrapped(self.promise)
+        # The verdicts stand above.
+        others = [each for each in self.notices if not each.code.startswith("curves-")]
+        lines += bullets(worst_first(others))
+        return "\n".join(lines)
+
+    def _numbers(self, axis: AxisComparison) -> str:
+        found = []
+        for letter in _UNITS:
+            value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+            if np.isfinite(value):
+                sign = "<= " if letter in axis.numbers.upper else ""
+                times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
+                shown = " ".join(axis.number_text(letter, value))
+                found.append(f"{letter} {sign}{shown}{times}")
+        own = len(axis.numbers.each)
+        if not found:
+            return "none: no recording can be used"
+        few = f" (of {own} only)" if own < len(self.labels) else ""
+        return ", ".join(found) + few
+
+    @property
+    def promise(self) -> str:
+        """What the covering numbers hold for, and what they do not."""
+        return (
+            "They are not overconfident for any of these recordings, each with its fitted model; "
+            "parameter uncertainty is not included. "
+            f"1-in-{len(self.labels) + 1} chance that another recording has a larger N, and the "
+            "same for K."
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the curves, in JSON types and SI units."""
+        return {
+            "schema": "gmwm.sensor-comparison",
+            "schema_version": 1,
+            "horizon_s": self.horizon,
+            "level": tuning.LEVEL,
+            "recordings": [
+                {"label": label, "source": each.source, "rate_hz": each.rate, "n": each.n}
+                for label, each in self.calibrations.items()
+            ],
+            "channels": {name: axis.to_dict() for name, axis in self.items()},
+            "notices": [notice.to_dict() for notice in self.notices],
+        }
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table with one row a channel, in SI units; needs pandas."""
+        nan = float("nan")
+        rows = []
+        for name, axis in self.items():
+            worst = axis.main[0] if axis.main else None
+            rows.append({
+                "channel": name,
+                "state": axis.state,
+                "p_value": axis.p_value,
+                "part": worst.part if worst else "",
+                "extent": worst.extent if worst else nan,
+                "sigma": worst.sigma if worst else nan,
+                "recordings": len(axis.fits),
+                "model": axis.joint.model.title() if axis.joint else "",
+                "N": axis.numbers.value("N"),
+                "N_inflation": axis.numbers.inflation("N"),
+                "K": axis.numbers.value("K"),
+                "K_inflation": axis.numbers.inflation("K"),
+                "curve_inflation": axis.curve_inflation,
+            })  # fmt: skip
+        return frame(rows, tuple(rows[0]) if rows else ("channel",))
+
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        datasheet: str | os.PathLike[str] | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
+        written: Path = make(
+            "page", self, path,
+            datasheet=datasheet, provenance=provenance,
+        )  # fmt: skip
+        return written

@@ -1,0 +1,239 @@
+"""From a series to its wavelet variance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.process import wavelet as known_wavelet
+from gmwm.readers import Channel
+from gmwm.variance import tuning
+from gmwm.variance.covariance.empirical import WINDOWS, data_covariance as covariance_of_data
+from gmwm.variance.gaps import Runs
+from gmwm.variance.kernels import difference_powers, survey
+from gmwm.variance.levels import Levels
+from gmwm.variance.wavelet import WaveletVariance
+
+MIN_SAMPLES = 8
+"""Fewest samples of which a wavelet variance is made."""
+
+
+def wavelet_variance(
+    data: Channel | FloatArray | Sequence[float],
+    dt: float | None = None,
+    *,
+    wavelet: str = "haar",
+    robust: bool = False,
+    efficiency: float = 0.6,
+    data_covariance: str | None = None,
+    confidence: float = 0.95,
+) -> WaveletVariance:
+    """MODWT wavelet variance of a channel or an array.
+
+    All levels with at least one coefficient free of end effects are given; the mean of the series
+    does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
+    averaging time are filled from what is around them, and what that changes in the expected
+    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing
+    samples take part in are left out.
+
+    Parameters
+    ----------
+    data : Channel or (n,) array_like
+        At least 8 samples without a gap between them.
+    dt : float, optional
+        Sampling interval, s; needed for an array.
+    wavelet : str, optional
+        A Daubechies filter, as PyWavelets names it: "haar", "db2" ... "db10", "sym4", "coif2".
+    robust : bool, optional
+        Whether to bound the influence of outliers, see `gmwm.variance.robust`.
+    efficiency : float, optional
+        Of the robust estimate where there are no outliers, between 0 and 1.
+    data_covariance : {"none", "octave"}, optional
+        Estimate the covariance of the variances from the coefficients too, over all lags or with
+        a lag window (see `gmwm.variance.covariance.empirical`), for ``fit(weights="data")``.
+    confidence : float, optional
+        Level of the chi-square intervals.
+
+    Raises
+    ------
+    InputError
+        For data that is not one series of numbers, too short or constant, also between gaps, or an
+        unknown wavelet.
+
+    Notes
+    -----
+    Percival & Walden (2000), *Wavelet Methods for Time Series Analysis*, sec. 8.3; eq. (3) of
+    Stebler et al. (2012). The Haar variance of averaging time tau is half the overlapping Allan
+    variance.
+    """
+    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    values, runs, mean = checked_samples(channel)
+    confidence = checks.share("confidence", confidence, 0.95)
+    efficiency = checks.share("efficiency", efficiency, 0.6)
+    efficiency = efficiency if checks.truth("robust", robust) else 1.0
+    if data_covariance is not None:
+        checks.choice("data_covariance", data_covariance, WINDOWS)
+    wavelet = "haar" if wavelet == "db1" else wavelet
+    _check_width(channel, runs, wavelet)
+    values = values - mean
+    levels = Levels.of(values, runs, wavelet, channel.dt)
+    moments = levels.moments()
+    driftless = None
+    if robust:
+        moments = _robust_moments(levels.coefficients(), efficiency)
+        driftless = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
+        driftless = driftless / (1.0 + levels.change)
+    blocks, block = levels.block_means()
+    found = None
+    if data_covariance is not None:
+        # What is subtracted for the filling leaves the error of that which it is subtracted from.
+        factor = (1.0 + levels.error) / (1.0 + levels.change)
+        longest = int(np.max(levels.counts))
+        found = covariance_of_data(levels.coefficients(), longest, data_covariance)
+        found = found * np.outer(factor, factor)
+    variance = levels.unfilled(moments)
+    if not np.any(variance > 0.0):
+        raise InputError(
+            f"{where_of(channel)} changes only where samples are missing: a dead channel has no "
+            "noise model"
+        )
+    return WaveletVariance(
+        tau=levels.averaging * channel.dt,
+        variance=variance,
+        mean=moments[:, 0],
+        blocks=blocks,
+        block=block,
+        n=runs.n,
+        dt=channel.dt,
+        confidence=confidence,
+        name=channel.name,
+        quantity=channel.quantity,
+        unit=channel.unit or "u",
+        wavelet=wavelet,
+        efficiency=efficiency,
+        driftless=driftless,
+        gaps=levels.effects(),
+        fourth_cumulant=0.0 if robust else fourth_cumulant(values),
+        data_covariance=found,
+    )
+
+
+def fourth_cumulant(values: FloatArray) -> float:
+    """Of the independent part of a series, NaN where samples are missing, u^4."""
+    count, square, fourth = difference_powers(values)
+    return cumulant_of_powers(square / count, fourth / count, count)
+
+
+def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
+    """Of the independent part of a series, u^4; 0 if not above chance.
+
+    Cumulants of independent samples add up, so that first differences have twice that of the
+    samples.
+
+    square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
+    count: Number of the first differences.
+    """
+    excess = fourth / square**2 - 3.0 if square > 0.0 else 0.0
+    chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)
+    return 0.5 * square**2 * excess if excess > chance else 0.0
+
+
+def where_of(channel: Channel) -> str:
+    """How messages call a channel."""
+    return f"channel {channel.name!r}" if channel.name else "the series"
+
+
+def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
+    """The samples of a channel, which of them exist, and their mean.
+
+    Raises InputError if they are no series of numbers, too few, infinite, constant or of no
+        sensor's size, or the sampling interval is none.
+    """
+    where = where_of(channel)
+    checks.sampling_interval(channel.dt)
+    values = np.ascontiguousarray(checks.real_numbers(channel.values, where))
+    if values.ndim != 1 or values.size < MIN_SAMPLES:
+        raise InputError(
+            f"{where} has shape {values.shape}: give one series of {MIN_SAMPLES} samples or more"
+        )
+    missing, total, low, high = survey(values)
+    bad = np.flatnonzero(np.isinf(values)) if not np.isfinite(total) else np.zeros(0)
+    if bad.size:
+        raise InputError(
+            f"{where} has {bad.size} infinite samples, the first at index {bad[0]}: remove or "
+            "repair them, or set them to NaN for missing"
+        )
+    runs = Runs.of(values) if missing else Runs((0,), (values.size,), values.size)
+    if runs.longest < MIN_SAMPLES:
+        raise InputError(
+            f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
+            "can be determined of its noise"
+        )
+    check_varies(replace(channel, values=np.array([low, high])))
+    return values, runs, total / runs.present
+
+
+def check_varies(channel: Channel) -> None:
+    """Refuse a channel that is constant or varies by what no sensor does.
+
+    Raises InputError.
+    """
+    where = where_of(channel)
+    if channel.is_constant:
+        raise InputError(
+            f"{where} is constant ({np.nanmin(channel.values):g}): a dead channel has no noise "
+            "model"
+        )
+    if not channel.is_of_a_sensor:
+        raise InputError(
+            f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
+        )
+
+
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
+
+
+def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
+    """Mean, and the robust stand-in for the mean square, of each level's coefficients, (J, 2)."""
+    from gmwm.variance.robust import robust_variance
+
+    return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
+
+
+def as_wavelet_variance(
+    data: WaveletVariance | Channel | FloatArray | Sequence[float],
+    dt: float | None,
+    *,
+    data_covariance: str | None = None,
+) -> WaveletVariance:
+    """A wavelet variance as it is, or that of a series.
+
+    Raises InputError if a sampling interval is given for a wavelet variance, which has its own.
+    """
+    if not isinstance(data, WaveletVariance):
+        return wavelet_variance(data, dt, data_covariance=data_covariance)
+    if dt is not None:
+        raise InputError("a wavelet variance has its own sampling interval: leave dt out")
+    return data
+
+
+def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
+    """A channel without a name from an array and its sampling interval (s).
+
+    Raises InputError if either is not usable.
+    """
+    if dt is None:
+        raise InputError("an array has no sampling interval: give it in seconds, e.g. dt=0.01")
+    interval = checks.sampling_interval(dt)
+    return Channel("", checks.real_numbers(data, "the series"), interval)
