@@ -264,9 +264,14 @@ def _axis(
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
-            text, hint = f"its own fit is not valid ({codes})", "the curve is compared all the same"
-            values = {"reasons": codes}
-            notices.append(Notice("fit-not-valid", "note", name, text, values, hint, label))
+            invalid = notice(
+                "fit-not-valid",
+                name,
+                {"reasons": codes},
+                variant="compared",
+                hint="the curve is compared all the same",
+            )
+            notices.append(replace(invalid, source=label))
     inflation = float("nan")
     if joint and test and test.tau.size:
         inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))

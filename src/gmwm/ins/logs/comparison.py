@@ -231,15 +231,16 @@ class Comparison:
             if "" not in codes:
                 code = "better" if "better" in codes else "more-honest"
                 return notice(code, unbeaten[0], values, but=but)
-        text = f"A tie: errors of {' and '.join(shown)} are equal as far as this log shows{but}. "
-        if self.resolved > tuning.WORTH:
-            text += "Errors that differ by 10 % would have been found."
-        else:
-            text += (
+        resolution = "Errors that differ by 10 % would have been found."
+        if self.resolved <= tuning.WORTH:
+            resolution = (
                 f"It shows differences of {100.0 * (1.0 - self.resolved):.0f} % or more; for 10 % "
                 f"record {self.length_needed / 60.0:.0f} min."
             )
-        return Notice("tie", "note", "", text, values)
+        together = " and ".join(shown)
+        return notice(
+            "tie", "", values, variant="log", names=together, but=but, resolution=resolution
+        )
 
     @property
     def resolved(self) -> float:

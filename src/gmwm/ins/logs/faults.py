@@ -258,17 +258,15 @@ def fault_notice(fault: Fault, start: float) -> Notice:
     if "time" in values:
         values["time"] += start
     words, code = _WORDS[fault.code](fault), fault.code
-    if code == "outliers":
-        text = f"{words['fixes']} ({words['share']})"
-        return Notice(code, "bad", fault.where, text, values, "leave them out")
-    variant = "wrong" if code == "heading" else ""
+    variant = {"outliers": "fixes", "heading": "wrong"}.get(code, "")
     return notice(code, fault.where, values, severity="bad", variant=variant, **words)
 
 
 def _outlier_words(fault: Fault) -> dict[str, Any]:
     count = int(fault.values["count"])
     fixes = "1 fix is an outlier" if count == 1 else f"{count} fixes are outliers"
-    return {"fixes": fixes, "share": per_cent(fault.values["fraction"])}
+    share = per_cent(fault.values["fraction"])
+    return {"fixes": fixes, "share": share, "hint": "leave them out"}
 
 
 def _offset_words(fault: Fault) -> dict[str, Any]:

@@ -164,8 +164,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         velocity = np.stack([values[name] for name in _VELOCITY], axis=1)
     notices = []
     if scale:
-        text = f"dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds"
-        notices.append(Notice("dates", "note", "", text, {"scale": scale}))
+        notices.append(notice("dates", values={"scale": scale}, variant="fixes"))
     if log.unused:
         names = ", ".join(log.unused)
         notices.append(notice("columns-unused", values={"columns": names}))

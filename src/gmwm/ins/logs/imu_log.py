@@ -193,10 +193,9 @@ def _stuck(rotation: FloatArray, velocity: FloatArray, dt: float, start: float) 
         if length <= tuning.LONGEST_HELD or count == 1:
             continue
         begin = start + first * dt
-        text = f"one value for {length:.4g} s from {begin:.10g} s on: the sensor is stuck"
-        hint = "leave that part of the log out, or check what is in the column"
         values = {"start": begin, "length": length}
-        notices.append(Notice("stuck", "warning", name, text, values, hint))
+        hint = "leave that part of the log out, or check what is in the column"
+        notices.append(notice("stuck", name, values, variant="log", hint=hint))
     return notices
 
 

@@ -243,12 +243,15 @@ class Navigated:
             squares = self.solution.innovations.standard**2
             usual = float(np.nanmedian(squares) / chi2.ppf(0.5, 1))
             if usual < tuning.MOSTLY_FINE:
-                text = (
-                    f"The filter's model does not fit: innovations are {shown} as it expects; most "
-                    "are not, so that some fixes are outliers, or errors without fixes grow faster "
-                    "than the sensor models predict."
+                return notice(
+                    "outliers",
+                    "",
+                    sizes,
+                    severity="bad",
+                    variant="innovations",
+                    sizes=shown,
+                    hint="",
                 )
-                return Notice("outliers", "bad", "", text, sizes)
             code = "too-large"
         return notice(code, values=sizes, sizes=shown, hint=hint)
 
