@@ -237,10 +237,9 @@ class Comparison:
                 f"It shows differences of {100.0 * (1.0 - self.resolved):.0f} % or more; for 10 % "
                 f"record {self.length_needed / 60.0:.0f} min."
             )
-        together = " and ".join(shown)
-        return notice(
-            "tie", "", values, variant="log", names=together, but=but, resolution=resolution
-        )
+        names = " and ".join(shown)
+        words: dict[str, Any] = {"names": names, "but": but, "resolution": resolution}
+        return notice("tie", values=values, variant="log", **words)
 
     @property
     def resolved(self) -> float:

@@ -243,15 +243,8 @@ class Navigated:
             squares = self.solution.innovations.standard**2
             usual = float(np.nanmedian(squares) / chi2.ppf(0.5, 1))
             if usual < tuning.MOSTLY_FINE:
-                return notice(
-                    "outliers",
-                    "",
-                    sizes,
-                    severity="bad",
-                    variant="innovations",
-                    sizes=shown,
-                    hint="",
-                )
+                words: dict[str, Any] = {"variant": "innovations", "hint": "", "sizes": shown}
+                return notice("outliers", "", sizes, severity="bad", **words)
             code = "too-large"
         return notice(code, values=sizes, sizes=shown, hint=hint)
 
