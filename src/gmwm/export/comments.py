@@ -126,7 +126,7 @@ def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
         rows.append(row)
     units = ", ".join(f"{key} [{_unit(unit, triad.quantity)}]" for key, unit in columns)
     title = f"{triad.quantity}: {units}"
-    title += "; NEES after ..." if shared is not None and times else ""
+    title += "; NEES" if shared is not None and times else ""
     return [*wrapped(title), *plain_table(heads, rows).splitlines()]
 
 

@@ -232,7 +232,7 @@ def test_slow_terms_count_as_a_random_walk(slow, horizon):
 
 def test_comments_hold_consistency_and_other_horizons(slow):
     text = gmwm.export(slow, "openvins")
-    assert "NEES after" in text
+    assert "; NEES" in text
     joined = " ".join(line.lstrip("# ") for line in text.splitlines())
     for horizon in (10, 60, 600):
         one = next(iter(bound(slow, "N+K", horizon, shared=True).of("gyro").values()))
