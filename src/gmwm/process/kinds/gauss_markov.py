@@ -203,7 +203,7 @@ def _sinh_excess(rate: Any) -> Any:
     total = 0.0 * rate
     for k in range(_SINH_ARRAY.size - 1, -1, -1):
         total = total * rate * rate + _SINH_ARRAY[k]
-    return total * rate * rate * rate
+    return total * (rate * rate * rate)
 
 
 @compiled()
@@ -214,7 +214,7 @@ def _h(x: Any) -> Any:
     total = 0.0 * x
     for k in range(_H_ARRAY.size - 1, -1, -1):
         total = total * x + _H_ARRAY[k]
-    return total * x * x * x
+    return total * (x * x * x)
 
 
 @compiled()
@@ -274,6 +274,6 @@ def resonance_haar(frequency: float, damping: float, dt: float, m: FloatArray) -
             quartic = 4.0 * m[i] ** 4 - 2.0 * m[i] ** 2
             result[i] = v2 * m[i] ** 2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0
         else:
-            whole = (2.0 * m[i] * excess + _h(m[i] * rate)) / (m[i] * m[i] * scale)
-            result[i] = (weight * whole).real
+            whole = weight * (2.0 * m[i] * excess + _h(m[i] * rate))
+            result[i] = (whole / (m[i] * m[i] * scale)).real
     return result
