@@ -78,6 +78,9 @@ class Process:
     is_flicker: ClassVar[bool] = False
     """Whether it is 1/f noise, a plateau of the Allan deviation that no few states describe."""
 
+    is_exponential: ClassVar[bool] = False
+    """Whether ``sigma`` and ``tau`` are those of an autocovariance ``sigma^2 exp(-lag / tau)``."""
+
     is_drift: ClassVar[bool] = False
     """Whether it is a deterministic slope: a regressor, no noise."""
 

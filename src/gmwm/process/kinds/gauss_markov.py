@@ -56,7 +56,6 @@ class GaussMarkov(Process):
     is_candidate: ClassVar[bool] = True
     compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
-    is_textbook: ClassVar[bool] = True
     is_exponential: ClassVar[bool] = True
     _examples = (
         (0.5, 125.0),

@@ -37,7 +37,6 @@ class WhiteNoise(Process):
     short_name: ClassVar[str] = "N"
     is_candidate: ClassVar[bool] = True
     is_white: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
     _examples = ((0.2,), (1e-4,))
 
     def __init__(self, N: float | None = None) -> None:
@@ -75,7 +74,6 @@ class QuantizationNoise(Process):
     label: ClassVar[str] = "quantization noise"
     short_name: ClassVar[str] = "Q"
     is_candidate: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
     _examples = ((0.7,), (3e-5,))
 
     def __init__(self, Q: float | None = None) -> None:
@@ -115,7 +113,6 @@ class RandomWalk(Process):
     short_name: ClassVar[str] = "K"
     is_candidate: ClassVar[bool] = True
     is_walk: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
     _examples = ((0.02,), (5e-7,))
 
     def __init__(self, K: float | None = None) -> None:
