@@ -179,13 +179,15 @@ class Selection(Document, Printed):
         if any(item.compared_only for item in self.ranking):
             lines += wrapped(
                 "flicker noise is compared only: extra=[BiasInstability()] makes it a choice",
-                first="~ ", indent=2,
-            )  # fmt: skip
+                first="~ ",
+                indent=2,
+            )
         if self.chosen not in ties:
             lines += wrapped(
                 "chosen: simpler, fits equally well under its own weights",
-                first="> ", indent=2,
-            )  # fmt: skip
+                first="> ",
+                indent=2,
+            )
         return "\n".join(lines)
 
 
