@@ -5,12 +5,12 @@ import json
 import mpmath
 import numpy as np
 import pytest
+from gmwm.variance.analysis import wavelet_variance
 from hypothesis import given, settings, strategies as st
 
 import gmwm
 from gmwm.process import CATALOGUE, Process
 from gmwm.process.spectral import haar_gain, haar_variance
-from gmwm.variance.analysis import wavelet_variance
 from gmwm.variance.covariance.haar import (
     dyadic_levels,
     haar_counts,

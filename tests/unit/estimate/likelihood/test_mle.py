@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from gmwm.variance.analysis import as_channel
 from scipy.stats import chi2, norm
 from statsmodels.tsa.statespace.sarimax import SARIMAX
 from statsmodels.tsa.statespace.structural import UnobservedComponents
@@ -28,7 +29,6 @@ from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.result.fit import Fit
 from gmwm.process import as_model
 from gmwm.readers.recording import Channel
-from gmwm.variance.analysis import as_channel
 from marks import slow
 
 OF_SAMPLES = ("mle", "whittle", "em")

@@ -2,6 +2,16 @@
 
 import numpy as np
 import pytest
+from gmwm.variance.gaps.effects import (
+    Gaps,
+    Runs,
+    common_share,
+    pair_factor,
+    window_centres,
+    window_count,
+)
+from gmwm.variance.gaps.filling import Filling
+from gmwm.variance.gaps.kernels import pairs_at_lag
 from hypothesis import given, settings, strategies as st
 from scipy.linalg import toeplitz
 from scipy.stats import chi2, norm
@@ -17,16 +27,6 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.estimate import estimate
-from gmwm.variance.gaps.effects import (
-    Gaps,
-    Runs,
-    common_share,
-    pair_factor,
-    window_centres,
-    window_count,
-)
-from gmwm.variance.gaps.filling import Filling
-from gmwm.variance.gaps.kernels import pairs_at_lag
 from marks import slow
 
 

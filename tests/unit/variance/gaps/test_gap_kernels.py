@@ -2,14 +2,9 @@
 
 import numpy as np
 import pytest
-
-from gmwm import RandomWalk, WhiteNoise
-from gmwm.process import haar_gain
-from gmwm.variance.gaps import Runs
 from gmwm.variance.gaps.effects import Gaps, window_centres, window_count
 from gmwm.variance.gaps.filling import _deviation, _gain, _nodes
 from gmwm.variance.gaps.kernels import fill, neighbours
-from gmwm.variance.kernels import cumulative
 from gmwm.variance.streaming.window_kernels import (
     COUNT,
     FINE,
@@ -22,6 +17,11 @@ from gmwm.variance.streaming.window_kernels import (
     gappy_windows,
     total,
 )
+
+from gmwm import RandomWalk, WhiteNoise
+from gmwm.process import haar_gain
+from gmwm.variance.gaps import Runs
+from gmwm.variance.kernels import cumulative
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.3])

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from gmwm.variance.streaming.gaps import _spread, effects, unmasked
 
 from gmwm.variance import tuning
-from gmwm.variance.streaming.gaps import _spread, effects, unmasked
 
 J = 12
 M = 2.0 ** np.arange(J)
