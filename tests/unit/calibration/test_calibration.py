@@ -592,7 +592,7 @@ def test_notices_survive_the_file(tmp_path):
     content = json.loads(path.read_text())
     content["notices"] = [{"code": "line"}]
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match="notices.0: not a notice"):
+    with pytest.raises(InputError, match=r"notices\.0: not a notice"):
         gmwm.load(path)
 
 
