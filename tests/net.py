@@ -768,7 +768,29 @@ def _make_lot(folder: Path) -> None:
     (folder / "unit_9.csv").write_text("no,numbers\nat,all\n")
 
 
-TARGETS = ["kalibr", "openvins", "vins", "orbslam3", "fastlio", "liosam", "kimera", "okvis2", "maplab", "px4", "gtsam", "gtsam-cpp", "ros-covariance", "matlab", "state-space", "gazebo", "pyins", "gnss-ins-sim", "kfgins", "basalt", "glim"]
+TARGETS = [
+    "kalibr",
+    "openvins",
+    "vins",
+    "orbslam3",
+    "fastlio",
+    "liosam",
+    "kimera",
+    "okvis2",
+    "maplab",
+    "px4",
+    "gtsam",
+    "gtsam-cpp",
+    "ros-covariance",
+    "matlab",
+    "state-space",
+    "gazebo",
+    "pyins",
+    "gnss-ins-sim",
+    "kfgins",
+    "basalt",
+    "glim",
+]
 
 
 @part
@@ -799,7 +821,23 @@ def _exported(found: Any, target: str, **more: Any) -> Any:
 
 # -- damaged files --------------------------------------------------------------------------------
 
-READ = ["text", "gzip", "npy", "npz", "ulog", "ardupilot", "mat", "mat73", "hdf5", "parquet", "feather", "bag1", "sqlite3", "mcap", "records"]
+READ = [
+    "text",
+    "gzip",
+    "npy",
+    "npz",
+    "ulog",
+    "ardupilot",
+    "mat",
+    "mat73",
+    "hdf5",
+    "parquet",
+    "feather",
+    "bag1",
+    "sqlite3",
+    "mcap",
+    "records",
+]
 USES: dict[str, Callable[[Path, int], Any]] = {
     "document": lambda path, case: gmwm.load(path),
     "imu": lambda path, case: ins.read_imu(path, 100.0 if case % 2 else None, SI),

@@ -269,7 +269,8 @@ _READERS = (
 )  # fmt: skip
 
 _VARIANCE = (
-    Issue("curve-shortened", "{text}", severity="warning", topic="samples"),
+    Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
+          "complete record at {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (
@@ -475,61 +476,123 @@ _CALIBRATION = (
 )  # fmt: skip
 
 _ESTIMATE = (
-    Issue("amplitude-bound", "{text}", severity="bad", topic="fit", lacks="amplitudes_above_zero",
+    Issue("amplitude-bound", "not significantly above zero: only an upper limit is known",
+          severity="bad", topic="fit", lacks="amplitudes_above_zero",
           reason="a term was not found"),
-    Issue("confounded", "{text}", severity="bad", topic="fit", lacks="parameters_separable",
-          reason="terms cannot be separated"),
-    Issue("drift-in-state", "{text}", severity="bad", topic="fit", lacks="drift_is_ramp",
-          reason="the drift is no ramp"),
-    Issue("indistinct-terms", "{text}", severity="bad", topic="fit", lacks="terms_distinct",
-          reason="two terms look alike"),
-    Issue("level-missed", "{text}", severity="bad", topic="fit", lacks="describes_every_level",
-          reason="the model misses one level"),
-    Issue("misfit", "{text}", severity="bad", topic="fit", lacks="describes_data",
-          reason="the model misses the data"),
-    Issue("no-curvature", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("no-region", "{text}", severity="bad", topic="fit", lacks="regions_found",
-          reason="no straight region found"),
-    Issue("no-test", "{text}", topic="fit"),
-    Issue("not-converged", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("recordings-differ", "{text}", severity="bad", topic="fit", lacks="recordings_agree",
-          reason="the recordings disagree"),
-    Issue("redundant-term", "{text}", severity="bad", topic="fit", lacks="terms_needed",
+    Issue("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
+          "of {correlation:.5f})", "fix one of them", severity="bad", topic="fit",
+          lacks="parameters_separable", reason="terms cannot be separated"),
+    Issue("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
+          severity="bad", topic="fit", lacks="drift_is_ramp", reason="the drift is no ramp"),
+    Issue("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} "
+          "s, {second} = {other:.3g} s)", "use one fewer", severity="bad", topic="fit",
+          lacks="terms_distinct", reason="two terms look alike"),
+    Issue("level-missed", "at tau = {tau:.3g} s the data lie {errors} standard errors {side} the "
+          "model: it lacks a term there, or the recording has a fault", severity="bad",
+          topic="fit", lacks="describes_every_level", reason="the model misses one level"),
+    Issue("misfit", {
+        "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
+            "model's Allan deviation, by {errors} standard errors",
+        "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
+                  "which may be chance: {chance:.0f} % of right models are missed as clearly",
+        "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
+        "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
+                   "which the intervals allow for",
+        "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s",
+    }, severity="bad", topic="fit", lacks="describes_data", reason="the model misses the data"),
+    Issue("no-curvature", "the likelihood has no curvature in some direction: too many parameters",
+          severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
+          severity="bad", topic="fit", lacks="regions_found", reason="no straight region found"),
+    Issue("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
+          "bridge them", topic="fit"),
+    Issue("not-converged", {
+        "": "the maximum of the likelihood was not reached",
+        "em": "EM did not converge in {iterations} iterations",
+        "no-maximum": "EM did not reach a maximum of the likelihood",
+    }, severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("recordings-differ", {
+        "": "the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
+            "values are their mean, see the spread",
+        "curves": "the wavelet variances differ from the joint model (p = {curves_p:.2g}): the "
+                  "recordings differ, or the model is wrong",
+    }, severity="bad", topic="fit", lacks="recordings_agree", reason="the recordings disagree"),
+    Issue("redundant-term", "the {term} does not improve the fit significantly: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit", lacks="terms_needed",
           reason="a term is not needed"),
-    Issue("search-limit", "{text}", severity="bad", topic="fit", lacks="shapes_within_search",
-          reason="a correlation time beyond reach"),
-    Issue("sensor-bandwidth", "{text}", topic="fit"),
-    Issue("too-few-levels", "{text}", severity="bad", topic="fit", lacks="enough_levels",
-          reason="record too short"),
-    Issue("undetermined", "{text}", severity="bad", topic="fit", lacks="shapes_determined",
+    Issue("search-limit", "the {term} is at the limit of what this record can show: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit",
+          lacks="shapes_within_search", reason="a correlation time beyond reach"),
+    Issue("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise "
+          "({term}, N = {size:.3g} {unit}); a filter needs no state for it", topic="fit"),
+    Issue("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
+          "record longer or take a smaller model", severity="bad", topic="fit",
+          lacks="enough_levels", reason="record too short"),
+    Issue("undetermined", "not determined by this record (standard error {stderr:.2g})",
+          severity="bad", topic="fit", lacks="shapes_determined",
           reason="record too short for model"),
-    Issue("wrong-slope", "{text}", severity="bad", topic="fit", lacks="slopes_agree",
-          reason="slopes contradict the model"),
+    Issue("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
+          "{slope:+.2f}, not {named}", "give another region", severity="bad", topic="fit",
+          lacks="slopes_agree", reason="slopes contradict the model"),
 )  # fmt: skip
 
 _SELECTION = (
-    Issue("ramp-or-walk", "{text}", topic="selection"),
+    Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
+          "them apart, so the model has no ramp", topic="selection"),
     Issue("tie", "{text}", topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    Issue("bounded-error", "{text}", topic="filter"),
-    Issue("estimate-it", "{text}", severity="warning", topic="filter"),
-    Issue("fast-peak-left-out", "{text}", topic="filter"),
-    Issue("less-white-noise", "{text}", topic="filter"),
-    Issue("line-left-out", "{text}", severity="warning", topic="filter"),
-    Issue("loose-form", "{text}", topic="filter"),
-    Issue("more-than-random-walk", "{text}", topic="filter"),
-    Issue("more-than-white-noise", "{text}", topic="filter"),
-    Issue("no-navigation-filter", "{text}", topic="filter"),
-    Issue("not-predicted", "{text}", topic="filter"),
-    Issue("optimistic", "{text}", topic="filter"),
-    Issue("other-units", "{text}", severity="warning", topic="filter"),
-    Issue("ramp-as-constant", "{text}", severity="warning", topic="filter"),
-    Issue("turn-on-left-out", "{text}", topic="filter"),
-    Issue("uncertainty-not-covered", "{text}", topic="filter"),
+    Issue("bounded-error",
+          "a {cause} moves the first integral by a bounded amount: its N, which is enough at any "
+          "time, is {factor:.2g} times too large after {horizon:g} s", topic="filter"),
+    Issue("estimate-it",
+          "larger numbers are a poor substitute for {cause}: N times {N_factor:.3g}, K times "
+          "{K_factor:.3g}", "estimate it as a state, or calibrate it", "warning", "filter"),
+    Issue("fast-peak-left-out",
+          "only the low-frequency density{also} of the {label} counts: it lies above {fast:.3g} Hz "
+          "and averages out", topic="filter"),
+    Issue("less-white-noise",
+          "N is {share:.3g} times that of the error model: use N and K as a pair, for outages of "
+          "the given lengths", topic="filter"),
+    Issue("line-left-out",
+          {"": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
+           "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow "
+                   "for this horizon, and errors are larger than the numbers say"}, topic="filter"),
+    Issue("loose-form",
+          "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true ones; "
+          "with {tightest}, {with_state:.3g} times", topic="filter"),
+    Issue("more-than-random-walk",
+          {"": "the model has no random walk: K covers {parts}",
+           "more": "K is {times:.3g} times that of the model's random walk: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("more-than-white-noise",
+          {"": "the model has no white noise: N covers {parts}",
+           "more": "N is {times:.3g} times that of the model's white noise: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("no-navigation-filter", "the INS/GNSS filter is left out: {reason}", topic="filter"),
+    Issue("not-predicted", "the consistency is not predicted: {reason}", topic="filter"),
+    Issue("optimistic",
+          {"bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
+           "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such "
+                     "numbers are consistent at all times and on all axes that share them",
+           "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than "
+                     "the numbers are for"}, "estimate it as a state, or remove it from the data",
+          "warning", "filter"),
+    Issue("other-units",
+          "N in use is {factor:.3g} times that of the error model: it may be in other units",
+          "give it in {unit}/sqrt(Hz)", "warning", "filter"),
+    Issue("ramp-as-constant",
+          "the {label} counts as a constant of standard deviation {size}: |R| times the horizon",
+          "a filter that lasts longer needs a state for it", "warning", "filter"),
+    Issue("turn-on-left-out",
+          "the start bias leaves out the turn-on bias, which a recording at rest cannot show",
+          "add its variance", topic="filter"),
+    Issue("uncertainty-not-covered",
+          {"": "the uncertainty of the fitted parameters is not covered", "why": "{reason}"},
+          topic="filter"),
 )  # fmt: skip
 
 _INS = (
@@ -549,12 +612,17 @@ _INS = (
     Issue("fixes-left-out", "{text}", topic="navigation"),
     Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
     Issue("heading", "{text}", topic="navigation"),
-    Issue("judged-on-loiter", "{text}", topic="navigation"),
+    Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
+          "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
     Issue("levelled", "{text}", topic="navigation"),
     Issue("lost", "{text}", severity="bad", topic="navigation"),
     Issue("no-time-stamps", "{text}", topic="navigation"),
     Issue("not-white", "{text}", severity="bad", topic="navigation"),
-    Issue("outside-linearity", "{text}", severity="warning", topic="navigation"),
+    Issue("outside-linearity",
+          "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
+          "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
+          "are too small",
+          "check them by runs, as gmwm navigate does", "warning", "navigation"),
     Issue("positions-at-zero", "{text}", severity="warning", topic="navigation"),
     Issue("resolution", "{text}", topic="navigation"),
     Issue("samples-filled", "{text}", severity="warning", topic="navigation"),

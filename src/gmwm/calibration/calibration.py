@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from annotated_types import Ge
 
-from gmwm._core.documents import Document, Rate, Samples, Text, load_document, plain_schema
+from gmwm._core.documents import Document, Rate, Samples, Text, load_document
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
@@ -19,7 +19,7 @@ from gmwm.calibration.summary import sentence
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
 from gmwm.issues import Notice
-from gmwm.process import Model, model_from_list
+from gmwm.process import Model
 from gmwm.readers import Recording
 
 if TYPE_CHECKING:
@@ -28,13 +28,6 @@ if TYPE_CHECKING:
 
 
 Index = Annotated[int, Ge(0)]
-
-
-class _IsModel:
-    """Mark of a field that is a model, stored as a list of its terms."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        return plain_schema(model_from_list, lambda model: [term.to_dict() for term in model.terms])
 
 
 @dataclass(frozen=True, repr=False)
@@ -75,7 +68,7 @@ class Calibration(Mapping[str, Fit], Document):
     rate: Rate
     n: Samples
     notices: tuple[Notice, ...] = ()
-    rivals: Mapping[str, tuple[Annotated[Model, _IsModel()], ...]] = field(default_factory=dict)
+    rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
     left_out: Mapping[str, tuple[tuple[Index, Index], ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from gmwm.variance.analysis import fourth_cumulant
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
+from gmwm.variance.series import fourth_cumulant
 
 N, DT = 4000, 0.01
 
