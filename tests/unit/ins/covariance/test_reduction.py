@@ -34,10 +34,7 @@ FULL = SensorModels.of(
     }
 )
 WALK = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-5) + RandomWalk(2e-5),
-        "accel": WhiteNoise(3e-4) + RandomWalk(3e-4),
-    }
+    {"gyro": WhiteNoise(1e-5) + RandomWalk(2e-5), "accel": WhiteNoise(3e-4) + RandomWalk(3e-4)}
 )
 
 
