@@ -237,8 +237,8 @@ class Comparison:
                 f"It shows differences of {100.0 * (1.0 - self.resolved):.0f} % or more; for 10 % "
                 f"record {self.length_needed / 60.0:.0f} min."
             )
-        names = " and ".join(shown)
-        words: dict[str, Any] = {"names": names, "but": but, "resolution": resolution}
+        tied = " and ".join(shown)
+        words: dict[str, Any] = {"names": tied, "but": but, "resolution": resolution}
         return notice("tie", values=values, variant="log", **words)
 
     @property

@@ -272,7 +272,8 @@ class Navigated:
         lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest
         lines.append(f"largest: {far:.3g} sigma at {at:.10g} s")
-        for sentence in (*self.accuracy, self.verdict.text):
+        verdict, hint = self.verdict.text, self.verdict.hint
+        for sentence in (*self.accuracy, f"{verdict} ({hint})" if hint else verdict):
             lines += ["", *wrapped(sentence)]
         lines += ["", *wrapped(self.resolution.sentence)]
         return "\n".join(lines)
