@@ -414,8 +414,10 @@ _DIAGNOSIS = (
           severity="warning", lacks="attitude_kept", reason="the sensor tilted",
           spoils=("accel",)),
     Issue("value-repeated",
-          "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as often "
-          "as the values next to it",
+          {"": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as "
+               "often as the values next to it",
+           "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: "
+                  "samples were cut towards zero, not rounded"},
           "if it stands for no answer or a dead band, make such samples missing (NaN)",
           severity="warning", topic="samples", lacks="samples_measured",
           reason="one value stands for many", spoils=("channel",)),
@@ -436,28 +438,51 @@ _DIAGNOSIS = (
 )  # fmt: skip
 
 _CALIBRATION = (
-    Issue("all-missing", "{text}", severity="warning", topic="recording"),
-    Issue("constant", "{text}", severity="bad", topic="recording"),
-    Issue("departures-many", "{text}", severity="bad", topic="recording", lacks="stationary",
-          reason="the bias steps to and fro"),
-    Issue("departures-removed", "{text}", severity="warning", topic="recording"),
-    Issue("drift-at-start", "{text}", severity="bad", topic="departure", lacks="stationary",
+    Issue("all-missing", "all samples missing{why}", severity="bad"),
+    Issue("ambiguity", "{models} models fit equally well: {titles}{also}", "the first is used",
+          topic="selection"),
+    Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
+    Issue("departures-many",
+          "{removed} departures were subtracted: a level that changes so often is noise of the "
+          "sensor",
+          "fit a slow term in place of it, such as a Gauss-Markov process",
+          severity="bad", lacks="stationary", reason="the bias steps to and fro"),
+    Issue("departures-removed",
+          "what was subtracted makes the deviation {times} times as large at tau = {tau:.3g} s: "
+          "the model holds where nothing like it comes again",
+          "find its cause, or let a slow term of the model describe it", severity="warning"),
+    Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
+          "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
           reason="drift after switching on"),
     Issue("fit-not-valid", {
         "": "{text}",
         "compared": "its own fit is not valid ({reasons})",
     }, topic="recording"),
-    Issue("longest-part", "{text}", topic="recording"),
-    Issue("mostly-missing", "{text}", severity="bad", topic="recording"),
-    Issue("not-estimable", "{text}", severity="bad", topic="recording"),
-    Issue("slow-period", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a slow period stands out"),
-    Issue("step", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="the bias stepped"),
-    Issue("transient", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a transient at the start"),
-    Issue("unresolved-walk", "{text}", topic="recording"),
-    Issue("unsteady", "{text}", severity="bad", topic="recording", lacks="noise_steady",
+    Issue("longest-part",
+          "the longest part without the {count} steps and drifts is {kept:,.0f} s of {of:,.0f} s, "
+          "from {start:.6g} s to {stop:.6g} s",
+          "calibrate that part{also}"),
+    Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
+          severity="bad"),
+    Issue("not-estimable", "{text}", severity="bad"),
+    Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
+          "find what varies so, such as the temperature{back}", severity="bad",
+          topic="departure", lacks="stationary", reason="a slow period stands out"),
+    Issue("step", "a step of {height} at {when}{also}",
+          "calibrate the part before it or after it{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="the bias stepped"),
+    Issue("transient",
+          "a transient of {height} at the start with a time constant of {when}{also}",
+          "leave out the first three time constants{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="a transient at the start"),
+    Issue("unresolved-walk",
+          "the record leaves open a random walk of up to K = {shown} (95 %): with it the deviation "
+          "at {tau:.4g} s is {times} times that of the model",
+          "only a longer record can tell"),
+    Issue("unsteady",
+          "the slow noise changes during the recording: {quiet_part} it has {less} times the "
+          "deviation of the whole record, {loud_part} {more} times; the model is an average",
+          "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
           reason="slow noise changes its size"),
 )  # fmt: skip
 

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gmwm.calibration.stationarity.departures import Departure
-from gmwm.calibration.stationarity.removal import _independent, _without
 
 import gmwm
 from gmwm import Channel, WhiteNoise
-from gmwm._core.notices import Notice
-from gmwm.calibration.channel import ChannelModel, mostly_missing
-from gmwm.calibration.judgement import judged, with_one_remedy
+from gmwm.calibration.channel import ChannelModel
+from gmwm.calibration.departures import Departure
+from gmwm.calibration.removal import _independent, _without
+from gmwm.calibration.validity import advise_cut, with_validity
+from gmwm.issues import Notice
 
 NAMES = ("gyro_x", "accel_y")
 FITS = {
@@ -51,7 +51,7 @@ STEP, DRIFT = departed("step", 40.0, 50.0), departed("drift-at-start", 0.0, 20.0
     ],
 )
 def test_the_longest_part_without_any(notices, part):
-    found, (advice,) = with_one_remedy(models(*notices), 100.0)
+    found, (advice,) = advise_cut(models(*notices), 100.0)
     assert (advice.values["start"], advice.values["stop"]) == part
     assert advice.values["of"] == 100.0 and advice.values["removable"]
     assert "remove_departures" in advice.hint
@@ -66,19 +66,18 @@ def test_the_longest_part_without_any(notices, part):
     [
         ((STEP,), 100.0),
         ((STEP, DRIFT), 0.0),
-        ((STEP, departed("step", 10.0, 20.0, evident=False)), 100.0),
         ((STEP, departed("step", 10.0, 20.0, severity="note")), 100.0),
         ((STEP, departed("slow-period", 10.0, 20.0)), 100.0),
     ],
 )
 def test_one_that_is_evident_has_its_own_remedy(notices, length):
     given = models(*notices)
-    assert with_one_remedy(given, length) == (given, [])
+    assert advise_cut(given, length) == (given, [])
 
 
 def test_what_cannot_be_taken_off_is_cut():
     kept = departed("step", 70.0, 80.0, removable=False)
-    _, (advice,) = with_one_remedy(models(STEP, kept), 100.0)
+    _, (advice,) = advise_cut(models(STEP, kept), 100.0)
     assert not advice.values["removable"] and advice.hint == "calibrate that part"
 
 
@@ -106,7 +105,7 @@ def issue(code, severity="bad", where=""):
     ],
 )
 def test_issues_that_spoil_a_channel(issues, still, spoilt):
-    found = judged(models(), issues, still=still)
+    found = with_validity(models(), issues, still=still)
     for name in NAMES:
         own = [notice.code for notice in found[name].fit.notices]
         assert own[:1] == [issues[0].code] * (name in spoilt)
@@ -115,15 +114,7 @@ def test_issues_that_spoil_a_channel(issues, still, spoilt):
 
 def test_an_issue_that_comes_twice_is_named_once():
     twice = [issue("stuck", "bad", "gyro_x")] * 2
-    assert len(judged(models(), twice, still=True)["gyro_x"].fit.notices) == 1
-
-
-@pytest.mark.parametrize(("missing", "skipped"), [(50, False), (51, True)])
-def test_a_channel_is_skipped_of_which_more_than_half_is_missing(missing, skipped):
-    found = mostly_missing("gyro_x", missing, 100)
-    assert (found is not None) is skipped
-    if skipped:
-        assert found.text == "51 of 100 samples missing, more than half"
+    assert len(with_validity(models(), twice, still=True)["gyro_x"].fit.notices) == 1
 
 
 TIME = np.arange(0.0, 100.0)

@@ -18,19 +18,10 @@ from gmwm._core.jobs import (
     shared,
     worker_pool,
 )
-from gmwm._core.notices import Notice
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
-from gmwm.calibration.channel import (
-    ChannelModel,
-    GivenModels,
-    calibration_of,
-    channel_model,
-    model_of,
-    mostly_missing,
-)
-from gmwm.calibration.judgement import judged, with_one_remedy
+from gmwm.calibration.channel import ChannelModel, GivenModels, channel_model, model_of
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -40,15 +31,19 @@ from gmwm.calibration.screening import (
     with_outcomes,
 )
 from gmwm.calibration.stages import Stopwatch, current, stage
+from gmwm.calibration.summary import unresolved_notice
+from gmwm.calibration.validity import advise_cut, with_validity
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
+from gmwm.selection import Selection, wider_ranges
 from gmwm.variance import MIN_SAMPLES
 
-_TAKING = ("sentinel", "event", "outliers", "held", "rows-copied")
-"""Codes of notices of what makes samples missing."""
+AMBIGUITY = "ambiguity"
+"""Code of the notice that several models describe a channel equally well."""
 
 
 @one_blas_thread()
@@ -110,7 +105,9 @@ def calibrate(
         If no channel can be calibrated, a mapping has no model for one, or a log that is not static
         has no stretch of ten seconds at rest.
     """
-    given = _recordings(recording)
+    alone = isinstance(recording, Recording | str | os.PathLike) or is_frame(recording)
+    parts: list[Any] = [recording] if alone else list(recording)
+    given: list[Recording] = [read(each) if is_frame(each) else each for each in parts]
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
     others = extra_workers(jobs, max(len(each.inertial) for each in given))
@@ -136,7 +133,13 @@ def _calibrated(
     alive, dead, sources = _usable(treated)
     models = {name: model_of(name, model) for name in alive}
     if not alive:
-        raise InputError(_nothing_alive(recordings, dead))
+        which = "; ".join(f"{name}: {why.text}" for name, why in dead.items())
+        if dead and all(why.code == "constant" for why in dead.values()):
+            which = "every channel is constant"
+        raise InputError(
+            f"{recordings[0].source or 'the recording'}: {which or 'only auxiliary channels'}, "
+            "nothing to calibrate: check the sensor and the columns"
+        )
     for each in recordings:
         if each.n < MIN_SAMPLES:
             raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
@@ -152,23 +155,75 @@ def _calibrated(
     ]
     during_startup(compile_steps)
     found = _models_found(channels, progress)
-    issues = [
-        replace(notice, source=each.recording.source) if len(given) > 1 else notice
-        for each in treated
-        for notice in each.notices
-    ]
+    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
+    for one in treated:
+        for issue in one.notices:
+            named = replace(issue, source=one.recording.source) if len(given) > 1 else issue
+            if named not in issues:
+                issues.append(named)
     chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
-    found, advice = with_one_remedy(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
-    issues = [*_each_once(issues), *advice]
-    return calibration_of(
-        judged(found, issues, still=still),
+    models_of, advice = advise_cut(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
+    issues += advice
+    return _calibration_of(
+        with_validity(models_of, issues, still=still),
         dead,
         with_outcomes(issues, chosen, offered if model is None else {}),
-        source=", ".join(each.source for each in given),
+        given,
+        _left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
+    )
+
+
+def _calibration_of(
+    models: Mapping[str, ChannelModel | Notice],
+    dead: Mapping[str, Notice],
+    issues: Sequence[Notice],
+    given: Sequence[Recording],
+    left_out: Mapping[str, tuple[tuple[int, int], ...]],
+) -> Calibration:
+    """Put together what was found of the channels.
+
+    models: Of each channel that was worked on.
+    dead: Why others were not.
+    Raises InputError if no channel has a model.
+    """
+    source = ", ".join(each.source for each in given)
+    done = {name: each for name, each in models.items() if isinstance(each, ChannelModel)}
+    skipped = {name: each for name, each in models.items() if isinstance(each, Notice)}
+    skipped = {**dead, **skipped}
+    if not done:
+        why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
+        raise InputError(f"{source or 'the recording'}: {why}")
+    rivals: dict[str, list[Model]] = {}
+    tied, left_open = [], []
+    for name, each in done.items():
+        if each.selection is not None and each.selection.rivals:
+            rivals[name] = [rival.model for rival in each.selection.rivals]
+            tied.append(_ambiguity(name, each.selection))
+        if each.largest is not None:
+            rivals.setdefault(name, []).append(each.largest)
+            left_open.append(unresolved_notice(name, each.fit, each.largest))
+    return Calibration(
+        fits={name: each.fit for name, each in done.items()},
+        skipped=skipped,
+        source=source,
         rate=given[0].rate,
         n=sum(each.n for each in given),
-        left_out=_left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
+        notices=(*issues, *tied, *left_open),
+        rivals={name: tuple(models) for name, models in rivals.items()},
+        left_out=left_out,
     )
+
+
+def _ambiguity(name: str, selection: Selection) -> Notice:
+    """Say which models fit equally well, and which parameters that leaves less known."""
+    models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
+    better, also = selection.surpassed_by, ""
+    if better is not None and better.model.title() in models:
+        also = f" (best is that with bias instability, of {better.n_parameters} parameters)"
+    if wider := wider_ranges(selection.fit, selection.ranges()):
+        also += f". If none of them is ruled out: {', '.join(wider)}"
+    values = {"models": len(models)}
+    return notice(AMBIGUITY, name, values, titles="; ".join(models), also=also)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,21 +278,6 @@ def _models_found(
                 running.add(name, elapsed, watch.worked[name])
     report("")
     return {channel.name: found[channel.name] for channel in channels}
-
-
-def _recordings(given: Any) -> list[Any]:
-    """What was given, as a list; frames are read."""
-    alone = isinstance(given, Recording | str | os.PathLike) or is_frame(given)
-    return [read(each) if is_frame(each) else each for each in ([given] if alone else given)]
-
-
-def _each_once(notices: Iterable[Notice]) -> list[Notice]:
-    """Sensors with rates of their own share those of the reader."""
-    found: list[Notice] = []
-    for notice in notices:
-        if notice not in found:
-            found.append(notice)
-    return found
 
 
 def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tuple[int, int], ...]]:
@@ -298,26 +338,14 @@ def _usable(
     return alive, {name: why for name, why in dead.items() if name not in alive}, sources
 
 
-def _nothing_alive(recordings: Sequence[Recording], dead: Mapping[str, Notice]) -> str:
-    which = "; ".join(f"{name}: {why.text}" for name, why in dead.items())
-    which = which or "only auxiliary channels"
-    if dead and all(why.code == "constant" for why in dead.values()):
-        which = "every channel is constant"
-    return (
-        f"{recordings[0].source or 'the recording'}: {which}, nothing to calibrate: check the "
-        "sensor and the columns"
-    )
-
-
 def _reason_to_skip(channel: Channel, notices: Iterable[Notice]) -> Notice | None:
-    """Why a channel is skipped, if it is; of missing samples, what took them, if that was said."""
-    if channel.is_constant and channel.missing <= channel.n / 2:
-        text = f"constant at {channel.mean:.6g} {channel.unit}"
-        return Notice("constant", "bad", channel.name, text, {"missing": channel.missing})
-    why = mostly_missing(channel.name, channel.missing, channel.n)
-    if why is None:
-        return None
-    if channel.missing == channel.n:
-        why = replace(why, code="all-missing", text="all samples missing")
-    causes = (n.text for n in notices if n.where in ("", channel.name) and n.code in _TAKING)
-    return replace(why, text=": ".join([why.text, *causes]))
+    """Why a channel is skipped, if it is, and what took missing samples, if that was said."""
+    values = {"missing": channel.missing}
+    if 2 * channel.missing > channel.n:
+        code = "all-missing" if channel.missing == channel.n else "mostly-missing"
+        causes = (n for n in notices if n.where in ("", channel.name) and n.issue.masks)
+        why = "".join(f": {cause.text}" for cause in causes)
+        return notice(code, channel.name, values, severity="bad", n=channel.n, why=why)
+    if channel.is_constant:
+        return notice("constant", channel.name, values, value=channel.mean, unit=channel.unit)
+    return None
