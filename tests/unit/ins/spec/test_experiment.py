@@ -8,6 +8,7 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.ins import Scenario, SensorModels, experiment_from
 from gmwm.ins.imu import AXES
+from gmwm.ins.logs import LogSpec
 from gmwm.ins.spec import experiment, read_document
 from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec
 from gmwm.process import RandomWalk
