@@ -58,14 +58,24 @@ def clock(recording: Recording) -> Iterator[Notice]:
 
 
 OF_RECORDING: tuple[Callable[[Recording], Iterator[Notice]], ...] = (
-    length, moves, clock, copied_rows, vibration,
-)  # fmt: skip
+    length,
+    moves,
+    clock,
+    copied_rows,
+    vibration,
+)
 """Checks of a whole recording of one rate."""
 
 CHECKS: tuple[Callable[[Examined], Iterator[Notice]], ...] = (
-    held_or_stuck, cut_off_or_abrupt_end, repeated_value, event, outliers_or_tails, rounding,
-    variance, drift,
-)  # fmt: skip
+    held_or_stuck,
+    cut_off_or_abrupt_end,
+    repeated_value,
+    event,
+    outliers_or_tails,
+    rounding,
+    variance,
+    drift,
+)
 """Checks of a channel; those of its spectrum come last (`spectral_notices`)."""
 
 
@@ -217,8 +227,14 @@ def _examined(channel: Channel, motion: Motion) -> _Found:
     del present
     examined = _with_errors(channel, values, step, smallest, motion)
     if examined is None:
-        few = notice("length", channel.name, severity="warning", variant="few",
-                     hint="record longer", fewest=tuning.FEWEST_KNOWN)  # fmt: skip
+        few = notice(
+            "length",
+            channel.name,
+            severity="warning",
+            variant="few",
+            hint="record longer",
+            fewest=tuning.FEWEST_KNOWN,
+        )
         return _Found([few], ChannelHealth(lsb=step))
     notices = [one for check in CHECKS for one in check(examined)]
     held, events, level = examined.held, examined.events, examined.scatter
