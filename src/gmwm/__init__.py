@@ -32,13 +32,9 @@ def _public() -> dict[str, list[str]]:
         if isinstance(line, ast.ImportFrom) and line.module:
             listed = [alias.name for alias in line.names]
             if listed == ["*"]:
-                text = (folder / line.module.replace(".", "/") / "__init__.py").read_text("utf-8")
-                (value,) = (
-                    each.value
-                    for each in ast.parse(text).body
-                    if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "__all__"
-                )
-                listed = list(ast.literal_eval(value))
+                room = folder.joinpath(*line.module.split("."), "__init__.py")
+                table = room.read_text(encoding="utf-8").partition("\n__all__ = ")[2]
+                listed = list(ast.literal_eval(table[: table.index("\n)") + 2]))
             names.setdefault(line.module, []).extend(listed)
     return names
 
