@@ -21,8 +21,8 @@ from gmwm._core.documents import (
     Text,
     check_covariance,
 )
-from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
