@@ -1,9 +1,4 @@
 from . import ins as ins
-from .budget import (
-    ErrorBudget as ErrorBudget,
-    ErrorRow as ErrorRow,
-    error_budget as error_budget,
-)
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
@@ -41,12 +36,15 @@ from .estimate import (
 from .export import export as export
 from .filter_numbers import (
     Certificate as Certificate,
+    ErrorBudget as ErrorBudget,
+    ErrorRow as ErrorRow,
     FilterNumbers as FilterNumbers,
     Imperfections as Imperfections,
     Motion as Motion,
     SensorNumbers as SensorNumbers,
     bound as bound,
     certify as certify,
+    error_budget as error_budget,
     reduce as reduce,
 )
 from .population import (
@@ -56,27 +54,14 @@ from .population import (
     fleet as fleet,
 )
 from .process import (
-    AR as AR,
-    ARIMA as ARIMA,
-    ARMA as ARMA,
-    MA as MA,
-    AveragedNoise as AveragedNoise,
-    BiasInstability as BiasInstability,
-    GaussMarkov as GaussMarkov,
-    LowPassNoise as LowPassNoise,
     Model as Model,
     Parameter as Parameter,
     Process as Process,
-    QuantizationNoise as QuantizationNoise,
-    RandomWalk as RandomWalk,
-    RateRamp as RateRamp,
-    Resonance as Resonance,
-    Sinusoid as Sinusoid,
     StateSpace as StateSpace,
-    WhiteNoise as WhiteNoise,
     parameter as parameter,
     simulate as simulate,
 )
+from .process.kinds import *  # noqa: F403
 from .readers import Channel as Channel, Recording as Recording, read as read
 from .selection import Selection as Selection, select as select
 from .variance import (

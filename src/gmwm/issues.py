@@ -234,7 +234,10 @@ _READERS = (
     Issue("counts", "{text}", severity="bad", topic="recording", lacks="units_agree",
           reason="counts, not in the unit given", spoils=("gyro", "accel")),
     Issue("damaged", "{text}", severity="warning", topic="recording"),
-    Issue("dates", "{text}", topic="recording"),
+    Issue("dates", {
+        "": "{text}",
+        "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds",
+    }, topic="recording"),
     Issue("gravity", "{text}", severity="bad", topic="recording", lacks="units_agree",
           reason="gravity contradicts the unit", spoils=("gyro", "accel")),
     Issue("gravity-absent", "{text}", severity="warning", topic="reading"),
@@ -274,73 +277,212 @@ _VARIANCE = (
 )  # fmt: skip
 
 _DIAGNOSIS = (
-    Issue("abrupt-end", "{text}", severity="warning", topic="samples", lacks="within_range",
+    Issue("abrupt-end",
+          "samples end abruptly at {ends}, where noise would thin out: rectified, wrapped round or "
+          "sorted out",
+          "look for what wraps, cuts or takes absolute values between the sensor and the file",
+          severity="warning", topic="samples", lacks="within_range",
           reason="samples that end abruptly", spoils=("channel",), user_only=True),
-    Issue("clean", "{text}", severity="good", topic="recording"),
-    Issue("clock", "{text}", severity="warning", topic="recording"),
-    Issue("crosstalk", "{text}", severity="warning", topic="samples"),
-    Issue("dead", "{text}", severity="bad", topic="samples", lacks="samples_change",
-          spoils=("channel",)),
-    Issue("drift", "{text}", topic="samples"),
-    Issue("event", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("events-left-out", "{text}", topic="samples"),
-    Issue("filled", "{text}", severity="warning", topic="samples", lacks="samples_measured",
-          reason="samples put between others", spoils=("channel",), user_only=True),
-    Issue("gap", "{text}", severity="bad", topic="samples"),
-    Issue("heavy-tails", "{text}", topic="samples"),
-    Issue("held", "{text}", severity="warning", topic="samples", lacks="samples_measured",
-          reason="samples that repeat the one before", spoils=("channel",), masks=True,
+    Issue("clean", "nothing found that spoils the estimates", severity="good"),
+    Issue("clock", "the steps of the time stamps vary by {jitter:.2g%} rms",
+          "harmless if only the stamps are late; else let the sensor's own clock trigger it",
+          severity="warning"),
+    Issue("crosstalk", "fast noise of {both} is correlated by {correlation:.2g}",
+          "each channel is modelled by itself; a filter may need their covariance",
+          severity="warning", topic="samples"),
+    Issue("dead", "every sample is {shown}: the channel is dead",
+          "check sensor and columns; the calibration skips it",
+          severity="bad", topic="samples", lacks="samples_change", spoils=("channel",)),
+    Issue("drift",
+          {"": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
+               "leaves",
+           "ramp": "drifts by {shown[0]} over the record and wanders about that by {shown[1]} rms"},
+          "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
+    Issue("event",
+          {"": "a spike or shock {shown} at {time:.6g} s, {duration:.2g} s long",
+           "many": "{count:,.0f} spikes or shocks, the largest {shown} at {time:.6g} s, "
+                   "{duration:.2g} s long{others}",
+           "most": "{part:.2g%} of the samples differ from what is before them as spikes do: "
+                   "values that are held, switched or made otherwise, not noise of a sensor"},
+          "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True",
+          severity="warning", topic="samples", masks=True),
+    Issue("events-left-out",
+          "{samples:,} samples of {copies}spikes, shocks or lost packets left out",
+          topic="samples"),
+    Issue("filled",
+          "{share:.2g%} of the samples lie on straight lines between others: put there for samples "
+          "that were lost or sorted out",
+          "make such samples missing (NaN)", severity="warning", topic="samples",
+          lacks="samples_measured", reason="samples put between others", spoils=("channel",),
           user_only=True),
-    Issue("infinite", "{text}", severity="bad", topic="samples"),
-    Issue("interpolated", "{text}", severity="bad", topic="samples"),
-    Issue("length", "{text}", severity="good", topic="recording"),
-    Issue("light-tails", "{text}", topic="samples"),
-    Issue("line", "{text}", topic="samples"),
-    Issue("not-static", "{text}", severity="warning", topic="recording", lacks="recording_static",
-          reason="the sensor moved", spoils=("gyro", "accel")),
-    Issue("outliers", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("repeated-samples", "{text}", topic="samples"),
-    Issue("resets", "{text}", severity="warning", topic="samples", user_only=True),
-    Issue("resonance", "{text}", topic="samples"),
-    Issue("rounding", "{text}", severity="bad", topic="samples", lacks="resolution_fine",
+    Issue("gap",
+          {"": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} "
+               "gap{gaps:s?}, the longest {longest:.3g} s",
+           "all": "all samples missing"},
+          severity="bad", topic="samples"),
+    Issue("heavy-tails",
+          {"student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
+                      "freedom: large samples belong to it",
+           "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples belong "
+                    "to it"},
+          "nothing is left out; the standard error of the white noise allows for it",
+          topic="samples"),
+    Issue("held",
+          "{share:.2g%} of the samples repeat the one before, where chance explains "
+          "{chance:.2g%}: lost packets, for which the last sample was written again",
+          "make such samples missing (NaN)", severity="warning", topic="samples",
+          lacks="samples_measured", reason="samples that repeat the one before",
+          spoils=("channel",), masks=True, user_only=True),
+    Issue("infinite", "{count:,} infinite samples", "repair them, or set them to NaN for missing",
+          severity="bad", topic="samples"),
+    Issue("interpolated",
+          "{share:.2g%} of the samples lie on straight lines between others: interpolated from "
+          "about {rate:.3g} Hz, so the noise is not the sensor's",
+          "record what the sensor gives, in a topic of its own or without the driver's "
+          "interpolation (RealSense: unite_imu_method 0); the calibration skips the channel",
+          severity="bad", topic="samples"),
+    Issue("length",
+          {"": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
+           "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s, too short for slow errors of "
+                    "minutes and more",
+           "few": "fewer than {fewest} samples in a row, too few for any other check"},
+          "an hour or more shows them", severity="good"),
+    Issue("line",
+          {"": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times its "
+               "surroundings{also}",
+           "weak": "{count:.0f} weaker periodic line{count:s?}, the strongest at "
+                   "{frequency:.4g} Hz, amplitude {shown}"},
+          "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
+          topic="samples"),
+    Issue("not-static", "not static: {verb} {times}", severity="warning",
+          lacks="recording_static", reason="the sensor moved", spoils=("gyro", "accel")),
+    Issue("outliers",
+          {"": "{share:.2g%} of the samples are outliers spread over the record, beyond four "
+               "standard deviations, where noise has {usual:.2g%}",
+           "fixes": "{fixes} ({share})",
+           "innovations": "The filter's model does not fit: innovations are {sizes} as it expects; "
+                          "most are not, so that some fixes are outliers, or errors without fixes "
+                          "grow faster than the sensor models predict."},
+          "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
+          severity="warning", topic="samples", masks=True),
+    Issue("repeated-samples",
+          "each sample is written {times:.0f} times: the channel's own rate is {rate:.6g} Hz",
+          "one of each is used, at that rate", topic="samples"),
+    Issue("resonance",
+          "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times its "
+          "surroundings, {shown} rms",
+          "gmwm calibrate adds a Resonance to the model where it is needed", topic="samples"),
+    Issue("rounding",
+          {"": "samples come in steps of {step}, {times} times the white noise of {shown}",
+           "coarse": "samples come in steps of {step}, more than three times the noise below them"},
+          severity="bad", topic="samples", lacks="resolution_fine",
           reason="steps coarser than the noise", spoils=("channel",)),
-    Issue("rows-copied", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("saturation", "{text}", severity="warning", topic="samples", lacks="within_range",
+    Issue("rows-copied",
+          {"": "{samples:,.0f} rows repeat earlier ones in every channel, all from {start:.6g} s "
+               "on, as from {first:.6g} s on: noise does not repeat",
+           "several": "{samples:,.0f} rows repeat earlier ones in every channel, in {count:,.0f} "
+                      "stretches, the longest {longest:.6g} s from {start:.6g} s on, as from "
+                      "{first:.6g} s on: noise does not repeat"},
+          "look for files joined with an overlap and for buffers that are sent again",
+          severity="warning", topic="samples", masks=True),
+    Issue("saturation",
+          "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of the scale",
+          "use a wider range; make such samples missing (NaN) if they are few",
+          severity="warning", topic="samples", lacks="within_range",
           reason="samples cut off at range", spoils=("channel",), user_only=True),
-    Issue("size", "{text}", severity="bad", topic="recording"),
-    Issue("still-stretches", "{text}", severity="warning", topic="recording"),
-    Issue("stuck", "{text}", severity="warning", topic="samples", lacks="samples_change",
-          reason="values that stick", spoils=("channel",), user_only=True),
-    Issue("temperature", "{text}", severity="warning", topic="recording", user_only=True),
-    Issue("tilt", "{text}", severity="warning", topic="recording", lacks="attitude_kept",
-          reason="the sensor tilted", spoils=("accel",)),
-    Issue("value-repeated", "{text}", severity="warning", topic="samples",
-          lacks="samples_measured", reason="one value stands for many", spoils=("channel",)),
-    Issue("variance", "{text}", severity="bad", topic="samples", lacks="noise_steady",
+    Issue("size", "varies by {spread:.1g} {unit}, which no sensor gives", "check the unit",
+          severity="bad"),
+    Issue("still-stretches",
+          "in motion or vibrating for a part of its {duration:.4g} s; at rest from {listed} "
+          "|{timeline}|: these {total:.4g} s are used, and no averaging time is longer than the "
+          "longest of them, {longest:.4g} s",
+          "slower errors are not seen", severity="warning"),
+    Issue("stuck",
+          {"": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
+               "explains {chance:,}",
+           "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples "
+                    "from {time:.6g} s on, where rounding explains {chance:,}",
+           "log": "one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
+          "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
+          lacks="samples_change", reason="values that stick", spoils=("channel",),
+          user_only=True),
+    Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})",
+          "compensate for it first, or slow terms of the model will stand for it",
+          severity="warning", user_only=True),
+    Issue("tilt",
+          "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the axes",
+          severity="warning", lacks="attitude_kept", reason="the sensor tilted",
+          spoils=("accel",)),
+    Issue("value-repeated",
+          {"": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as "
+               "often as the values next to it",
+           "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: "
+                  "samples were cut towards zero, not rounded"},
+          "if it stands for no answer or a dead band, make such samples missing (NaN)",
+          severity="warning", topic="samples", lacks="samples_measured",
+          reason="one value stands for many", spoils=("channel",)),
+    Issue("variance",
+          {"": "{before}the noise is not steady: {low} in the quiet and {high} in the loud tenth "
+               "of parts of {part:.3g} s, so that its mean is {excess:.2g%} above that of the "
+               "quiet quarter",
+           "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
+           "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
+                    "begins at {start:.4g} s"},
+          "use a recording, or a part, without what vibrates",
+          severity="bad", topic="samples", lacks="noise_steady",
           reason="the noise comes and goes", spoils=("channel",), user_only=True),
-    Issue("vibration", "{text}", severity="warning", topic="recording"),
+    Issue("vibration",
+          "it vibrates for {total:.4g} s: samples scatter up to {times} times more than at rest "
+          "from {listed}",
+          "use what is at rest: gmwm.find_still has the stretches", severity="warning"),
 )  # fmt: skip
 
 _CALIBRATION = (
-    Issue("all-missing", "{text}", severity="warning", topic="recording"),
-    Issue("constant", "{text}", severity="bad", topic="recording"),
-    Issue("departures-many", "{text}", severity="bad", topic="recording", lacks="stationary",
-          reason="the bias steps to and fro"),
-    Issue("departures-removed", "{text}", severity="warning", topic="recording"),
-    Issue("drift-at-start", "{text}", severity="bad", topic="departure", lacks="stationary",
+    Issue("all-missing", "all samples missing{why}", severity="bad"),
+    Issue("ambiguity", "{models} models fit equally well: {titles}{also}", "the first is used",
+          topic="selection"),
+    Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
+    Issue("departures-many",
+          "{removed} departures were subtracted: a level that changes so often is noise of the "
+          "sensor",
+          "fit a slow term in place of it, such as a Gauss-Markov process",
+          severity="bad", lacks="stationary", reason="the bias steps to and fro"),
+    Issue("departures-removed",
+          "what was subtracted makes the deviation {times} times as large at tau = {tau:.3g} s: "
+          "the model holds where nothing like it comes again",
+          "find its cause, or let a slow term of the model describe it", severity="warning"),
+    Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
+          "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
           reason="drift after switching on"),
-    Issue("fit-not-valid", "{text}", topic="recording"),
-    Issue("longest-part", "{text}", topic="recording"),
-    Issue("mostly-missing", "{text}", severity="bad", topic="recording"),
-    Issue("not-estimable", "{text}", severity="bad", topic="recording"),
-    Issue("slow-period", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a slow period stands out"),
-    Issue("step", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="the bias stepped"),
-    Issue("transient", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a transient at the start"),
-    Issue("unresolved-walk", "{text}", topic="recording"),
-    Issue("unsteady", "{text}", severity="bad", topic="recording", lacks="noise_steady",
+    Issue("fit-not-valid", {
+        "": "{text}",
+        "compared": "its own fit is not valid ({reasons})",
+    }, topic="recording"),
+    Issue("longest-part",
+          "the longest part without the {count} steps and drifts is {kept:,.0f} s of {of:,.0f} s, "
+          "from {start:.6g} s to {stop:.6g} s",
+          "calibrate that part{also}"),
+    Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
+          severity="bad"),
+    Issue("not-estimable", "{text}", severity="bad"),
+    Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
+          "find what varies so, such as the temperature{back}", severity="bad",
+          topic="departure", lacks="stationary", reason="a slow period stands out"),
+    Issue("step", "a step of {height} at {when}{also}",
+          "calibrate the part before it or after it{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="the bias stepped"),
+    Issue("transient",
+          "a transient of {height} at the start with a time constant of {when}{also}",
+          "leave out the first three time constants{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="a transient at the start"),
+    Issue("unresolved-walk",
+          "the record leaves open a random walk of up to K = {shown} (95 %): with it the deviation "
+          "at {tau:.4g} s is {times} times that of the model",
+          "only a longer record can tell"),
+    Issue("unsteady",
+          "the slow noise changes during the recording: {quiet_part} it has {less} times the "
+          "deviation of the whole record, {loud_part} {more} times; the model is an average",
+          "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
           reason="slow noise changes its size"),
 )  # fmt: skip
 
@@ -408,74 +550,188 @@ _ESTIMATE = (
 _SELECTION = (
     Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
           "them apart, so the model has no ramp", topic="selection"),
-    Issue("tie", "{text}", topic="selection"),
+    Issue("tie", {
+        "": "{text}",
+        "log": "A tie: errors of {names} are equal as far as this log shows{but}. {resolution}",
+    }, topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    Issue("bounded-error", "{text}", topic="filter"),
-    Issue("estimate-it", "{text}", severity="warning", topic="filter"),
-    Issue("fast-peak-left-out", "{text}", topic="filter"),
-    Issue("less-white-noise", "{text}", topic="filter"),
-    Issue("line-left-out", "{text}", severity="warning", topic="filter"),
-    Issue("loose-form", "{text}", topic="filter"),
-    Issue("more-than-random-walk", "{text}", topic="filter"),
-    Issue("more-than-white-noise", "{text}", topic="filter"),
-    Issue("no-navigation-filter", "{text}", topic="filter"),
-    Issue("not-predicted", "{text}", topic="filter"),
-    Issue("optimistic", "{text}", topic="filter"),
-    Issue("other-units", "{text}", severity="warning", topic="filter"),
-    Issue("ramp-as-constant", "{text}", severity="warning", topic="filter"),
-    Issue("turn-on-left-out", "{text}", topic="filter"),
-    Issue("uncertainty-not-covered", "{text}", topic="filter"),
+    Issue("bounded-error",
+          "a {cause} moves the first integral by a bounded amount: its N, which is enough at any "
+          "time, is {factor:.2g} times too large after {horizon:g} s", topic="filter"),
+    Issue("estimate-it",
+          "larger numbers are a poor substitute for {cause}: N times {N_factor:.3g}, K times "
+          "{K_factor:.3g}", "estimate it as a state, or calibrate it", "warning", "filter"),
+    Issue("fast-peak-left-out",
+          "only the low-frequency density{also} of the {label} counts: it lies above {fast:.3g} Hz "
+          "and averages out", topic="filter"),
+    Issue("less-white-noise",
+          "N is {share:.3g} times that of the error model: use N and K as a pair, for outages of "
+          "the given lengths", topic="filter"),
+    Issue("line-left-out",
+          {"": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
+           "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow "
+                   "for this horizon, and errors are larger than the numbers say"}, topic="filter"),
+    Issue("loose-form",
+          "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true ones; "
+          "with {tightest}, {with_state:.3g} times", topic="filter"),
+    Issue("more-than-random-walk",
+          {"": "the model has no random walk: K covers {parts}",
+           "more": "K is {times:.3g} times that of the model's random walk: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("more-than-white-noise",
+          {"": "the model has no white noise: N covers {parts}",
+           "more": "N is {times:.3g} times that of the model's white noise: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("no-navigation-filter", "the INS/GNSS filter is left out: {reason}", topic="filter"),
+    Issue("not-predicted", "the consistency is not predicted: {reason}", topic="filter"),
+    Issue("optimistic",
+          {"bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
+           "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such "
+                     "numbers are consistent at all times and on all axes that share them",
+           "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than "
+                     "the numbers are for"}, "estimate it as a state, or remove it from the data",
+          "warning", "filter"),
+    Issue("other-units",
+          "N in use is {factor:.3g} times that of the error model: it may be in other units",
+          "give it in {unit}/sqrt(Hz)", "warning", "filter"),
+    Issue("ramp-as-constant",
+          "the {label} counts as a constant of standard deviation {size}: |R| times the horizon",
+          "a filter that lasts longer needs a state for it", "warning", "filter"),
+    Issue("turn-on-left-out",
+          "the start bias leaves out the turn-on bias, which a recording at rest cannot show",
+          "add its variance", topic="filter"),
+    Issue("uncertainty-not-covered",
+          {"": "the uncertainty of the fitted parameters is not covered", "why": "{reason}"},
+          topic="filter"),
 )  # fmt: skip
 
 _INS = (
-    Issue("aligned-in-motion", "{text}", topic="navigation"),
-    Issue("attitude-given", "{text}", topic="navigation"),
-    Issue("axis-up", "{text}", severity="warning", topic="navigation"),
-    Issue("barometer-set", "{text}", topic="navigation"),
-    Issue("biases-assumed", "{text}", topic="navigation"),
-    Issue("columns-unused", "{text}", topic="navigation"),
-    Issue("consistent", "{text}", severity="good", topic="navigation"),
+    Issue("aligned-in-motion", "aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw "
+          "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading",
+          topic="navigation"),
+    Issue("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma {sd_deg:.2g} deg",
+          topic="navigation"),
+    Issue("axis-signs", "the sign of {wrong} is wrong{unseen}", "bring gyros and accelerometers "
+          "to the same axes forward, right, down: reverse {reverse}, and check every gyro by "
+          "hand, for a drive does not show them all: positive while the right side goes down (x), "
+          "the front goes up (y), it turns right (z)", severity="bad", topic="navigation"),
+    Issue("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg", "if it "
+          "is mounted upside down, fine; else reverse gyro_z and accel_z, and gyro_y and accel_y "
+          "too if y points left", severity="warning", topic="navigation"),
+    Issue("barometer-set", "barometric heights are set to the first position fix, by {shift:.3g} m",
+          topic="navigation"),
+    Issue("better", "Take {where}: its errors after the outages are smaller{but}.", severity="good",
+          topic="navigation"),
+    Issue("biases-assumed", "turn-on biases, which a static calibration does not know, are "
+          "assumed to be {sd} (1 sigma)", topic="navigation"),
+    Issue("columns-unused", "columns not used: {columns}", topic="navigation"),
+    Issue("consistent", "The innovations agree with the filter's model: they are as large as it "
+          "expects, and white.", severity="good", topic="navigation"),
     Issue("diverged", {
-        "": "{text}",
+        "": "The filter diverged: the sensor models or the initial state are far off, or a fix is.",
         "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
     }, severity="bad", topic="navigation"),
     Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
           "this length that do not overlap", severity="warning", topic="navigation"),
-    Issue("fixes-left-out", "{text}", topic="navigation"),
-    Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
-    Issue("heading", "{text}", topic="navigation"),
-    Issue("judged-on-loiter", "{text}", topic="navigation"),
-    Issue("levelled", "{text}", topic="navigation"),
-    Issue("lost", "{text}", severity="bad", topic="navigation"),
-    Issue("no-time-stamps", "{text}", topic="navigation"),
-    Issue("not-white", "{text}", severity="bad", topic="navigation"),
-    Issue("outside-linearity", "{text}", severity="warning", topic="navigation"),
-    Issue("positions-at-zero", "{text}", severity="warning", topic="navigation"),
-    Issue("resolution", "{text}", topic="navigation"),
-    Issue("samples-filled", "{text}", severity="warning", topic="navigation"),
-    Issue("sd-assumed", "{text}", topic="navigation"),
-    Issue("sd-not-used", "{text}", severity="warning", topic="navigation"),
-    Issue("standstills", "{text}", topic="navigation"),
-    Issue("standstills-unknown", "{text}", severity="warning", topic="navigation"),
-    Issue("time-scales", "{text}", severity="warning", topic="navigation"),
+    Issue("fixes-left-out", "{count} fixes before or after the IMU's record are left out",
+          topic="navigation"),
+    Issue("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma off "
+          "at {time:.10g} s", severity="warning", topic="navigation"),
+    Issue("heading", {
+        "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
+        "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "
+        "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards",
+    }, topic="navigation"),
+    Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
+          "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
+    Issue("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}",
+          topic="navigation"),
+    Issue("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in brackets",
+          severity="bad", topic="navigation"),
+    Issue("lost", "The filter is lost: innovations are {times} times as large as it expects; do "
+          "not use the accuracy that it predicts. Look first at {first}the heading that it "
+          "started with, then at the units of the sensors and the clock of the fixes.",
+          severity="bad", topic="navigation"),
+    Issue("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as it expects; "
+          "the standard deviations of the fixes do not fit each other.", severity="bad",
+          topic="navigation"),
+    Issue("more-honest", "Take {where}: errors are as large, but it predicts them better{but}.",
+          severity="good", topic="navigation"),
+    Issue("no-time-stamps", "the IMU has no time stamps: fixes are timed from its first sample",
+          topic="navigation"),
+    Issue("not-white", "The filter's model does not fit: innovations are as large as it expects, "
+          "but depend on those before; a slow error of the sensors is missing in their models.",
+          severity="bad", topic="navigation"),
+    Issue("outside-linearity",
+          "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
+          "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
+          "are too small",
+          "check them by runs, as gmwm navigate does", "warning", "navigation"),
+    Issue("positions-at-zero", "{count} position{count:s?} at 0, 0 are left out",
+          severity="warning", topic="navigation"),
+    Issue("resolution", "this motion would show {shown}{missing}", topic="navigation"),
+    Issue("samples-filled", "{count:,} missing sample{count:s?}, at most {longest} in a row, are "
+          "interpolated", severity="warning", topic="navigation"),
+    Issue("sd-assumed", "the fixes have no standard deviations: {sd} to the north, east and down "
+          "are assumed", "give {where}_sd", topic="navigation"),
+    Issue("sd-not-used", "the fixes have standard deviations of their own: the given ones are not "
+          "used", severity="warning", topic="navigation"),
+    Issue("standstills", "{count} standstill{count:s?} of {length:g} s are recognised",
+          topic="navigation"),
+    Issue("standstills-unknown", "no standstill can be recognised: the vehicle does not stand at "
+          "the start", severity="warning", topic="navigation"),
+    Issue("time-offset", "the fixes are stamped {size:.3g} s too {late} (standard error "
+          "{error:.1g} s){scale}", "{change} their times", severity="bad", topic="navigation"),
+    Issue("time-scales", "both have dates, the fixes in {scale}: if the IMU's are in UTC, GPS "
+          "time is ahead of them by the leap seconds, {seconds:g} s since 2017",
+          "shift the fixes by as much", severity="warning", topic="navigation"),
+    Issue("too-large", {
+        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
+        "are worse than their models, or the fixes than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
+        "innovations are {sizes} as they allow.",
+    }, severity="bad", topic="navigation"),
+    Issue("too-small", {
+        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
+        "are better than their models, or the fixes than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
+        "innovations are {sizes} as they allow.",
+    }, severity="bad", topic="navigation"),
 )  # fmt: skip
 
 _POPULATION = (
-    Issue("channel-missing", "{text}", severity="warning", topic="population"),
-    Issue("channel-skipped", "{text}", severity="warning", topic="population"),
-    Issue("channels-differ", "{text}", severity="warning", topic="population"),
-    Issue("clock-ratio", "{text}", severity="warning", topic="population"),
-    Issue("few-recordings", "{text}", topic="population"),
-    Issue("few-units", "{text}", topic="population"),
-    Issue("left-over", "{text}", topic="population"),
-    Issue("lengths-differ", "{text}", topic="population"),
-    Issue("no-joint-model", "{text}", severity="warning", topic="population"),
-    Issue("no-numbers", "{text}", severity="warning", topic="population"),
-    Issue("not-noise", "{text}", severity="warning", topic="population"),
-    Issue("rates-differ", "{text}", severity="warning", topic="population"),
-    Issue("same-recording", "{text}", severity="warning", topic="population"),
+    Issue("channel-missing", "it has no such channel", severity="warning", topic="population"),
+    Issue("channel-skipped", "{reason}", severity="warning", topic="population"),
+    Issue("channels-differ", "{have} no such channel: {names}", severity="warning",
+          topic="population"),
+    Issue("curves-close", "{sentence}", topic="population"),
+    Issue("curves-differ", "{sentence}", severity="warning", topic="population"),
+    Issue("few-recordings", "{recordings} recordings know the spread within factors of {low:.2g} "
+          "and {factor:.2g} (95 %)", topic="population"),
+    Issue("few-units", "{units} unit{units:s?}: a distribution-free limit needs {needed}",
+          topic="population"),
+    Issue("left-over", "the folder also holds {units} calibration{units:s?} of other recordings: "
+          "{names}", topic="population"),
+    Issue("lengths-differ", "recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s "
+          "long: short ones scatter more", topic="population"),
+    Issue("no-joint-model", "{error}", severity="warning", topic="population"),
+    Issue("no-numbers", "{error}", severity="warning", topic="population"),
+    Issue("not-noise", "{bad}", "not compared: the curve is not noise alone", severity="warning",
+          topic="population"),
+    Issue("rates-differ", {
+        "": "at {rate:.6g} Hz, {others} at {usual:.6g} Hz",
+        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}",
+    }, "not compared level by level", severity="warning", topic="population"),
+    Issue("same-recording", {
+        "": "the same recording as {other}",
+        "fleet": "the same recording: {names}",
+    }, "left out", severity="warning", topic="population"),
+    Issue("units-differ", "in {own}, {others} in {common}", "not compared level by level",
+          severity="warning", topic="population"),
 )  # fmt: skip
 
 _STUDY = (

@@ -34,9 +34,9 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration, Stopwatch
     from gmwm.estimate.result import Estimate
+    from gmwm.issues import Notice
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -50,25 +50,6 @@ _ON_DISK = 2 << 30
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
-
-_OF_RECORDING = (
-    "not-static",
-    "tilt",
-    "rate-changes",
-    "rounding",
-    "saturation",
-    "abrupt-end",
-    "stuck",
-    "held",
-    "filled",
-    "value-repeated",
-    "variance",
-    "counts",
-    "gravity",
-    "swapped",
-)
-"""Codes of notices of a fit that are those of the recording."""
-
 
 _FILES = ("calibration.json", "report.html", "imu.yaml")
 
@@ -212,10 +193,10 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
 
 
 def show(result: Calibration) -> None:
-    from gmwm._core.notices import worst_first
     from gmwm.calibration import LONGEST_PART
     from gmwm.diagnosis import gathered
     from gmwm.estimate.result import JointFit
+    from gmwm.issues import worst_first
     from gmwm.report import duration_text
 
     size = f"{duration_text(result.duration)} at {result.rate:g} Hz, {result.n:,} samples a channel"
@@ -239,7 +220,7 @@ def show(result: Calibration) -> None:
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             remarks.append(f"{name}: {fit.agreement}")
-        of_fit = [each for each in fit.notices if each.code not in _OF_RECORDING]
+        of_fit = [each for each in fit.notices if not each.issue.spoils]
         remarks += [f"{name}: {with_option(n)}" for n in of_fit if n.severity != "bad"]
     invalid = [f"{name} is not valid: {with_option(notice)}" for name, notice in reasons]
     for remark in (*invalid, *remarks):
@@ -248,9 +229,7 @@ def show(result: Calibration) -> None:
 
 def _is_shown(notice: Notice) -> bool:
     """How the file was read, and what may spoil the estimates; the report has the rest."""
-    from gmwm.readers import READING
-
-    if notice.code in (*READING, "events-left-out"):
+    if notice.issue.topic in ("reading", "clock") or notice.code == "events-left-out":
         return True
     if notice.code == "length":
         return notice.severity != "good"

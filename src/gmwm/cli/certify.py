@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from gmwm.calibration import Calibration
 
 _GRAVITY = 9.80665
+_SI = {
+    "scale_error": 0.01,
+    "misalignment": math.radians(1.0),
+    "g_sensitivity": math.radians(1.0) / _GRAVITY,
+    "time_offset": 1e-3,
+    "vibration_rectification": 1e-3 / _GRAVITY,
+    "vibration": _GRAVITY,
+}
+"""SI units of one unit of each option of errors."""
 
 
 @click.command()
@@ -64,15 +73,10 @@ def certify(
     outages: str,
     keyframe: float,
     motion: str | None,
-    scale_error: float,
-    misalignment: float,
-    g_sensitivity: float,
-    time_offset: float,
-    vibration_rectification: float,
-    vibration: float,
     output: Path | None,
     units: str,
     as_json: bool,
+    **errors: float,
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
@@ -90,14 +94,7 @@ def certify(
     from gmwm.filter_numbers import Imperfections, certify as run
 
     calibration = Calibration.load(file)
-    known = Imperfections(
-        scale_error=scale_error / 100.0,
-        misalignment=math.radians(misalignment),
-        g_sensitivity=math.radians(g_sensitivity) / _GRAVITY,
-        time_offset=time_offset / 1000.0,
-        vibration_rectification=vibration_rectification * 1e-3 / _GRAVITY,
-        vibration=vibration * _GRAVITY,
-    )
+    known = Imperfections(**{name: errors[name] * _SI[name] for name in errors})
     if known.needs_motion and motion is None:
         raise InputError("errors that come with motion do nothing at rest: add --motion drone")
     found = run(
@@ -108,7 +105,7 @@ def certify(
         imperfections=known,
         motion=_motion(motion),
     )
-    show(found, output, as_json, units)
+    show(found, output=output, as_json=as_json, units=units)
 
 
 def _numbers(

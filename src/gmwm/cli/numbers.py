@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -60,20 +61,8 @@ def _tau(text: str | None) -> float | str | None:
     "Cover the confidence region of this level, e.g. 0.95, and not the estimate alone.",
     type=float,
 )
-def bound(
-    file: Path,
-    form: str,
-    shared: bool,
-    tau: float | str | None,
-    gyro_bias: float,
-    accel_bias: float,
-    output: Path | None,
-    units: str,
-    as_json: bool,
-    horizon: float,
-    level: float | None,
-) -> None:
-    """Find the smallest numbers that are never too optimistic.
+def bound(file: Path, horizon: float, level: float | None, **options: Any) -> None:
+    """Find the smallest numbers that are never overconfident.
 
     FILE is a calibration.json.
 
@@ -84,16 +73,8 @@ def bound(
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import bound as run
 
-    found = run(
-        Calibration.load(file),
-        form,
-        horizon,
-        level=level,
-        shared=shared,
-        tau=tau,
-        bias_sd={"gyro": gyro_bias, "accel": accel_bias},
-    )
-    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
+    found = run(Calibration.load(file), horizon=horizon, level=level, **_arguments(options))
+    show(found, **_printing(options), remark=_turn_on_hint(found, options))
 
 
 @click.command()
@@ -108,19 +89,7 @@ def bound(
     "Interval of keyframes or scans, in place of outages, for relative poses.",
     type=float,
 )
-def reduce(
-    file: Path,
-    form: str,
-    shared: bool,
-    tau: float | str | None,
-    gyro_bias: float,
-    accel_bias: float,
-    output: Path | None,
-    units: str,
-    as_json: bool,
-    outages: str,
-    keyframe: float | None,
-) -> None:
+def reduce(file: Path, outages: str, keyframe: float | None, **options: Any) -> None:
     """Find the numbers with which a small filter is consistent.
 
     FILE is a calibration.json.
@@ -135,16 +104,9 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration,
-            form,
-            times,
-            keyframe=keyframe,
-            shared=shared,
-            tau=tau,
-            progress=bar,
-            bias_sd={"gyro": gyro_bias, "accel": accel_bias},
+            calibration, outages=times, keyframe=keyframe, progress=bar, **_arguments(options)
         )
-    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
+    show(found, **_printing(options), remark=_turn_on_hint(found, options))
 
 
 @click.command()
@@ -167,25 +129,34 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     Example:
       gmwm budget out/calibration.json --times 1,10,60
     """
-    from gmwm.budget import error_budget
     from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import error_budget
 
     calibration = Calibration.load(file)
     click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))
 
 
-def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> str:
-    """A line on the bias at switch-on, of the sensors for which none was given."""
-    given = {"gyro": gyro_bias, "accel": accel_bias}
-    flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
-    if not flags:
-        return ""
-    text = f"give the bias at switch-on (1 sigma) by {' and '.join(flags)}"
-    return "\n".join(bullets([text]))
+def _arguments(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of the function that finds the numbers."""
+    bias_sd = {"gyro": options["gyro_bias"], "accel": options["accel_bias"]}
+    return {"bias_sd": bias_sd} | {name: options[name] for name in ("form", "shared", "tau")}
+
+
+def _printing(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: options[name] for name in ("output", "as_json", "units")}
+
+
+def _turn_on_hint(numbers: SensorNumbers, options: Mapping[str, Any]) -> str:
+    """A line for the sensors whose turn-on bias was not given."""
+    kinds = [kind for kind in ("gyro", "accel") if numbers.of(kind)]
+    flags = [f"--{kind}-bias" for kind in kinds if options[f"{kind}_bias"] == 0.0]
+    text = f"add your turn-on bias (1 sigma) by {' and '.join(flags)}"
+    return "\n".join(bullets([text])) if flags else ""
 
 
 def show(
     result: SensorNumbers | Certificate,
+    *,
     output: Path | None,
     as_json: bool,
     units: str,

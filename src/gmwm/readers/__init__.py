@@ -7,7 +7,6 @@ channel, `clock` turns time stamps into a rate. Whatever cannot be used raises
 
 from gmwm._core.units import AUXILIARY as AUXILIARY
 from gmwm.readers.cells import DATE as DATE, seconds_of as seconds_of
-from gmwm.readers.clock import CLOCK_CODES as CLOCK_CODES
 from gmwm.readers.csv_table import CsvTable as CsvTable
 from gmwm.readers.formats import is_frame as is_frame, is_text as is_text
 from gmwm.readers.missing import Missing as Missing
@@ -25,6 +24,7 @@ from gmwm.readers.recording import (
     Recording as Recording,
     require_recording as require_recording,
 )
+from gmwm.readers.spool import load_columns as load_columns
 from gmwm.readers.table import label as label
 from gmwm.readers.text_file import content_size as content_size
 from gmwm.readers.turning import (

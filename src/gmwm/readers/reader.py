@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -26,10 +27,8 @@ from gmwm.readers.clock import (
     is_time_of_day,
     seconds_of_day,
     timing_of,
-    without_summer_time,
     without_unit,
 )
-from gmwm.readers.csv_table import CsvTable
 from gmwm.readers.formats import (
     Part,
     Wanted,
@@ -131,86 +130,77 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    tables = tables_of(path, layout, topic, clock, format, channels, damaged)
-    return _read(tables, Given(rate, units or {}, channels, time))
-
-
-def tables_of(
-    path: str | os.PathLike[str] | Any,
-    layout: str | None,
-    topic: str | Sequence[str],
-    clock: str,
-    format: str | None,
-    channels: object,
-    damaged: bool,
-) -> Sequence[Table]:
-    """What `read` opens; the arguments are its own."""
-    if layout is None:
+    if layout is not None:
+        if format is not None:
+            raise InputError("layout is for a binary file without a header: leave out format")
+        tables: Sequence[Table] = [
+            BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))
+        ]
+    else:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
-        return open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
-    if format is not None:
-        raise InputError("layout is of a binary file without a header: leave out format")
-    return [BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))]
+        tables = open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
+    return _read(tables, Given(rate, units or {}, channels, time))
 
 
 def _read(tables: Sequence[Table], given: Given) -> Recording:
     """The recording of one table or of several."""
     if len(tables) == 1:
-        return part_of(tables[0], given).recording
+        return recording_of(tables[0], given).recording
     own = [table for table in tables if has_sensors(table)]
     chosen = [(own[0], given.channels)] if len(own) == 1 else shares(own, given.channels)
-    parts = [part_of(table, replace(given, channels=only)) for table, only in chosen]
+    parts = [recording_of(table, replace(given, channels=only)) for table, only in chosen]
     for table in tables:
         if table not in own:
             parts[0] = with_temperature(parts[0], table)
     return joined(parts)
 
 
-def part_of(table: Table, given: Given) -> Part:
-    """The recording of a table, and when it begins."""
+def recording_of(table: Table, given: Given) -> Part:
+    """The recording of a table, and the time of its first sample.
+
+    Raises InputError if a column, a unit, the rate or enough samples are missing, or they
+    contradict each other.
+    """
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     _check_one_sensor(table, roles)
-    # Complain before a long file is read, not after.
-    if roles.time is not None and stated is None:
+    if roles.time is not None and stated is None:  # complain before a long file is read
         stated_seconds(table.source, table.names[roles.time])
     unit_of, unit_notices = channel_units(
         table, roles, given.units, lambda: _unknown_rate(table, roles.time, stated)
     )
-
     arrays, auxiliary, unreadable = _load(table, roles)
-    _check_size(table, roles, arrays)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
-        if isinstance(table, CsvTable) and table.layout.dates.get(roles.time) is False:
-            arrays[roles.time], odd = without_summer_time(arrays[roles.time], table.where)
-        elif meaning(table.names[roles.time]).seconds in (None, 1.0) and is_time_of_day(
-            arrays[roles.time]
-        ):
+        seconds = meaning(table.names[roles.time]).seconds
+        if seconds in (None, 1.0) and is_time_of_day(arrays[roles.time]):
             arrays[roles.time] = seconds_of_day(arrays[roles.time])
             text = "times of day (hhmmss) count as seconds since midnight"
-            odd = [Notice("time-of-day", "note", "", text)]
-        start = float(arrays[roles.time][0]) * (meaning(table.names[roles.time]).seconds or 1.0)
+            odd.append(Notice("time-of-day", "note", "", text))
+        start = float(arrays[roles.time][0]) * (seconds or 1.0)
     for name, index in roles.channels.items():
-        unit = unit_of[name]
-        largest = tuning.BEYOND_SENSORS / factor(unit, SI_UNIT[quantity_of(unit)])
+        largest = tuning.BEYOND_SENSORS / factor(unit_of[name], SI_UNIT[quantity_of(unit_of[name])])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    used_rate, timing, clock_notices = _timing(table, roles.time, arrays, stated)
+    timing = None if roles.time is None else _timing(table, roles.time, arrays, stated)
+    rate = stated or (
+        timing.rate if timing else 0.0
+    )  # without one, it was asked for with the units
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
     further = [
-        Channel(column.name, arrays[column.index], 1.0 / used_rate, column.quantity)
+        Channel(column.name, arrays[column.index], 1.0 / rate, column.quantity)
         if column.unit is None
-        else auxiliary_channel(column.name, arrays[column.index], 1.0 / used_rate, column.unit)
+        else auxiliary_channel(column.name, arrays[column.index], 1.0 / rate, column.unit)
         for column in auxiliary
     ]
     series = {name: arrays[index] for name, index in roles.channels.items()}
     arrays.clear()
+    clock_notices = timing.notices if timing else ()
     recording = Recording.from_arrays(
         ((name, series.pop(name)) for name in list(series)),
-        rate=used_rate,
+        rate=rate,
         units=unit_of,
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
@@ -226,30 +216,9 @@ def part_of(table: Table, given: Given) -> Part:
         recording,
         channels=(*recording.channels, *further),
         notices=(*at_rest, *recording.notices),
-        jitter=timing.jitter if timing is not None else None,
+        jitter=timing.jitter if timing else None,
     )
-    return Part(recording, start, timing.jumps if timing is not None else None)
-
-
-def _check_one_sensor(table: Table, roles: Roles) -> None:
-    """Raise InputError if a column says that the rows are of several sensors in turns."""
-    for index, name in enumerate(table.names):
-        if index in roles.columns or bare(name).lower() not in NUMBERS_OF_SENSORS:
-            continue
-        segments = getattr(table, "segments", None)
-        try:
-            first = next(segments([index], tuning.FEWEST_OF_BLOCK)) if segments else None
-            numbers = known_of((first or table.load([index]))[index])
-        except InputError:  # of words
-            continue
-        several = np.unique(numbers).size
-        turns = np.count_nonzero(np.diff(numbers))
-        if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
-            raise InputError(
-                f"{table.source}, {column_of(table, index)}: rows of {several} sensors come in "
-                "turns: keep those of one",
-                "several-sensors",
-            )
+    return Part(recording, start)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:
@@ -267,8 +236,28 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
     return rate
 
 
+def _check_one_sensor(table: Table, roles: Roles) -> None:
+    """Raise InputError if a column says that the rows are of several sensors in turns."""
+    for index, name in enumerate(table.names):
+        if index in roles.columns or bare(name).lower() not in NUMBERS_OF_SENSORS:
+            continue
+        try:
+            first = next(table.segments([index], tuning.FEWEST_OF_BLOCK), {index: np.zeros(0)})
+        except InputError:  # words
+            continue
+        numbers = known_of(first[index])
+        several = np.unique(numbers).size
+        turns = np.count_nonzero(np.diff(numbers))
+        if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
+            raise InputError(
+                f"{table.source}, {column_of(table, index)}: rows of {several} sensors come in "
+                "turns: keep those of one",
+                "several-sensors",
+            )
+
+
 def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:
-    """What is to be asked for if the rate is not known: it, or the unit of the time stamps."""
+    """What to ask for if the rate is not known: the rate, or the unit of the time stamps."""
     if stated is not None:
         return None
     if time is None:
@@ -285,30 +274,28 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
 def _load(
     table: Table, roles: Roles
 ) -> tuple[dict[int, FloatArray], list[AuxiliaryColumn], list[Notice]]:
-    """Columns; an auxiliary one that cannot be read, or has another length, is left out."""
+    """Columns, auxiliary columns among them, and a notice if some of these are left out.
+
+    An auxiliary column is left out if it cannot be read or has another length.
+    """
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
+    kept, notices = list(roles.auxiliary), list[Notice]()
     try:
-        return load_columns(table, sorted(wanted)), list(roles.auxiliary), []
+        arrays = load_columns(table, sorted(wanted))
     except InputError:
         if not roles.auxiliary:
             raise
-    arrays = load_columns(table, roles.columns)
-    n = arrays[roles.columns[0]].size
-    kept = []
-    for column in roles.auxiliary:
-        try:
-            values = load_columns(table, [column.index])[column.index]
-        except InputError:
-            continue
-        if values.size == n:
-            arrays[column.index] = values
-            kept.append(column)
-    names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
-    text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
-    return arrays, kept, [Notice("columns-unreadable", "note", "", text)]
-
-
-def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) -> None:
+        arrays, kept = load_columns(table, roles.columns), []
+        n = arrays[roles.columns[0]].size
+        for column in roles.auxiliary:
+            with suppress(InputError):
+                values = load_columns(table, [column.index])[column.index]
+                if values.size == n:
+                    arrays[column.index] = values
+                    kept.append(column)
+        names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
+        text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
+        notices.append(Notice("columns-unreadable", "note", "", text))
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
     if most < tuning.FEWEST_SAMPLES:
@@ -317,41 +304,30 @@ def _check_size(table: Table, roles: Roles, arrays: Mapping[int, FloatArray]) ->
             f"{table.source} has {most} samples{of_any} where at least "
             f"{tuning.FEWEST_SAMPLES} are needed: record longer"
         )
-
-
-def _repeated(columns: Sequence[FloatArray], order: IntArray) -> BoolArray:
-    """Which rows, in an order, have the values of the row before in every column."""
-    same = np.ones(order.size, dtype=bool)
-    same[0] = False
-    for column in columns:
-        values = column[order]
-        both = np.isnan(values[1:]) & np.isnan(values[:-1])
-        same[1:] &= (values[1:] == values[:-1]) | both
-    return same
+    return arrays, kept, notices
 
 
 def _timing(
-    table: Table,
-    time: int | None,
-    arrays: Mapping[int, FloatArray],
-    stated: float | None,
-) -> tuple[float, Timing | None, tuple[Notice, ...]]:
-    """The stated rate if there is one, checked against the time stamps if there are any."""
-    if time is None:
-        return stated or 0.0, None, ()  # without one, it was asked for with the units
-    name = table.names[time]
+    table: Table, time: int, arrays: Mapping[int, FloatArray], stated: float | None
+) -> Timing:
+    """What the time stamps say, checked against the stated rate if there is one."""
+
+    def same(order: IntArray) -> BoolArray:
+        found = np.ones(order.size, dtype=bool)
+        found[0] = False
+        for values in (arrays[i][order] for i in arrays if i != time):
+            both = np.isnan(values[1:]) & np.isnan(values[:-1])
+            found[1:] &= (values[1:] == values[:-1]) | both
+        return found
+
+    found = meaning(table.names[time])
     clock = Clock(
-        source=table.source,
-        column=column_of(table, time),
-        stamps=arrays[time],
-        seconds=meaning(name).seconds,
-        own_unit=meaning(name).stated,
-        where=table.where,
-        same=lambda order: _repeated([arrays[i] for i in arrays if i != time], order),
-    )
+        table.source, column_of(table, time), arrays[time], found.seconds, found.stated,
+        table.where, same,
+    )  # fmt: skip
     timing = timing_of(clock, stated)
     if stated is None:
-        return timing.rate, timing, timing.notices
+        return timing
     text = f"the rate stated, {stated:g} Hz, is used"
     used = Notice("rate-stated", "note", "", text, {"rate": stated})
-    return stated, timing, (*timing.notices, used)
+    return replace(timing, notices=(*timing.notices, used))

@@ -24,10 +24,10 @@ READING = frozenset(
     | {"time-column", "units-from-names", "units-contradicted"}
     | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
     | {"rate-unlikely"}
-    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-set", "clock-wraps"}
-    | {"stamps-in-turns", "sensors-in-turns", "clock-shifts", "sentinel", "gravity-absent"}
+    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-wraps"}
+    | {"sentinel", "gravity-absent"}
     | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
-    | {"partial-record", "still-stretches", "summer-time"}
+    | {"partial-record", "still-stretches"}
 )
 """Codes of the notices about how a file was read."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -48,6 +48,9 @@ class Table(Protocol):
 
         Returns: finite values, NaN where a sample is missing.
         """
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
+        """The same, about ``rows`` at a time."""
 
     def where(self, row: int) -> str:
         """Say where a row of data is, e.g. ``"line 12"``."""

@@ -29,50 +29,16 @@ cheapest usual ones."""
 LARGEST_BIAS = 0.7
 """rad/s (40 deg/s): data sheets of the cheapest gyros allow 20 deg/s at rest, seldom more."""
 
-QUIET_GYRO, QUIET_BIAS = 2.9e-6, 2e-4
-"""rad/s/sqrt(Hz) (0.01 deg/sqrt(h)) and rad/s (41 deg/h, the earth's rate included): a gyro of less
-noise than the one has no bias above the other."""
-
-EARTH_SEEN, EARTH_AGREES = 1.5e-6, 3e-3
-"""rad/s/sqrt(Hz) (0.005 deg/sqrt(h)), noise of gyros whose mean is the earth's rate to 0.3 % (0.05
-deg/h): of MEMS gyros, one in a thousand has that mean by chance."""
-
-QUIETEST_GYRO = 2.9e-9
-"""rad/s/sqrt(Hz) (1e-5 deg/sqrt(h)): a tenth of the best fibre-optic and hemispherical gyros."""
-
-EARTH_SHOWS, EARTH_IS_SHOWN, NO_EARTH = 2.9e-7, 0.2, 1e-3
-"""rad/s/sqrt(Hz) (0.001 deg/sqrt(h)): gyros of less noise have biases far below the earth's rate,
-so that three at rest read it to this part. A mean below the last part of it was taken away."""
-
 UNITS_APART = 5.0
 """Ratio of two units up to which both are named where they explain the noise: deg/h and mdeg/s."""
-
-TURNING_EXPLAINED, TURNING_AGREES = 0.5, 0.2
-"""Share of the changes of gravity that turning explains, and relative error of the rate, from which
-on it shows a wrong unit; units differ by a factor of 57 and more."""
 
 LEAST_CONE, LAGS_OF_TURN, FEWEST_TURNING = 0.01, (1, 4, 16), 20
 """rad by which gravity leaves its mean where a sensor turns steadily (at rest by 0.3 deg), seconds
 over which its changes are compared, and how many of these a recording has at least."""
 
-MOST_IN_TURNS, TURNS_ALIKE, SURE_OF_TURNS, SENSORS_APART = 4, 0.99, 8.0, 0.3
-"""Rows of one stamp up to which as many sensors are as likely as a batch of one, part of the stamps
-that have as many, standard errors (one in 1e10 by chance), and standard deviations of a sample,
-more than the tones of converters at half of their rate."""
-
-BLOCKS_OF_TURNS, SHORTER_OF_TURNS, FEWEST_OF_TURNS, WANDERS = 64, 16, 16, 3.0
-"""Blocks whose means are compared, by how much shorter others are, rows of one at least, and the
-ratio of their variances, each times its length: eleven standard errors above that of white
-noise."""
-
 ROWS_OF_COUNTS, NOISE_OF_COUNTS = 4096, 2.0
 """First samples that are to be whole numbers before all are looked at, and their noise, above which
 these are no steps of a coarse output: no gyro has noise of 2 deg/s, no accelerometer of 2 m/s^2."""
-
-NEAREST_UNITS, FAR_UNITS, AXES_ALIKE = 2.0, 3.4, ((0.25, 0.07), (1.6, 0.5))
-"""Logarithm of the ratio of two units that are not taken for each other (mg and cm/s^2 have 0.02,
-deg/h and mdeg/s 1.3), and of noise that the axes of one sensor never have. For ratios below and
-above this, by how much two axes may differ, and by how much the third may miss the ratio."""
 
 USUAL_BIAS = 0.052
 """rad/s (3 deg/s): biases at rest of most MEMS gyros are smaller by their data sheets; those of the
@@ -89,9 +55,6 @@ BEYOND_SENSORS = 1e6
 
 MOST_TURNS = 0.1
 """Of the steps of times of day, hhmmss, that pass a minute: at 0.2 Hz a twelfth do."""
-
-STEPS_OF_HOUR, NEAR_HOUR, MOST_HOURS = 2.0, 0.25, 2
-"""Usual steps, or s, to which a step of an hour is the change of summer time; twice a year."""
 
 OF_QUARTILES, LEAST_REPEATS, TRANSITIONS = 2.44, 3, 0.1
 """Times the distance of the quartiles, 90 % of Gaussian samples lie in; how often a number comes at
@@ -156,6 +119,9 @@ SHORTEST_STEP = 0.499
 USUAL_STEP = 1.75
 """Median steps up to which a step makes the usual one: 2 and 3 ms of a clock of 400 Hz."""
 
+JUMP = 2.25
+"""Median steps from which a step is a jump: those of 1 and 2 of rounded stamps are none."""
+
 LONGEST_STEP = 1.5
 """Usual steps beyond which a step may be a jump: half way to a missing row."""
 
@@ -180,53 +146,33 @@ ROWS_OF_ROUGH = 32
 """Rows over which the interval is known to 2 % with jitter of 0.4, and of which most have no loss
 where one of a hundred is lost."""
 
-JITTER_EXPECTED, LEAST_JITTER = 0.25, 0.05
-"""Standard deviation of stamps about the clock, in intervals: that of uniform jitter of 40 % is
-0.23; rounding of a fifth of an interval has 0.05."""
-
-CLOCK_COSTS = (5.0, 5.0, 25.0, 8.0)
-"""Negative logarithms of the chance of a loss and a repetition (1 of 150 rows) and of a set clock
-(1e-11), and the most that one stamp costs: four standard deviations."""
-
 COPIES = 0.8
 """Share of the repeated stamps that have repeated samples too, above which these are copies: by
 chance, coarse samples repeat less often."""
 
-ROWS_OF_CLOCK = (128, 1024, 1024, 1024)
-"""Rows over which the clock is followed: first alone, phase to 0.05 and rate to 1e-3 of an interval
-with jitter of 0.25; then about its slow changes, until nothing changes."""
+UNLIKE_STEPS, MOST_IN_TURNS = 0.25, 0.8
+"""Relative distance of the usual step from half of that of two steps, and part of the pairs that
+are alike, from which on short and long steps alternate. Steps of 2 and 3 ms at 400 Hz do not."""
 
-ROWS_KNOWN = 16
-"""Rows that the interval and the phase at the beginning are worth."""
+STAMPS_BESIDE, FEWEST_BESIDE = 64, 16
+"""Different stamps before and after a step by which losses show; a host that stalls for less makes
+no loss. Stamps at either end of which a clock that was set back shows."""
 
-ROWS_OF_TRIAL, TRIED_INTERVALS = 2048, (1.0, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4)
-"""First rows on which intervals are tried, and how much shorter than the rough one they are: 0 to
-30 % of the rows are lost."""
+ROUNDS_OF_GRID = 3
+"""Times that losses are looked for, each with the sampling interval of the one before."""
 
-ROWS_OF_TREND = 257
-"""Rows over which slow changes of the clock are averaged: 1e-3 of an interval at 100 ppm in an
-hour."""
+STAMPS_OF_WANDER = 257
+"""Different stamps over which slow changes of the clock are averaged: 1e-3 of an interval at 100
+ppm in an hour."""
 
-ROWS_AT_ONCE = 1 << 15
-"""Rows that are decided at a time: bounds the memory."""
-
-MOST_SET, MOST_UNEVEN = 2e-3, 0.75
-"""Fraction of rows at which a clock that is set is none, and the median distance from the clock, in
-intervals, above which stamps are no even clock."""
+MOST_UNEVEN = 0.75
+"""Intervals from the grid, in the median: more, and the stamps have no even clock."""
 
 ASTRAY = 2.0
 """Intervals from the clock, beyond the rows of a burst, from which stamps are reported as far."""
 
 MOST_OF_ONE_STAMP = 1024
 """Rows with one stamp that a full buffer holds, or a host that stalls writes."""
-
-BEATS, IN_BEAT, MOST_IN_BEAT = (0.125, 0.42), 0.1, 0.9
-"""Intervals by which stamps are early and late in turns: less is the jitter of any clock, more are
-bursts of two rows. How near to the short or the long step they are, and how many of them."""
-
-ROWS_OF_SHIFT, LEAST_SHIFT, SHIFT_ERRORS = 100, 0.3, 8.0
-"""Rows of a median of the distance from the clock; its change, in intervals and in usual changes,
-that is a shift: with jitter of 40 % a median has an error of 0.04."""
 
 # -- binary files ---------------------------------------------------------------------------------
 

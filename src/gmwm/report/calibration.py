@@ -12,11 +12,11 @@ from typing import Any
 
 from gmwm._core.files import writable_file, written
 from gmwm._core.jobs import shared
-from gmwm._core.notices import worst_first
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
+from gmwm.issues import worst_first
 from gmwm.readers import Channel, Recording
 from gmwm.report.answer import (
     answer,

@@ -14,10 +14,10 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units, si_parameter_unit
-from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.calibration import Calibration, floor
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
+from gmwm.filter_numbers import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
 from gmwm.process import Model
 from gmwm.readers import Channel

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice
 from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.simulation import GROUPS, FilterErrors, Validation
+from gmwm.issues import Notice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,7 +17,6 @@ import numpy as np
 from gmwm import filter_numbers
 from gmwm._core.documents import Document
 from gmwm._core.files import folder_to_fill, written
-from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
@@ -25,6 +24,7 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import Experiment, Validation
+from gmwm.issues import Notice
 from gmwm.readers import Recording
 from gmwm.study.figures import saved
 from gmwm.study.navigation import TEN, Calibrated, aligned, scenario_of, times

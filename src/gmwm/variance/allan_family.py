@@ -209,7 +209,13 @@ def deviations(
             "these deviations are computed by allantools, which is not installed: install it with "
             "pip install 'gmwm[allan]'"
         ) from None
-    channel, values = _checked(data, dt)
+    channel = as_channel(data, dt)
+    values, runs, _ = checked_samples(channel)
+    if not runs.is_complete:
+        raise InputError(
+            f"{where_of(channel)} has {runs.n - runs.present:,} missing samples: cut it to a part "
+            "without any, or use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
+        )
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
@@ -246,20 +252,6 @@ def deviations(
         quantity=channel.quantity,
         unit=channel.unit or "u",
     )
-
-
-def _checked(data: Channel | FloatArray, dt: float | None) -> tuple[Channel, FloatArray]:
-    if not isinstance(data, Channel) and dt is None:
-        raise InputError("give the sampling interval of the array: deviations(x, dt=0.01)")
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
-    where = where_of(channel)
-    missing = np.count_nonzero(np.isnan(checks.real_numbers(channel.values, where)))
-    if missing:
-        raise InputError(
-            f"{where} has {missing:,} missing samples: cut it to a part without any, or "
-            "use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
-        )
-    return channel, checked_samples(channel)[0]
 
 
 def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:

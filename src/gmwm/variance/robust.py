@@ -17,10 +17,9 @@ and the efficiency at independent Gaussian coefficients, 2 nu^4 over its varianc
 
     E[(Z^2 - 1) chi(Z)]^2 / (2 var chi(Z)).
 
-What it can do has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient
-of averaging time m is made of 2 m samples, and where most of them hold an outlier, their mean is
-nearly Gaussian with the raised variance, which no estimate from the coefficients of that level can
-tell from noise.
+It has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient of
+averaging time m is made of 2 m samples. Where most of these coefficients contain an outlier, they
+are nearly Gaussian with the raised variance, which no estimate from that level can tell from noise.
 """
 
 from __future__ import annotations
@@ -96,38 +95,21 @@ def tuning_constant(efficiency: float = EFFICIENCY) -> float:
 
 
 def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) -> float:
-    """Robust variance, about zero, of the wavelet coefficients of one level.
+    """Robust variance, about zero, of the wavelet coefficients of one level, u^2.
 
     The equation has a second, meaningless solution far below, and may have more in contaminated
     data. The solution is the one found first from the squared median of \\|W\\| over 0.6745, on the
-    branch on which the equation falls with nu^2, as it does for Gaussian data.
+    branch on which the equation falls with nu^2, as it does for Gaussian data. Where more than half
+    of the coefficients are zero, the search starts from their mean square. Without a solution the
+    start itself is returned: at an efficiency of 0.6 with more than a quarter of far outliers, or
+    of zeros beside noise. With few independent coefficients the estimate is biased, as any
+    non-linear function of them. Independent uniform rounding errors give 15 % more than their
+    variance, a level that holds nothing but a periodic line 40 % more.
 
-    Parameters
-    ----------
-    coefficients : (M,) array_like
-        Coefficients free of end effects, in u; at least one.
-    efficiency : float, optional
-        At Gaussian data, between 0 and 1; see `tuning_constant`.
-
-    Returns
-    -------
-    float
-        In u^2. Where more than half of the coefficients are zero (coarsely rounded data; below a
-        millionth of their root mean square), the search starts from their mean square. Where the
-        equation has no solution, the start itself is returned: at an efficiency of 0.6 with more
-        than a quarter of far outliers, or of zeros beside noise.
-
-    Raises
-    ------
-    InputError
-        For coefficients that are not one series of finite numbers, or an efficiency outside (0, 1).
-
-    Notes
-    -----
-    With few independent coefficients (coarse levels) the estimate is biased, as any non-linear
-    function of them: at a single one it is W^2 over a constant. It stands for the variance of
-    Gaussian coefficients: independent uniform rounding errors give 15 % more than their variance,
-    and a level that holds nothing but a periodic line gives 40 % more.
+    coefficients: (M,), free of end effects, in u; at least one.
+    efficiency: See `tuning_constant`.
+    Raises InputError for coefficients that are not one series of finite numbers, or an efficiency
+        outside (0, 1).
     """
     c = tuning_constant(efficiency)
     w = np.ascontiguousarray(coefficients, dtype=float)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.spool import release, scaled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
@@ -20,7 +21,7 @@ from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
 MIN_SAMPLES = 8
-"""Fewest samples of which a wavelet variance is made."""
+"""Fewest samples for a wavelet variance."""
 
 
 def wavelet_variance(
@@ -37,9 +38,9 @@ def wavelet_variance(
 
     All levels with at least one coefficient free of end effects are given; the mean of the series
     does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
-    averaging time are filled from what is around them, and what that changes in the expected
-    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing
-    samples take part in are left out.
+    averaging time are filled from the samples around them, and the bias of the filling is
+    subtracted (`gmwm.variance.filling`). Coefficients that contain other missing samples are left
+    out.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def wavelet_variance(
     robust : bool, optional
         Whether to bound the influence of outliers, see `gmwm.variance.robust`.
     efficiency : float, optional
-        Of the robust estimate where there are no outliers, between 0 and 1.
+        Efficiency of the robust estimate where there are no outliers, between 0 and 1.
     data_covariance : {"none", "octave"}, optional
         Estimate the covariance of the variances from the coefficients too, over all lags or with
         a lag window (see `gmwm.variance.covariance.empirical`), for ``fit(weights="data")``.
@@ -71,7 +72,7 @@ def wavelet_variance(
     Stebler et al. (2012). The Haar variance of averaging time tau is half the overlapping Allan
     variance.
     """
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    channel = as_channel(data, dt)
     values, runs, mean = checked_samples(channel)
     confidence = checks.share("confidence", confidence, 0.95)
     efficiency = checks.share("efficiency", efficiency, 0.6)
@@ -80,21 +81,21 @@ def wavelet_variance(
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
     _check_width(channel, runs, wavelet)
-    values = values - mean
+    values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet, channel.dt)
-    moments = levels.moments()
-    driftless = None
+    moments, driftless = levels.moments(), None
     if robust:
         moments = _robust_moments(levels.coefficients(), efficiency)
-        driftless = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
-        driftless = driftless / (1.0 + levels.change)
+        level = _robust_moments(levels.coefficients(level=True), efficiency)
+        driftless = level[:, 1] / (1.0 + levels.change)
     blocks, block = levels.block_means()
+    release(channel.values)
     found = None
     if data_covariance is not None:
-        # What is subtracted for the filling leaves the error of that which it is subtracted from.
-        factor = (1.0 + levels.error) / (1.0 + levels.change)
         longest = int(np.max(levels.counts))
         found = covariance_of_data(levels.coefficients(), longest, data_covariance)
+        # The bias of the filling is subtracted, its error stays.
+        factor = (1.0 + levels.error) / (1.0 + levels.change)
         found = found * np.outer(factor, factor)
     variance = levels.unfilled(moments)
     if not np.any(variance > 0.0):
@@ -123,17 +124,32 @@ def wavelet_variance(
     )
 
 
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
+
+
+def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
+    """Mean and robust mean square of each level's coefficients, (J, 2)."""
+    from gmwm.variance.robust import robust_variance
+
+    return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
+
+
 def fourth_cumulant(values: FloatArray) -> float:
-    """Of the independent part of a series, NaN where samples are missing, u^4."""
+    """Fourth cumulant of the independent part of a series, NaN where samples are missing, u^4."""
     count, square, fourth = difference_powers(values)
     return cumulant_of_powers(square / count, fourth / count, count)
 
 
 def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
-    """Of the independent part of a series, u^4; 0 if not above chance.
+    """Fourth cumulant of the independent part of a series, u^4; 0 if it may be chance.
 
-    Cumulants of independent samples add up, so that first differences have twice that of the
-    samples.
+    Cumulants of independent samples add up: first differences have twice that of the samples.
 
     square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
     count: Number of the first differences.
@@ -144,7 +160,7 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
 
 
 def where_of(channel: Channel) -> str:
-    """How messages call a channel."""
+    """Name of a channel in messages."""
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
@@ -152,7 +168,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
     """The samples of a channel, which of them exist, and their mean.
 
     Raises InputError if they are no series of numbers, too few, infinite, constant or of no
-        sensor's size, or the sampling interval is none.
+        sensor's size, or the sampling interval is not positive.
     """
     where = where_of(channel)
     checks.sampling_interval(channel.dt)
@@ -179,10 +195,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
 
 
 def check_varies(channel: Channel) -> None:
-    """Refuse a channel that is constant or varies by what no sensor does.
-
-    Raises InputError.
-    """
+    """Raise InputError if a channel is constant or varies by an amount that no sensor does."""
     where = where_of(channel)
     if channel.is_constant:
         raise InputError(
@@ -193,22 +206,6 @@ def check_varies(channel: Channel) -> None:
         raise InputError(
             f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
         )
-
-
-def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
-    width = known_wavelet(wavelet).width(1)
-    if width > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
-
-
-def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
-    """Mean, and the robust stand-in for the mean square, of each level's coefficients, (J, 2)."""
-    from gmwm.variance.robust import robust_variance
-
-    return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
 
 
 def as_wavelet_variance(
@@ -228,11 +225,13 @@ def as_wavelet_variance(
     return data
 
 
-def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
-    """A channel without a name from an array and its sampling interval (s).
+def as_channel(data: Channel | FloatArray | Sequence[float], dt: float | None) -> Channel:
+    """A channel as it is, or one without a name from an array and its sampling interval (s).
 
     Raises InputError if either is not usable.
     """
+    if isinstance(data, Channel):
+        return data
     if dt is None:
         raise InputError("an array has no sampling interval: give it in seconds, e.g. dt=0.01")
     interval = checks.sampling_interval(dt)

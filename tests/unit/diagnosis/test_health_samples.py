@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from examining import examined, only
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.samples import abrupt_end_notice
+from gmwm.diagnosis.samples import cut_off_or_abrupt_end
+from marks import slow
 
 SEEDS = range(60)
 
@@ -115,9 +116,9 @@ def test_noise_that_thins_out_has_no_abrupt_end(step):
         "accel_y": rng.normal(size=5000) + 30.0 * np.sin(time / 40.0),
         "accel_z": rng.normal(size=5000) + 0.01 * time,
     }
-    for name, x in laws.items():
+    for x in laws.values():
         x = np.rint(x / step + 0.2) * step if step else x
-        assert abrupt_end_notice(Signal(name, "u", step=step, scatter=1.0), x) is None
+        assert only(cut_off_or_abrupt_end(examined(x, unit="u", step=step))) is None
 
 
 @pytest.mark.parametrize("step", STEPS[:2])
@@ -125,7 +126,7 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     x = white(100_000, 9) + 0.3 * np.sin(np.arange(100_000) / 500.0)
 
     def ends(values):
-        found = abrupt_end_notice(Signal("gyro_x", "u", step=step, scatter=1.0), values)
+        found = only(cut_off_or_abrupt_end(examined(values, unit="u", step=step)))
         return found.severity, found.values["lowest"], found.values["highest"]
 
     x = np.rint(x / step) * step if step else x
@@ -135,3 +136,14 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     assert ends(x[x < 1.45]) == ("bad", near(1.45, abs=0.06), near(1.45, abs=0.06))
     # Samples that are sorted out beyond 2.2 deviations make the noise a tenth smaller at most.
     assert ends(x[x < 2.25])[0] == "warning"
+
+
+@pytest.mark.parametrize(("step", "severity"), [(0.1, "bad"), (0.02, "warning"), (0.5, "bad")])
+@pytest.mark.parametrize("law", ["normal", slow("laplace")])
+def test_samples_cut_towards_zero_are_named_and_rounded_ones_are_not(step, severity, law):
+    scale = {"normal": 1.0, "laplace": 0.6}[law]
+    noise = getattr(np.random.default_rng(3), law)(0.0, scale, size=200_000)
+    channels = {"gyro_x": np.trunc(noise / step) * step, "gyro_y": np.rint(noise / step) * step}
+    rec = gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "deg/s"})
+    (notice,) = gmwm.health(rec).of(code="value-repeated")
+    assert (notice.where, notice.severity) == ("gyro_x", severity)

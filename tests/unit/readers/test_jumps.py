@@ -1,10 +1,10 @@
-"""Jumps, changes and shifts of a clock, where they are and of what size."""
+"""Jumps of a clock and changes of its rate: their places and sizes."""
 
 import numpy as np
 import pytest
 
 from gmwm.readers import tuning
-from gmwm.readers.clock.jumps import Jumps, find_change, find_jumps, find_shifts
+from gmwm.readers.grid import Jumps, find_change, find_jumps
 
 DT = 0.004
 
@@ -62,8 +62,6 @@ def test_rows_are_put_where_their_numbers_say(seed):
         if row not in repeated:
             number += 1 + int(np.sum(missing[rows == row]))
         expected.append(number)
-    assert jumps.sample(np.arange(n)).tolist() == expected
-    assert jumps.sample(np.array([-1])).tolist() == [-1]
     values = rng.normal(size=n)
     spread = jumps.spread(values)
     kept = np.setdiff1d(np.arange(n), repeated)
@@ -114,19 +112,3 @@ def test_a_change_of_the_rate_needs_two_parts():
     rng = np.random.default_rng(1)
     noisy = np.repeat([0.01, 0.0103], 400) * (1.0 + 0.3 * rng.normal(size=800))
     assert find_change(np.cumsum(noisy)) is None
-
-
-@pytest.mark.parametrize(("by", "found"), [(0.5 * tuning.LEAST_SHIFT, False), (3.0, True)])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_clock_that_is_late_from_some_row_on(by, found, sign):
-    size = tuning.ROWS_OF_SHIFT
-    n, row = 12 * size, 5 * size + size // 3
-    shifted = stamps(n) + DT * sign * by * (np.arange(n) >= row)
-    even = Jumps(np.array([], dtype=int), np.array([]), np.array([]), DT)
-    shifts = find_shifts(shifted, even)
-    assert len(shifts) == found
-    if found:
-        assert shifts[0] == (row, pytest.approx(sign * by))
-    reported = Jumps(even.rows, even.steps, even.missing, DT, set_at=np.array([row]))
-    assert find_shifts(shifted, reported) == []
-    assert find_shifts(shifted[-5 * size + 1 :], even) == []

@@ -7,7 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
-from gmwm.readers.clock.jumps import find_change
+from gmwm.readers.grid import find_change
 
 
 def texts(recording):
@@ -274,7 +274,7 @@ def test_line_counts_blank_lines_and_comments(timed):
     lines = path.read_text().splitlines()
     lines[20:20] = ["", "  "]
     path.write_text("\n".join(["# bench", *lines]))
-    assert "line 54: time stamp" in problem(path)
+    assert "the clock goes back" in problem(path)
 
 
 @pytest.mark.parametrize("step", [1e-310, 1e-200, 1e130])

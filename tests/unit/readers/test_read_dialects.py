@@ -257,19 +257,6 @@ def test_a_leap_second_is_read(tmp_path):
     assert dated(tmp_path, stamps).dt == pytest.approx(0.1, rel=1e-6)
 
 
-@pytest.mark.parametrize("hour", [1, -1])
-@pytest.mark.parametrize("step", [1.0, 0.01])
-def test_the_change_of_summer_time_is_no_gap(tmp_path, hour, step):
-    moments = [FIRST + timedelta(seconds=step * i + 3600 * hour * (i >= 4000)) for i in range(6000)]
-    recording = dated(tmp_path, [each.isoformat(timespec="milliseconds") for each in moments])
-    assert recording.dt == pytest.approx(step, rel=1e-6)
-    assert recording["gyro_x"].is_complete
-    assert recording.n == 6000
-    (notice,) = [each for each in recording.notices if each.code == "summer-time"]
-    assert (notice.severity, notice.values["row"]) == ("warning", 4000)
-    assert "line 4002" in notice.text
-
-
 def test_times_of_day_as_one_number_have_no_gap_at_the_minute(tmp_path):
     moments = [FIRST + timedelta(milliseconds=100 * i) for i in range(2000)]
     kept = moments[:1000] + moments[1003:]  # passes midnight and three minutes

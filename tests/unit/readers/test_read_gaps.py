@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 from gmwm.errors import InputError
 from gmwm.readers import csv_table, read
-from gmwm.readers.clock.jumps import find_jumps
+from gmwm.readers.grid import find_jumps
 from gmwm.readers.names import CANONICAL
 
 
@@ -264,19 +264,11 @@ def test_half_may_be_missing_but_no_more(recorded):
     assert "in all 210 samples are missing where there are 190, more than half" in message
 
 
-@pytest.mark.parametrize("far", [2.02, 1e6, 1e9])
-def test_a_clock_that_jumps_farther_than_the_recording_is_long_was_set(recorded, far):
-    stamps = 0.01 * np.arange(N)
-    stamps[300:] += far
-    kept = np.arange(N) % 2 < (1 if far < 3.0 else 2)  # 200 rows: 201 and more are missing
-    stamps = stamps if far > 3.0 else np.repeat(stamps[150:350], 2)
-    path, values = recorded(kept, stamps)
-    recording = read(path, units=GYRO)
-    assert recording.rate == pytest.approx(100.0, rel=1e-5)
-    np.testing.assert_array_equal(recording["gyro_x"].values, values[kept])
-    (notice,) = [each for each in recording.notices if each.code == "clock-set"]
-    assert notice.severity == "warning"
-    assert notice.values["largest"] == pytest.approx(far, abs=0.02)
+@pytest.mark.parametrize("far", [4.02, 1e6, 1e9])
+def test_a_clock_that_jumps_farther_than_the_recording_is_long_is_rejected(recorded, far):
+    path, _ = recorded(without(), 0.01 * np.arange(N) + far * (np.arange(N) >= 300))
+    with pytest.raises(InputError, match=r"line 302: the clock jumps .* more than half of the rec"):
+        read(path, units=GYRO)
 
 
 def test_a_wild_stamp_asks_for_no_memory(recorded):

@@ -225,13 +225,12 @@ def test_rows_written_again_change_neither_rate_nor_samples(again, how):
     assert (notice.code, notice.values["count"]) == ("rows-repeated", rows[again].size)
 
 
-def test_a_clock_that_is_set_back_repeats_stamps_and_no_rows():
+def test_a_clock_that_is_set_back_is_rejected():
     n, rng = 20_000, np.random.default_rng(5)
     number = np.arange(n) - 300 * (np.arange(n) >= 9000)
     frame = pd.DataFrame({"time_s": 0.01 * number, "gyro_x": rng.standard_normal(n)})
-    recording = gmwm.read(frame, units={"gyro": "rad/s"})
-    assert recording.n == n
-    assert "clock-set" in [each.code for each in recording.notices]
+    with pytest.raises(InputError, match=r"row 9000.*: the clock goes back"):
+        gmwm.read(frame, units={"gyro": "rad/s"})
 
 
 def test_rows_of_two_sensors_in_turns_are_refused():

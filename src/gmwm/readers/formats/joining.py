@@ -10,7 +10,6 @@ import numpy as np
 from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.clock import Jumps
 from gmwm.readers.names import CANONICAL, bare, meaning
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
 from gmwm.readers.table import Table
@@ -21,26 +20,14 @@ _SAMPLE = 0.5
 
 @dataclass(frozen=True)
 class Part:
-    """The sensors of one topic.
-
-    start: Stamp of its first sample, s.
-    jumps: Of its time stamps.
-    """
+    """The recording of one table, and the stamp of its first sample, s."""
 
     recording: Recording
     start: float = 0.0
-    jumps: Jumps | None = None
 
     @property
     def stop(self) -> float:
         return self.start + self.recording.duration
-
-    def samples(self, rows: slice) -> slice:
-        """The samples of some rows of the table, and those missing before these."""
-        if self.jumps is None:
-            return rows
-        before, last = self.jumps.sample(np.array([rows.start, rows.stop]) - 1).tolist()
-        return slice(before + 1, last + 1)
 
 
 def has_sensors(table: Table) -> bool:

@@ -5,10 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity, offset
-from gmwm.ins.geometry import matrix_from_rpy
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.trajectory.trajectory import Trajectory
+from gmwm.ins import Imu, Trajectory, emulate
+from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, offset
 
 PLACE = np.array([math.radians(46.0), 0.1, 250.0])
 

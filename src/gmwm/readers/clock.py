@@ -1,0 +1,424 @@
+"""Time stamps: the sampling rate, and the place of every row on an even grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gmwm._core.notices import Notice
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
+from gmwm.errors import InputError
+from gmwm.readers import tuning
+from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, place_uneven
+
+UNITS = {
+    86400.0: "days",
+    3600.0: "hours",
+    60.0: "minutes",
+    1.0: "seconds",
+    1e-3: "milliseconds",
+    1e-6: "microseconds",
+    1e-9: "nanoseconds",
+}
+"""Names of units of time, by their seconds."""
+
+_SHORT = dict(zip(UNITS, ("days", "h", "min", "s", "ms", "us", "ns"), strict=True))
+_WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
+_SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
+_SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
+_DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time stamps of a recording.
+
+    source, column: File and column, for messages, ``"column 't'"``.
+    stamps: (n,), in a unit of ``seconds``.
+    seconds: The unit; None if the header states none that is known.
+    own_unit: The unit as the header states it.
+    where: Row -> its place in the file.
+    same: Row numbers in an order -> whether each has the samples of the one before.
+    """
+
+    source: str
+    column: str
+    stamps: FloatArray
+    seconds: float | None
+    own_unit: str
+    where: Callable[[int], str]
+    same: Callable[[IntArray], BoolArray]
+
+    def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
+        """What is wrong with the stamps, with the file, the column and the place."""
+        place = "" if row is None else f", {self.where(row)}"
+        return InputError(f"{self.source}, {self.column}{place}: {text}", "clock", hint)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What time stamps say.
+
+    rate: Hz, as the stamps have it.
+    jumps: Where rows are missing.
+    notices: The rate, its unit, the jitter, the jumps, and what else is uneven.
+    jitter: Standard deviation of the steps, as a share of a step.
+    """
+
+    rate: float
+    jumps: Jumps
+    notices: tuple[Notice, ...]
+    jitter: float
+
+
+def agree(rate: float, other: float) -> bool:
+    """Whether two rates are the same within 1 %."""
+    return abs(rate / other - 1.0) <= tuning.RATES_AGREE
+
+
+def timing_of(clock: Clock, expected: float | None = None) -> Timing:
+    """Sampling rate over the whole recording, and the jumps.
+
+    Stamps without a unit are seconds where that gives the rate of an inertial sensor; for others a
+    rate is asked for. With an expected rate, the unit is the one that fits it, or where the header
+    states a unit that is unknown here, whatever makes it fit.
+
+    expected: Rate that the user or the file states, Hz.
+    Raises InputError if a stamp is missing, most are far from any even clock, the clock was set
+        back, more than half of the rows are missing, or the stamps contradict the expected rate.
+    """
+    missing = np.flatnonzero(np.isnan(clock.stamps))
+    if missing.size:
+        text = f"no time stamp{_others(missing.size)}"
+        raise clock.error(int(missing[0]), text, f"remove such lines, or, {_WAY_OUT}")
+    last: list[Notice] = []
+    copies = _copies(clock)
+    kept = np.delete(np.arange(clock.stamps.size), copies) if copies.size else None
+    if kept is not None:
+        rows, where = kept, clock.where
+        clock = replace(clock, stamps=clock.stamps[rows], where=lambda row: where(int(rows[row])))
+        text = (
+            f"{copies.size:,} row{'s repeat rows' if copies.size > 1 else ' repeats a row'} before"
+        )
+        last.append(Notice("rows-repeated", "note", "", text, {"count": copies.size}, "left out"))
+    continued = _unwrapped(clock.stamps)
+    if continued is not None:
+        clock = replace(clock, stamps=continued)
+        text = "the counter of the time stamps overflowed: they were continued"
+        last.insert(0, Notice("clock-wraps", "note", "", text))
+    found = _grid(clock)
+    jumps = found.jumps
+    if not _SHORTEST_STEP < jumps.interval < 1.0 / _SHORTEST_STEP:
+        raise clock.error(None, f"steps of {jumps.interval:g} are not those of a clock")
+    seconds, is_guess = _unit(clock, jumps.interval, expected)
+    _check_jumps(clock, found, seconds)
+    rate = 1.0 / (jumps.interval * seconds)
+    if expected is not None and not agree(rate, expected):
+        guessed = without_unit(clock.source, clock.column, jumps.interval, expected)
+        raise (guessed if is_guess and guessed else None) or InputError(
+            f"{clock.source}, {clock.column}: its stamps give {rate:.6g} Hz, not the "
+            f"{expected:.6g} Hz stated",
+            "rate-contradicted",
+            "leave out the rate to use that of the stamps, or give time=False to ignore them",
+        )
+    notices = _notices(clock, found, seconds, is_guess=is_guess)
+    is_told = expected is not None or not is_guess
+    slowest, fastest = tuning.RATES_OF_SENSORS if is_told else tuning.RATES_OF_SECONDS
+    if not slowest <= rate <= fastest:
+        hint = "check the unit of the time column"
+        if not is_told:
+            hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
+        text = f"inertial sensors hardly have a rate of {rate:.6g} Hz"
+        notices.append(Notice("rate-unlikely", "warning", "", text, {"rate": rate}, hint))
+    if kept is not None:
+        jumps = jumps.with_copies(kept, copies)
+    return Timing(rate, jumps, (*notices, *last), found.jitter)
+
+
+def _others(count: int) -> str:
+    return f", and {count - 1:,} more such" if count > 1 else ""
+
+
+def _copies(clock: Clock) -> IntArray:
+    """Rows, alone or in pieces, that were written again: they are the same as an earlier one."""
+    none = np.empty(0, dtype=np.int64)
+    if np.all(np.diff(clock.stamps) > 0.0):
+        return none
+    order = np.argsort(clock.stamps, kind="stable")
+    again = np.diff(clock.stamps[order], prepend=np.nan) == 0.0
+    beside = again & (np.diff(order, prepend=0) == 1)
+    alike = int(np.count_nonzero(beside | np.append(beside[1:], False)))
+    if 2 * alike > order.size or not np.any(again):
+        return none  # bursts: coarse samples repeat by chance
+    copies = again & clock.same(order)
+    many = np.count_nonzero(copies) > tuning.COPIES * np.count_nonzero(again)
+    return np.sort(order[copies]) if many else none
+
+
+def _unwrapped(stamps: FloatArray) -> FloatArray | None:
+    """Stamps of a counter of 16 or 32 bit that overflowed, continued; None if it did not."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(stamps)
+        back = np.flatnonzero(steps < 0.0)
+        if not back.size:
+            return None
+        usual = median(steps)
+        if usual == 0.0 and np.any(steps > 0.0):  # in bursts most are none
+            usual = median(steps[steps > 0.0])
+        for bits in (16, 32):
+            forward = steps[back] + 2.0**bits
+            if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):
+                wraps = np.zeros(stamps.size)
+                wraps[back + 1] = 2.0**bits
+                return np.asarray(stamps + np.cumsum(wraps))
+    return None
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Jumps and jitter of a clock, the change of its rate, and its uneven stamps if it has any."""
+
+    jumps: Jumps
+    jitter: float
+    change: Change | None
+    uneven: Uneven | None = None
+
+
+def _grid(clock: Clock) -> _Grid:
+    """Where no step is shorter than half of the usual one, the jumps are those of the steps."""
+    with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
+        steps = np.diff(clock.stamps)
+        is_increasing = bool(np.all(steps > 0.0))
+        is_even = is_increasing and not _are_in_turns(clock.stamps, steps)
+        every = 1 if is_even else tuning.ROWS_OF_ROUGH
+        change = find_change(clock.stamps[::every])
+        if change is not None:
+            before, after = change.rates
+            change = Change(change.row * every, (before * every, after * every))
+        short = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
+        if is_even and (change is not None or not short.size):
+            jumps = find_jumps(clock.stamps)
+            jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
+            return _Grid(jumps, jitter, change)
+        uneven = place_uneven(clock.stamps)
+        if isinstance(uneven, Uneven):
+            return _Grid(uneven.jumps, uneven.jitter, change, uneven)
+    # The first step that no clock has, and how many there are.
+    wrong, what = np.flatnonzero(steps < 0.0) + 1, "goes back"
+    if not wrong.size:
+        wrong, what = np.flatnonzero(steps == 0.0) + 1, "repeats the one before"
+    if not wrong.size:
+        wrong = short[:1] + 1 if short.size else np.array([int(np.argmax(steps)) + 1])
+        usual = np.median(steps)
+        what = f"is {steps[wrong[0] - 1]:.6g} after the one before, {usual:.6g} is usual"
+    if uneven is not None:
+        back = "the clock goes back: from here on stamps are early, or the rows are not in order"
+        raise clock.error(uneven, back, f"use the part before or after, or, {_WAY_OUT}")
+    stamp = f"time stamp {clock.stamps[wrong[0]]:.15g} {what}{_others(wrong.size)}"
+    hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
+    raise clock.error(int(wrong[0]), f"{stamp}, so that no even clock fits most of them", hint)
+
+
+def _are_in_turns(stamps: FloatArray, steps: FloatArray) -> bool:
+    """Whether short and long steps alternate, so that the usual step is not the interval.
+
+    A long step of about twice the short one may as well be one of three samples that is lost.
+    """
+    pairs = stamps[2:] - stamps[:-2]
+    usual = median(pairs)
+    if abs(2.0 * median(steps) / usual - 1.0) < tuning.UNLIKE_STEPS:
+        return False
+    short, long = median(steps[steps < 0.5 * usual]), median(steps[steps > 0.5 * usual])
+    if abs(long / short - 2.0) < tuning.OFF_GRID:
+        return False
+    return bool(np.mean(np.abs(pairs / usual - 1.0) < 0.1) > tuning.MOST_IN_TURNS)
+
+
+def _unit(clock: Clock, step: float, expected: float | None) -> tuple[float, bool]:
+    """The unit in seconds, and whether it is a guess."""
+    if clock.seconds is not None:
+        return clock.seconds, False
+    if expected is not None and clock.own_unit:
+        return 1.0 / expected / step, True
+    if expected is not None:
+        logs = {unit: abs(math.log(step * unit) + math.log(expected)) for unit in UNITS}
+        return min(logs, key=lambda unit: logs[unit]), True
+    if error := without_unit(clock.source, clock.column, step):
+        raise error
+    return 1.0, True
+
+
+def without_unit(
+    source: str, column: str, step: float, expected: float | None = None
+) -> InputError | None:
+    """What stamps without a unit may be; None if they are seconds of a sensor.
+
+    source, column: For the message, ``"column 't'"``.
+    step: Usual step.
+    expected: Rate that is stated but fits no unit, Hz.
+    """
+    if tuning.LEAST_STEP <= step < tuning.LARGEST_STEP or not step > 0.0:
+        return None
+    slowest, fastest = tuning.RATES_OF_SENSORS
+    rates = {unit: 1.0 / (step * unit) for unit in UNITS}
+    likely = sorted(
+        (unit for unit, rate in rates.items() if slowest <= rate <= fastest),
+        key=lambda unit: abs(math.log(rates[unit]) - 0.5 * math.log(slowest * fastest)),
+    )
+    each = [f"{rates[unit]:.6g} Hz if they are {UNITS[unit]}" for unit in likely]
+    each += [] if expected is None else [f"not the {expected:.6g} Hz stated"]
+    text = ", ".join([f"{source}, {column}: steps of {step:.6g} without a unit", *each])
+    name = column[8:-1] if column.endswith(("'", '"')) else "time"
+    rate, called = 100.0, "by its unit"
+    if likely:
+        rate, called = rates[likely[0]], repr(f"{name} [{_SHORT[likely[0]]}]")
+    hint = f"name the column {called}, or give the sampling rate, rate={rate:.6g}"
+    return InputError(text, "time-unit", hint, {"rate": rate, "column": called})
+
+
+def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
+    """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
+    jumps, n = found.jumps, clock.stamps.size
+    if found.change is not None:
+        first, then = (rate / seconds for rate in found.change.rates)
+        if max(first / then, then / first) > tuning.SHARP_CHANGE:
+            raise InputError(
+                f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}: the "
+                f"sampling rate goes from {first:.4g} to {then:.4g} Hz",
+                "rate-changes",
+                "use the part before or after",
+            )
+    if jumps.are_rounding:
+        text = (
+            f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances, "
+            "as if the stamps were rounded too coarsely"
+        )
+        raise clock.error(int(jumps.rows[0]), text)
+    if jumps.off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
+        text = (
+            f"{jumps.off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
+            f"{jumps.interval:.6g}, so that the sampling rate is not known"
+        )
+        raise clock.error(None, text)
+    if jumps.are_bursts:
+        text = (
+            f"every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by {jumps.steps[0]:.3g} "
+            "of the usual steps: rows come in bursts, and stamps say when they were written, not "
+            "when they were sampled"
+        )
+        raise clock.error(None, text)
+    if jumps.total > n:
+        text = (
+            f"the clock jumps by {jumps.missing[jumps.longest]:,.6g} sampling intervals, and in "
+            f"all {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
+            "the recording"
+        )
+        hint = f"use the part before or after, or, {_WAY_OUT}"
+        raise clock.error(int(jumps.rows[jumps.longest]), text, hint)
+
+
+def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> list[Notice]:
+    """The rate and the jitter, jumps, a change of the rate, and what is uneven."""
+    jumps, jitter = found.jumps, found.jitter
+    interval = jumps.interval * seconds
+    rate = 1.0 / interval
+    unit = UNITS.get(seconds, clock.own_unit) + (", inferred from the steps" if is_guess else "")
+    text = f"time stamps ({clock.column}, {unit}) give {rate:.6g} Hz"
+    if jitter >= tuning.JITTER_SHOWN:
+        far = jitter * interval
+        size = f"{far:.3g} s" if far >= _SHORTEST_SHOWN else f"{1e6 * far:.3g} us"
+        text += f"; their steps vary by {size} rms ({100.0 * jitter:.2f} % of a step)"
+    values = {"rate": rate, "unit": seconds, "jitter": jitter}
+    notices = [Notice("time-stamps", "note", "", text, values)]
+
+    def when(row: int) -> float:
+        return float(clock.stamps[row] - clock.stamps[0]) * seconds
+
+    if count := jumps.rows.size:
+        digits = 1 - math.floor(math.log10(interval))
+        length = round(float(jumps.steps[jumps.longest] - 1.0) * interval, digits)
+        time = round(when(int(jumps.rows[jumps.longest]) - 1), digits)
+        total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
+        place = f"by {length:.12g} s, {time:.12g} s after the start"
+        times = f"{count:,} times, farthest "
+        text = f"the clock jumps {times if count > 1 else ''}{place}: "
+        text += f"in all {total}" if count > 1 else total
+        values = {"count": count, "missing": jumps.total, "longest": length, "time": time}
+        notices.append(Notice("clock-jumps", "note", "", text, values))
+    if off := jumps.off_grid:
+        which = (
+            f"{off:,} of these jumps {'are' if off > 1 else 'is'}" if count > 1 else "the jump is"
+        )
+        text = (
+            f"{which} not near a whole number of sampling intervals: the samples after it were "
+            "placed at the nearest"
+        )
+        notices.append(Notice("clock-off-grid", "note", "", text, {"count": off}))
+    if found.change is not None:
+        before, after = (each / seconds for each in found.change.rates)
+        row, time = clock.where(found.change.row), when(found.change.row)
+        text = (
+            f"the sampling rate goes from {before:.4g} to {after:.4g} Hz at about {time:.4g} s, "
+            f"and {rate:.6g} Hz is taken for all of it"
+        )
+        values = {"before": before, "after": after, "rate": rate, "time": time}
+        hint = f"use the part before or after ({row})"
+        notices.append(Notice("rate-changes", "bad", "", text, values, hint))
+    if found.uneven is not None:
+        notices += _uneven_notices(clock, found.uneven, interval)
+    return notices
+
+
+def _uneven_notices(clock: Clock, found: Uneven, interval: float) -> list[Notice]:
+    """Bursts, and stamps far from the grid."""
+    notices = []
+    if found.burst > 1:
+        text = (
+            f"{found.burst} rows come with one stamp, usually: it is taken as that of the last "
+            "of them, and the others are one sampling interval apart"
+        )
+        hint = "if the rows are of several sensors, keep those of one"
+        notices.append(Notice("stamps-in-bursts", "note", "", text, {"rows": found.burst}, hint))
+    astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
+    if astray.size:
+        worst = astray[np.argmax(np.abs(found.late[astray]))]
+        by = float(found.late[worst]) * interval
+        count = f"{astray.size:,} time stamp{'s are' if astray.size > 1 else ' is'}"
+        text = (
+            f"{count} far from the clock, at most by {by:.3g} s "
+            f"({clock.where(int(found.last[worst]))}): the samples were taken as evenly spaced"
+        )
+        values = {"count": astray.size, "largest": by}
+        notices.append(Notice("stamps-astray", "note", "", text, values))
+    return notices
+
+
+# -- times of day ---------------------------------------------------------------------------------
+
+
+def is_time_of_day(stamps: FloatArray) -> bool:
+    """Whether stamps (n,), read as hhmmss.ss of NMEA 0183, pass minutes by a usual step."""
+    minutes, seconds = np.divmod(stamps, 100.0)
+    if not np.all((stamps >= 0.0) & (stamps < 240000.0) & (seconds < 60.0) & (minutes % 100 < 60)):
+        return False
+    turns = np.diff(minutes) != 0.0
+    count = int(np.count_nonzero(turns))
+    if not 0 < count < tuning.MOST_TURNS * turns.size:
+        return False
+    steps = np.diff(seconds_of_day(stamps))
+    usual = median(steps[~turns], overwrite=True)
+    even = np.abs(steps[turns] - usual) < 0.5 * abs(usual)
+    return int(np.count_nonzero(even)) > 0.5 * count
+
+
+def seconds_of_day(stamps: FloatArray) -> FloatArray:
+    """Times of day, hhmmss.ss (n,), in seconds since the first midnight."""
+    minutes, seconds = np.divmod(stamps, 100.0)
+    hours, minutes = np.divmod(minutes, 100.0)
+    # To the microsecond: that is what hhmmss.ss leaves.
+    found = np.round(3600.0 * hours + 60.0 * minutes + seconds, 6)
+    midnights = np.diff(found, prepend=found[:1]) < -0.5 * _DAY
+    return np.asarray(found + _DAY * np.cumsum(midnights))

@@ -1,0 +1,343 @@
+"""The even grid that time stamps lie on: the sampling interval, and which rows are missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from gmwm._core.spool import alike, release
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
+from gmwm.readers import tuning
+
+_NONE = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Where a clock jumps forward because rows are missing, and which rows are copies.
+
+    rows: (k,), first row after each jump.
+    steps: (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
+    missing: (k,), whole number of rows that are missing there, one or more.
+    interval: Sampling interval, in the unit of the stamps.
+    repeated: (r,), rows that repeat one before them.
+    """
+
+    rows: IntArray
+    steps: FloatArray
+    missing: FloatArray
+    interval: float
+    repeated: IntArray = field(default_factory=_NONE.copy)
+
+    @property
+    def total(self) -> float:
+        """Number of rows that are missing."""
+        return float(np.sum(self.missing))
+
+    @property
+    def longest(self) -> int:
+        """Index of the longest jump."""
+        return int(np.argmax(self.missing))
+
+    @property
+    def is_off_grid(self) -> BoolArray:
+        """Whether each jump is far from a whole number of sampling intervals."""
+        return np.asarray(np.abs(self.steps - 1.0 - self.missing) > tuning.OFF_GRID)
+
+    @property
+    def off_grid(self) -> int:
+        """Number of such jumps."""
+        return int(np.count_nonzero(self.is_off_grid))
+
+    @property
+    def are_bursts(self) -> bool:
+        """Whether rows come in bursts of equal length with stamps close together."""
+        length = np.diff(self.rows)
+        if length.size < tuning.FEWEST_BURSTS:
+            return False
+        usual = int(np.median(length))
+        alike = (length == usual) & (self.missing[1:] == np.median(self.missing))
+        return usual <= tuning.LONGEST_BURST and bool(np.mean(alike) > tuning.BURSTS_ALIKE)
+
+    @property
+    def are_rounding(self) -> bool:
+        """Whether they look like stamps rounded to a coarse unit rather than like missing rows.
+
+        A clock of 700 Hz that is written in whole milliseconds steps by 1 and now and then by 2,
+        in a rhythm; rows are lost without one. A lost row breaks the rhythm at two distances.
+        """
+        single = self.missing == 1.0
+        if np.count_nonzero(single) < max(tuning.FEWEST_IN_RHYTHM, 0.9 * self.rows.size):
+            return False
+        apart = np.sort(np.diff(self.rows))
+        half = max((apart.size + 1) // 2, min(apart.size, tuning.ALL_IN_RHYTHM))
+        shortest = np.min(apart[half - 1 :] - apart[: apart.size - half + 1])
+        return bool(shortest <= 1.0 + 0.1 * np.median(apart))
+
+    def with_copies(self, kept: IntArray, copies: IntArray) -> Jumps:
+        """The same, numbered by all rows, some of which were kept and the others are copies."""
+        return replace(self, rows=kept[self.rows], repeated=copies)
+
+    def spread(self, values: FloatArray) -> FloatArray:
+        """Samples (n,) on the even grid: NaN where a row is missing, without copies."""
+        if not (self.repeated.size or self.rows.size):
+            return values
+        result = alike(values, values.size - self.repeated.size + int(self.total))
+        result.fill(np.nan)
+        if self.repeated.size:
+            values = np.delete(values, self.repeated)
+        rows = self.rows - np.searchsorted(self.repeated, self.rows)
+        ends = np.append(rows, values.size)
+        result[: ends[0]] = values[: ends[0]]
+        shift = np.cumsum(self.missing).astype(np.int64)
+        for first, last, ahead in zip(ends[:-1], ends[1:], shift, strict=True):
+            result[first + ahead : last + ahead] = values[first:last]
+        release(result)
+        return result
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the sampling rate.
+
+    row: Its place, to within a part of the recording.
+    rates: Before and after, in rows per unit of the stamps.
+    """
+
+    row: int
+    rates: tuple[float, float]
+
+
+def find_change(stamps: FloatArray) -> Change | None:
+    """The change of the sampling rate between parts of a recording; None if there is none.
+
+    Both the median and the mean of the steps, without jumps, must differ: rounded stamps change
+    the median from part to part, a few missing rows the mean.
+
+    stamps: (n,), increasing.
+    Returns: the largest change from one part to the next; or, if the rate comes and goes, so that
+        the parts before and after differ by less than half as much, from or to the extreme part.
+    """
+    steps = np.diff(stamps)
+    parts = min(tuning.RATE_PARTS, steps.size // tuning.LEAST_PART)
+    if parts < 2:
+        return None
+    rows = np.array_split(steps, parts)
+    medians = np.array([median(part) for part in rows])
+    usual = [part[part < tuning.JUMP * m] for part, m in zip(rows, medians, strict=True)]
+    if not all(part.size for part in usual):
+        return None
+    means = np.array([np.mean(part) for part in usual])
+    if not (np.all(means > 0.0) and np.all(np.isfinite(means))):
+        return None
+    errors = np.array([np.std(part) / np.sqrt(part.size) for part in usual]) / means
+    fast, slow = int(np.argmin(means)), int(np.argmax(means))
+    limit = tuning.RATES_AGREE + tuning.RATE_ERRORS * np.hypot(errors[fast], errors[slow])
+    by_means, by_medians = (float(np.log(each[slow] / each[fast])) for each in (means, medians))
+    if min(by_means, by_medians) <= limit:
+        return None
+    edge = int(np.argmax(np.abs(np.diff(np.log(means))))) + 1
+    before, after = (float(1.0 / np.median(some)) for some in (means[:edge], means[edge:]))
+    if 2.0 * abs(np.log(before / after)) < by_means:
+        first, edge = sorted((fast, slow))
+        before, after = float(1.0 / means[first]), float(1.0 / means[edge])
+    return Change(sum(part.size for part in rows[:edge]), (before, after))
+
+
+def find_jumps(stamps: FloatArray) -> Jumps:
+    """Jumps of a clock without short steps.
+
+    How many rows are missing is judged from the stamps of some rows before and after the jump,
+    so that one late stamp, which a short step follows, makes no gap.
+
+    stamps: (n,), increasing.
+    Returns: jumps; their sampling interval is the slope of a robust line through the stamps.
+    """
+    steps = np.diff(stamps)
+    usual = np.mean(steps[steps <= tuning.USUAL_STEP * median(steps)])
+    candidates = np.flatnonzero(steps > tuning.LONGEST_STEP * usual) + 1
+    rest = stamps[-1] - stamps[0] - np.sum(steps[candidates - 1])
+    interval = float(rest / (steps.size - candidates.size))
+    if not (0.0 < interval < np.inf):
+        return Jumps(candidates[:0], steps[:0], steps[:0], interval)
+    del steps  # the line needs as much memory
+    advance = _advance(stamps, candidates, interval)
+    missing = np.maximum(np.rint(advance) - 1.0, 0.0)
+    real = missing > 0.0
+    found = Jumps(candidates[real], advance[real], missing[real], interval)
+    number = np.ones(stamps.size, dtype=np.int64)
+    number[found.rows] += found.missing.astype(np.int64)
+    # A jump off the grid starts a part whose clock has an offset of its own.
+    starts = np.zeros(stamps.size, dtype=bool)
+    starts[found.rows[found.is_off_grid]] = True
+    line = interval_of(stamps, np.cumsum(number, out=number), starts)
+    return replace(found, interval=line)
+
+
+def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:
+    """Advance of the clock at each of these rows, in intervals, with jitter averaged out."""
+
+    def lead(near: IntArray, wanted: BoolArray) -> FloatArray:
+        """Median of how far stamps near a row are ahead of an even clock, in intervals."""
+        near = np.clip(near, 0, stamps.size - 1)
+        # Against the stamp of the row itself: large stamps would lose digits.
+        ahead = (stamps[near] - stamps[rows][:, None]) / interval - (near - rows[:, None])
+        ahead[~wanted] = np.nan
+        return np.asarray(np.nanmedian(ahead, axis=1))
+
+    offsets = np.arange(tuning.NEIGHBOURS)
+    before, after = rows[:, None] - 1 - offsets, rows[:, None] + offsets
+    previous = np.concatenate([[0], rows[:-1]])[:, None]
+    following = np.append(rows[1:], stamps.size)[:, None]
+    return 1.0 + lead(after, after < following) - lead(before, before >= previous)
+
+
+@dataclass(frozen=True)
+class Uneven:
+    """Uneven stamps on an even grid: jitter, bursts, late stamps.
+
+    late: (m,), how far each different stamp is after the grid, in sampling intervals.
+    last: (m,), last row that has the stamp.
+    burst: Rows that have one stamp, usually.
+    jitter: Standard deviation of the steps without losses, in sampling intervals.
+    """
+
+    jumps: Jumps
+    late: FloatArray
+    last: IntArray
+    burst: int
+    jitter: float
+
+
+def place_uneven(stamps: FloatArray) -> Uneven | int | None:
+    """Place rows with uneven stamps on an even grid.
+
+    The stamp of several rows is taken as that of the last of them. Rows are lost where the stamps
+    are later from then on; a host that stalls catches up again, and loses none.
+
+    stamps: (n,).
+    Returns: the row from which on stamps are earlier, where a clock was set back; None if most
+        stamps are far from any even grid.
+    """
+    last = np.flatnonzero(np.diff(stamps, append=np.nan) != 0.0)
+    sizes = np.diff(last, prepend=-1)
+    if np.max(sizes) > min(tuning.MOST_OF_ONE_STAMP, max(stamps.size // 8, 16)):
+        return None  # the clock stood still
+    time = stamps[last] - stamps[last[0]]
+    rows = max(round(stamps.size / last.size), 1)
+    width = max(min(-(-tuning.ROWS_OF_ROUGH // rows), last.size // 2), 1)
+    if last.size <= width:
+        return None
+    # For a start over few rows, most of which have no loss: those alike to a fraction of a row.
+    slopes = (time[width:] - time[:-width]) / (last[width:] - last[:-width])
+    interval = median(slopes)
+    for _ in range(tuning.ROUNDS_OF_GRID):
+        alike = np.abs(slopes / interval - 1.0) * width * rows <= 0.9
+        if not np.any(alike):
+            return None
+        interval = float(np.mean(slopes[alike]))
+    finest = float(np.spacing(np.max(np.abs(stamps))))
+    for _ in range(tuning.ROUNDS_OF_GRID):
+        if not 10.0 * finest < interval < np.inf:
+            return None
+        lost, set_back = _losses(time / interval - last)
+        if set_back is not None:
+            return int(last[set_back] - sizes[set_back] + 1)
+        number = last + np.cumsum(lost)
+        interval = interval_of(time, number, np.zeros(last.size, dtype=bool))
+    late = time / interval - number
+    late -= _slow_part(late)
+    if not median(np.abs(late)) <= tuning.MOST_UNEVEN:
+        return None
+    usual = (lost[1:] == 0) & (sizes[1:] == np.median(sizes))
+    jitter = float(np.std(np.diff(late)[usual])) if np.any(usual) else 0.0
+    some = np.flatnonzero(lost)
+    missing = lost[some].astype(float)
+    steps = 1.0 + missing + late[some] - late[np.maximum(some - 1, 0)]
+    # Which row of a burst was lost is not known: the first is taken.
+    jumps = Jumps(last[some] - sizes[some] + 1, steps, missing, interval)
+    is_burst = 2 * int(np.sum(sizes[sizes > 1])) > stamps.size
+    burst = int(np.median(np.repeat(sizes, sizes))) if is_burst else 1
+    return Uneven(jumps, late, last, burst, jitter)
+
+
+def _losses(late: FloatArray) -> tuple[IntArray, int | None]:
+    """Samples lost before each stamp, and the first stamp before which the clock was set back.
+
+    late: (m,), how far each stamp is after a clock without losses, in sampling intervals.
+    """
+    lost = np.zeros(late.size, dtype=np.int64)
+    rows = np.flatnonzero(np.abs(np.diff(late, prepend=late[0])) > 0.5)
+    reach = np.arange(tuning.STAMPS_BESIDE)
+    for some in np.array_split(rows, -(-rows.size // 4096)) if rows.size else ():
+        before = _early(late[np.maximum(some[:, None] - 1 - reach, 0)])
+        after = _early(late[np.minimum(some[:, None] + reach, late.size - 1)])
+        for row in some[np.abs(after - before) > 0.4].tolist():
+            start = max(row - reach.size, 0)
+            earlier = lost[start:row]
+            level = late[start:row] + np.sum(earlier) - np.cumsum(earlier)
+            by = float(_early(late[row : row + reach.size]) - _early(level))
+            if by < -1.0 and min(row, late.size - row) >= tuning.FEWEST_BESIDE:
+                return lost, row + int(np.argmin(np.diff(late[row - 1 : row + reach.size])))
+            # Less than a whole one may be jitter, or a loss that comes soon.
+            lost[row] = max(int(by + 0.3), 0)
+    return lost, None
+
+
+def _early(late: FloatArray) -> FloatArray:
+    """Lateness of the second earliest stamp: a host that stalls makes others late."""
+    place = min(1, late.shape[-1] - 1)
+    return np.asarray(np.partition(late, place, axis=-1)[..., place])
+
+
+def _slow_part(late: FloatArray) -> FloatArray:
+    """Slow wander of a clock: the median drops what a stall delays, the mean its own noise."""
+    from scipy import ndimage
+
+    size = tuning.STAMPS_OF_WANDER
+    calm = ndimage.median_filter(late, min(size, late.size) | 1, mode="nearest")
+    return np.asarray(ndimage.uniform_filter1d(calm, size, mode="nearest"))
+
+
+def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> float:
+    """Sampling interval: slope of the robust line through the stamps over their sample numbers.
+
+    From the median slope of rows half of the record apart, least squares with the residuals bounded
+    at three robust standard deviations: a late stamp has no more weight than one of the usual
+    jitter. From independent errors of the stamps of s intervals the slope has a relative error of
+    ``s sqrt(12 / n^3)``, the slope from the first to the last stamp ``s sqrt(2) / n``.
+
+    stamps: (n,).
+    number: (n,).
+    starts: (n,), where a part begins whose clock has an offset of its own.
+    """
+    edges = [0, *np.flatnonzero(starts), stamps.size]
+    parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
+    lever = np.subtract(number, number[0], dtype=float)
+    half = max(max(part.stop - part.start for part in parts) // 2, 1)
+    pairs = [(slice(p.start, p.stop - half), slice(p.start + half, p.stop)) for p in parts]
+    slopes = [
+        (stamps[then] - stamps[first]) / (lever[then] - lever[first])
+        for first, then in pairs
+        if first.stop > first.start
+    ]
+    slope = median(np.concatenate(slopes), overwrite=True)
+    for part in parts:
+        lever[part] -= np.mean(lever[part])
+    scale = float(lever @ lever)
+    if not scale > 0.0:
+        return 0.0
+    late = np.empty(stamps.size)
+    for _ in range(tuning.ROUNDS_OF_LINE):
+        for part in parts:
+            np.subtract(stamps[part], stamps[part.start], out=late[part])
+            late[part] -= slope * lever[part]
+            late[part] -= median(late[part])
+        bound = 3.0 * 1.4826 * median(np.abs(late), overwrite=True)
+        change = float(lever @ np.clip(late, -bound, bound)) / scale
+        slope += change
+        if abs(change) < tuning.LINE_SETTLED * abs(slope):
+            break
+    return slope
