@@ -7,8 +7,8 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import Scenario, SensorModels, experiment_from
-from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu import AXES
+from gmwm.ins.logs import LogSpec
 from gmwm.ins.spec import experiment, read_document
 from gmwm.ins.spec.experiment import ExperimentSpec
 from gmwm.process import RandomWalk
@@ -143,7 +143,7 @@ def test_every_key_is_documented() -> None:
         assert f"`{name}`" in table
     page = (REPOSITORY / "docs/own-log.md").read_text()
     example = page.split("As a file:")[1].split("```")[1]
-    for name in MeasuredSpec.model_fields:
+    for name in LogSpec.model_fields:
         assert f"\n{name}:" in example
 
 
