@@ -48,7 +48,6 @@ from gmwm.ins.field.fix_file import read_fix_log
 from gmwm.ins.field.imu_file import read_imu_log
 from gmwm.ins.logs import read_log
 from gmwm.ins.spec import experiment_from, read_document
-from gmwm.readers.formats.trial import one_reader
 from gmwm.report import read_datasheet, write_report
 
 SECONDS, BYTES = 20, 2 << 30
@@ -758,8 +757,7 @@ def main() -> None:
     given = parser.parse_args()
     logging.disable()
     names = given.only or list(KINDS)
-    with one_reader():
-        tallies = run(names, given.cases, given.seed, given.first, given.store).values()
+    tallies = run(names, given.cases, given.seed, given.first, given.store).values()
     total = sum(sum(each.outcomes.values()) for each in tallies)
     failures = sum(each.failures for each in tallies)
     seconds, largest = sum(each.total for each in tallies), max(each.largest for each in tallies)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.errors import InputError
+from gmwm.readers import CLOCKS, NAMES as FORMATS
 
 if TYPE_CHECKING:
     from gmwm.process import Model, Process
@@ -19,15 +20,6 @@ _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
 
 TERMS = "Q, N, B, K, R, GM, Resonance, LowPassNoise, AveragedNoise, Sinusoid, AR, MA, ARMA, ARIMA"
 """What `gmwm.process.CATALOGUE` has, which would take long to import for a line of help."""
-
-CLOCKS = ("header", "log")
-"""As in `gmwm.read`, for the same reason."""
-
-FORMATS = (
-    "text", "numpy", "hdf5", "mat", "parquet", "feather", "rosbag", "rosbag2", "ulog", "ardupilot",
-)  # fmt: skip
-"""The same."""
-
 
 def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """One decorator that gives a command several options, listed in this order."""
@@ -81,7 +73,7 @@ reading_options = together(
                       "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
                       "[,rates][,little|big]."),
     click.option("--damaged", is_flag=True,
-                 help="Take what is there of a text or a flight log that is cut off or damaged in "
+                 help="Use what is left of a text or a flight log that is cut off or damaged in "
                       "places; it is refused otherwise."),
 )  # fmt: skip
 """What the file is, for `read_recording`."""

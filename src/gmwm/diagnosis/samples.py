@@ -32,7 +32,7 @@ class Lost(NamedTuple):
 
 def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
     """How much is missing; one notice for the recording where all channels miss the same."""
-    found = {channel.name: Missing().and_then(channel.values) for channel in channels}
+    found = {channel.name: Missing.of(channel.values) for channel in channels}
     return lost_notices(
         {
             name: Lost(each.n, each.samples, each.gaps, each.longest * dt)

@@ -13,13 +13,11 @@ from typing import Any, Literal
 import numpy as np
 
 from gmwm._core.files import existing_file
-from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.binary import BinaryTable, layout_of
-from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import (
     Clock,
     Timing,
@@ -29,22 +27,22 @@ from gmwm.readers.clock import (
     timing_of,
     without_unit,
 )
-from gmwm.readers.formats import (
-    Part,
-    Wanted,
-    has_sensors,
-    joined,
-    open_tables,
-    shares,
-    with_temperature,
+from gmwm.readers.columns import (
+    AuxiliaryColumn,
+    Given,
+    Reference,
+    Roles,
+    channel_units,
+    roles_of,
 )
+from gmwm.readers.formats.binary import BinaryTable, layout_of
+from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
+from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
-from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
-from gmwm.readers.spool import load_columns
-from gmwm.readers.table import Table, column_of
+from gmwm.readers.table import Table
 
 
 def read(
@@ -98,12 +96,10 @@ def read(
     clock : {"header", "log"}, optional
         Stamps of messages: those of their headers, or the times at which they were recorded.
     format : str, optional
-        What the file is, where its first bytes and its name do not show it: ``"text"``,
-        ``"numpy"``, ``"hdf5"``, ``"mat"``, ``"parquet"``, ``"feather"``, ``"rosbag"``,
-        ``"rosbag2"``, ``"ulog"`` or ``"ardupilot"``.
+        What the file is, where its first bytes and its name do not show it: one of FORMATS.
     damaged : bool, optional
-        Take what is there of a text or a flight log that is cut off or damaged in places; it is
-        refused otherwise. Other formats have what their ends are needed for.
+        Use what is left of a text or a flight log that is cut off or damaged in places; it is
+        rejected otherwise. Damaged files of other formats cannot be read.
 
     Returns
     -------
@@ -142,6 +138,9 @@ def read(
     return _read(tables, Given(rate, units or {}, channels, time))
 
 
+read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
+
+
 def _read(tables: Sequence[Table], given: Given) -> Recording:
     """The recording of one table or of several."""
     if len(tables) == 1:
@@ -175,8 +174,7 @@ def recording_of(table: Table, given: Given) -> Part:
         seconds = meaning(table.names[roles.time]).seconds
         if seconds in (None, 1.0) and is_time_of_day(arrays[roles.time]):
             arrays[roles.time] = seconds_of_day(arrays[roles.time])
-            text = "times of day (hhmmss) count as seconds since midnight"
-            odd.append(Notice("time-of-day", "note", "", text))
+            odd.append(notice("time-of-day"))
         start = float(arrays[roles.time][0]) * (seconds or 1.0)
     for name, index in roles.channels.items():
         largest = tuning.BEYOND_SENSORS / factor(unit_of[name], SI_UNIT[quantity_of(unit_of[name])])
@@ -250,7 +248,7 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
         turns = np.count_nonzero(np.diff(numbers))
         if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
             raise InputError(
-                f"{table.source}, {column_of(table, index)}: rows of {several} sensors come in "
+                f"{table.source}, {table.column(index)}: rows of {several} sensors come in "
                 "turns: keep those of one",
                 "several-sensors",
             )
@@ -268,7 +266,7 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
     steps = np.diff(table.load([time])[time])
     if not steps.size:
         return None  # too few samples is what is wrong then
-    return without_unit(table.source, column_of(table, time), float(np.median(steps)))
+    return without_unit(table.source, table.column(time), float(np.median(steps)))
 
 
 def _load(
@@ -281,21 +279,21 @@ def _load(
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     kept, notices = list(roles.auxiliary), list[Notice]()
     try:
-        arrays = load_columns(table, sorted(wanted))
+        arrays = table.load_or_map(sorted(wanted))
     except InputError:
         if not roles.auxiliary:
             raise
-        arrays, kept = load_columns(table, roles.columns), []
+        arrays, kept = table.load_or_map(roles.columns), []
         n = arrays[roles.columns[0]].size
         for column in roles.auxiliary:
             with suppress(InputError):
-                values = load_columns(table, [column.index])[column.index]
+                values = table.load_or_map([column.index])[column.index]
                 if values.size == n:
                     arrays[column.index] = values
                     kept.append(column)
         names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
-        text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
-        notices.append(Notice("columns-unreadable", "note", "", text))
+        what = f"auxiliary channels that cannot be read, or have another length ({names})"
+        notices.append(notice("columns-unreadable", what=what))
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
     if most < tuning.FEWEST_SAMPLES:
@@ -322,12 +320,10 @@ def _timing(
 
     found = meaning(table.names[time])
     clock = Clock(
-        table.source, column_of(table, time), arrays[time], found.seconds, found.stated,
+        table.source, table.column(time), arrays[time], found.seconds, found.stated,
         table.where, same,
     )  # fmt: skip
     timing = timing_of(clock, stated)
     if stated is None:
         return timing
-    text = f"the rate stated, {stated:g} Hz, is used"
-    used = Notice("rate-stated", "note", "", text, {"rate": stated})
-    return replace(timing, notices=(*timing.notices, used))
+    return replace(timing, notices=(*timing.notices, notice("rate-stated", "", {"rate": stated})))

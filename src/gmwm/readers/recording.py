@@ -10,25 +10,16 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.spool import scaled
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError, printable
+from gmwm.issues import Notice, codes, notice
 from gmwm.readers import tuning
 from gmwm.readers.missing import Missing, missing_notices
 
-READING = frozenset(
-    {"column-numbers", "preamble", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
-    | {"time-column", "units-from-names", "units-contradicted"}
-    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
-    | {"rate-unlikely"}
-    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-wraps"}
-    | {"sentinel", "gravity-absent"}
-    | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
-    | {"partial-record", "still-stretches"}
-)
+READING = codes(topic="reading") | codes(topic="clock")
 """Codes of the notices about how a file was read."""
 
 
@@ -287,7 +278,7 @@ class Recording(Mapping[str, Channel], Printed):
         end = self.duration if stop is None else min(float(stop), self.duration)
         if start == 0.0 and end == self.duration:
             return self
-        if any(notice.code == "rate-changes" for notice in self.notices):
+        if any(each.code == "rate-changes" for each in self.notices):
             raise InputError(
                 f"{self.source or 'the recording'}: the sampling rate changes, so that a part has "
                 "another rate than the whole: cut the file where it changes"
@@ -301,9 +292,8 @@ class Recording(Mapping[str, Channel], Printed):
             replace(c, values=c.values[round(start / c.dt) : round(end / c.dt)])
             for c in self.channels
         )
-        text = f"the part from {start:.6g} to {end:.6g} s is used; times count from its start"
-        part = Notice("part", "note", "", text, {"start": float(start), "stop": end})
-        kept = [notice for notice in self.notices if notice.code != "missing-samples"]
+        part = notice("part", "", {"start": float(start), "stop": end})
+        kept = [each for each in self.notices if each.code != "missing-samples"]
         notices = (*kept, part, *notices_of_gaps(channels))
         return replace(self, channels=channels, notices=notices)
 
@@ -359,9 +349,7 @@ def _series(name: str, values: FloatArray) -> FloatArray:
 
 def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
     """What is missing in channels that are whole."""
-    return missing_notices(
-        {channel.name: Missing().and_then(channel.values) for channel in channels}
-    )
+    return missing_notices({channel.name: Missing.of(channel.values) for channel in channels})
 
 
 def require_recording(given: Any) -> None:
