@@ -53,7 +53,7 @@ class Clock:
     same: Callable[[IntArray], BoolArray]
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
-        """What is wrong with the stamps, with the file, the column and the place."""
+        """An error about the stamps, with the file, the column and the place."""
         place = "" if row is None else f", {self.where(row)}"
         return InputError(f"{self.source}, {self.column}{place}: {text}", "clock", hint)
 
@@ -277,6 +277,7 @@ def without_unit(
 def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
     jumps, n = found.jumps, clock.stamps.size
+    off_grid = int(np.count_nonzero(jumps.is_off_grid))
     if found.change is not None:
         first, then = (rate / seconds for rate in found.change.rates)
         if max(first / then, then / first) > tuning.SHARP_CHANGE:
@@ -292,9 +293,9 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
             "as if the stamps were rounded too coarsely"
         )
         raise clock.error(int(jumps.rows[0]), text)
-    if jumps.off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
+    if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
         text = (
-            f"{jumps.off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
+            f"{off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
             f"{jumps.interval:.6g}, so that the sampling rate is not known"
         )
         raise clock.error(None, text)
@@ -306,13 +307,14 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
         )
         raise clock.error(None, text)
     if jumps.total > n:
+        longest = int(np.argmax(jumps.missing))
         text = (
-            f"the clock jumps by {jumps.missing[jumps.longest]:,.6g} sampling intervals, and in "
+            f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in "
             f"all {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
             "the recording"
         )
         hint = f"use the part before or after, or, {_WAY_OUT}"
-        raise clock.error(int(jumps.rows[jumps.longest]), text, hint)
+        raise clock.error(int(jumps.rows[longest]), text, hint)
 
 
 def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> list[Notice]:
@@ -321,8 +323,8 @@ def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> l
     interval = jumps.interval * seconds
     rate, steps = 1.0 / interval, ""
     if jitter >= tuning.JITTER_SHOWN:
-        far = jitter * interval
-        size = f"{far:.3g} s" if far >= _SHORTEST_SHOWN else f"{1e6 * far:.3g} us"
+        rms = jitter * interval
+        size = f"{rms:.3g} s" if rms >= _SHORTEST_SHOWN else f"{1e6 * rms:.3g} us"
         steps = f"; their steps vary by {size} rms ({100.0 * jitter:.2f} % of a step)"
     units = UNITS.get(seconds, clock.own_unit) + (", inferred from the steps" if is_guess else "")
     values = {"rate": rate, "unit": seconds, "jitter": jitter}
@@ -332,13 +334,13 @@ def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> l
         return float(clock.stamps[row] - clock.stamps[0]) * seconds
 
     if count := jumps.rows.size:
-        digits = 1 - math.floor(math.log10(interval))
-        length = round(float(jumps.steps[jumps.longest] - 1.0) * interval, digits)
-        time = round(when(int(jumps.rows[jumps.longest]) - 1), digits)
+        digits, far = 1 - math.floor(math.log10(interval)), int(np.argmax(jumps.missing))
+        length = round(float(jumps.steps[far] - 1.0) * interval, digits)
+        time = round(when(int(jumps.rows[far]) - 1), digits)
         values = {"count": count, "missing": jumps.total, "longest": length, "time": time}
         variant = "many" if count > 1 else ""
         notices.append(notice("clock-jumps", "", values, variant=variant))
-    if off := jumps.off_grid:
+    if off := int(np.count_nonzero(jumps.is_off_grid)):
         these = f"{off:,} of these jumps {'are' if off > 1 else 'is'}"
         which = these if count > 1 else "the jump is"
         notices.append(notice("clock-off-grid", "", {"count": off}, which=which))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from gmwm._core.spool import scaled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import tuning
 
 _CODES = {float(sign * (10**k - 1)) for k in range(3, 8) for sign in (-1, 1)} | {-999.25, -99.99}
@@ -110,15 +111,15 @@ def without_sentinels(
     for group in [[i] for i in others] + ([beyond] if beyond else []):
         rows = far[np.isin(which, group)]
         number = float(numbers[group[int(np.argmax(np.abs(numbers[group])))]])
-        meaning = _meaning(number, largest) or "far from all others with nothing between"
-        notices.append(
-            notice(
-                "sentinel", name, {"count": rows.size, "value": number, "row": int(rows[0])},
-                severity="bad" if is_bad else "warning", meaning=meaning,
-                samples=f"{rows.size:,} samples are" if rows.size > 1 else "a sample is",
-                alike=" and the like" if len(group) > 1 else "", place=where(int(rows[0])),
-            )
-        )  # fmt: skip
+        data = {"count": rows.size, "value": number, "row": int(rows[0])}
+        words: dict[str, Any] = {
+            "samples": f"{rows.size:,} samples are" if rows.size > 1 else "a sample is",
+            "alike": " and the like" if len(group) > 1 else "",
+            "meaning": _meaning(number, largest) or "far from all others with nothing between",
+            "place": where(int(rows[0])),
+        }
+        severity: Severity = "bad" if is_bad else "warning"
+        notices.append(notice("sentinel", name, data, severity=severity, **words))
     return clean, notices
 
 

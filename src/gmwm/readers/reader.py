@@ -320,9 +320,14 @@ def _timing(
 
     found = meaning(table.names[time])
     clock = Clock(
-        table.source, table.column(time), arrays[time], found.seconds, found.stated,
-        table.where, same,
-    )  # fmt: skip
+        table.source,
+        table.column(time),
+        arrays[time],
+        found.seconds,
+        found.stated,
+        table.where,
+        same,
+    )
     timing = timing_of(clock, stated)
     if stated is None:
         return timing

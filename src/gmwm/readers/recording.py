@@ -143,25 +143,14 @@ class Recording(Mapping[str, Channel], Printed):
     ) -> Recording:
         """Build a recording from arrays in any unit.
 
-        Parameters
-        ----------
-        arrays : mapping of str to (n,) array_like, or iterable of pairs
-            Channel name -> samples, NaN where one is missing. Of pairs that are made one by one,
-            each series is in memory once.
-        rate : float
-            Sampling rate, Hz.
-        units : mapping of str to str
-            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``. A
-            channel in degC, K, V, mV or s is auxiliary.
-        source : str, optional
-        notices : sequence of Notice, optional
-            What else there is to know; what is missing is added.
-
-        Raises
-        ------
-        InputError
-            If the rate is not positive, a unit is missing or unknown, or the channels are not
-            series of numbers of one length, none infinite.
+        arrays: Channel name -> samples (n,), NaN where one is missing; or pairs of these, of which
+            each series is in memory once if they are made one by one.
+        rate: Sampling rate, Hz.
+        units: Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
+            A channel in degC, K, V, mV or s is auxiliary.
+        notices: Added to those about missing samples.
+        Raises InputError if the rate is not positive, a unit is missing or unknown, or the channels
+            are not series of numbers of one length, none infinite.
         """
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
@@ -237,10 +226,7 @@ class Recording(Mapping[str, Channel], Printed):
     def of_one_rate(self, what: str) -> Recording:
         """The recording, if all channels of its sensors have one sampling rate.
 
-        Raises
-        ------
-        InputError
-            If they have several, which ``what`` does not work with.
+        Raises InputError if they have several, which ``what`` does not work with.
         """
         parts = self.by_rate()
         if len(parts) > 1:
@@ -257,23 +243,11 @@ class Recording(Mapping[str, Channel], Printed):
         return self.n * self.dt
 
     def part(self, start: float = 0.0, stop: float | None = None) -> Recording:
-        """The recording between two times.
+        """The recording between two times, whose own times count from ``start``.
 
-        Parameters
-        ----------
-        start, stop : float, optional
-            s from the first sample; by default to the end.
-
-        Returns
-        -------
-        Recording
-            Its own times count from ``start``.
-
-        Raises
-        ------
-        InputError
-            If fewer than 64 samples lie between, or the sampling rate changes, so that the times
-            are not those of the file.
+        start, stop: s from the first sample; by default to the end.
+        Raises InputError if fewer than 64 samples lie between, or the sampling rate changes, so
+            that the times are not those of the file.
         """
         end = self.duration if stop is None else min(float(stop), self.duration)
         if start == 0.0 and end == self.duration:
@@ -297,10 +271,6 @@ class Recording(Mapping[str, Channel], Printed):
         notices = (*kept, part, *notices_of_gaps(channels))
         return replace(self, channels=channels, notices=notices)
 
-    @property
-    def _rates(self) -> str:
-        return " and ".join(f"{part.rate:g}" for part in self.by_rate())
-
     def __getitem__(self, name: str) -> Channel:
         for channel in self.channels:
             if channel.name == name:
@@ -315,12 +285,16 @@ class Recording(Mapping[str, Channel], Printed):
     def __len__(self) -> int:
         return len(self.channels)
 
+    @property
+    def _size(self) -> str:
+        rates = " and ".join(f"{part.rate:g}" for part in self.by_rate())
+        return f"{rates} Hz, {self.duration:.6g} s"
+
     def __repr__(self) -> str:
-        size = f"{self._rates} Hz, {self.duration:.6g} s"
-        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
+        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {self._size}>"
 
     def __str__(self) -> str:
-        head = f"{self.source or 'recording'}: {self._rates} Hz, {self.duration:.6g} s"
+        head = f"{self.source or 'recording'}: {self._size}"
         return "\n".join(
             [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
         )

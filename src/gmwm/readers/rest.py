@@ -182,10 +182,15 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
         return ()
     return (
         notice(
-            "gravity", "accel", values, severity="warning", variant="scale", usual=usual,
+            "gravity",
+            "accel",
+            values,
+            severity="warning",
+            variant="scale",
+            usual=usual,
             ratio=ratio,
         ),
-    )  # fmt: skip
+    )
 
 
 def _gyro(rate: _Sensor | None) -> tuple[Notice, ...]:

@@ -40,16 +40,9 @@ class FrameTable(Table):
 
         Raises InputError if a column holds no numbers, or one is infinite.
         """
-        import pyarrow as pa
-
-        types = pa.types
         for column in columns:
             kind = self.types[column]
-            if not any(
-                is_kind(kind)
-                for is_kind in (types.is_integer, types.is_floating, types.is_decimal,
-                                types.is_timestamp, types.is_duration)
-            ):  # fmt: skip
+            if not _is_number(kind):
                 raise InputError(
                     f"{self.source}, column {label(self.names, column)} holds {kind}: give "
                     "numbers, a column for each axis"
@@ -83,6 +76,13 @@ class FrameTable(Table):
         ticks = values.cast(pa.int64(), safe=False).fill_null(0).to_numpy()
         start = first.setdefault(column, int(ticks[np.argmin(missing)]) if ticks.size else 0)
         return np.where(missing, np.nan, (ticks - start).astype(float))
+
+
+def _is_number(kind: Any) -> bool:
+    from pyarrow import types
+
+    is_plain = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
+    return bool(is_plain or _is_time(kind))
 
 
 def _is_time(kind: Any) -> bool:

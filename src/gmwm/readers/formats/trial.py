@@ -43,10 +43,14 @@ def tried(opener: Opener, path: Path) -> ArrayTable:
     done = subprocess.run(
         # -P: modules are not looked for in the folder of the data.
         [sys.executable, "-P", "-c", _PROGRAM, *question, str(memory.budget())],
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, encoding="utf-8",
-        errors="replace", check=False,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )  # fmt: skip
+    )
     last = done.stdout.rpartition(_MARK)[2] if _MARK in done.stdout else ""
     found: dict[str, Any] = {}
     with suppress(json.JSONDecodeError):

@@ -125,11 +125,16 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
             names = series.columns
             tables.append(
                 DataflashTable(
-                    source=path.name, names=tuple(names), notices=list(notices), topic=topic,
-                    path=path, series=series, stamps=f"{names[_TIME]} of {series.name}",
+                    source=path.name,
+                    names=tuple(names),
+                    notices=list(notices),
+                    topic=topic,
+                    path=path,
+                    series=series,
+                    stamps=f"{names[_TIME]} of {series.name}",
                     origin=f"messages {series.kind}",
                 )
-            )  # fmt: skip
+            )
         else:
             _, columns = batches[topic.name]
             entries = {name: array_of(values) for name, values in columns.items()}

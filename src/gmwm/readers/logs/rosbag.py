@@ -166,10 +166,16 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
 
     def table(topic: Topic, message: Message, names: Iterable[str]) -> BagTable:
         return BagTable(
-            source=path.name, names=(_STAMPS, *names), topic=topic, bag=bag, message=message,
-            is_log=is_log, start=start, origin="sensor_msgs/Imu",
+            source=path.name,
+            names=(_STAMPS, *names),
             stamps="times of recording" if is_log else "header stamps",
-        )  # fmt: skip
+            origin="sensor_msgs/Imu",
+            topic=topic,
+            bag=bag,
+            message=message,
+            is_log=is_log,
+            start=start,
+        )
 
     tables = []
     for topic in chosen:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers.names import AXES
 from gmwm.readers.text.layout import Layout
@@ -33,8 +32,6 @@ _GRAVITY_IN_STEPS = re.compile(rb'"?acc_1G"?\s*,\s*"?([0-9]+)')
 _BLACKBOX = re.compile(r"(gyroADC|accSmooth)\[([012])\]")
 _SCALES = re.compile(rb"(?m)^([tga])scale,([0-9.eE+-]+)")
 _GYROFLOW = {"t": "time [s]"} | _axes(gyro="g") | {f"a{axis}": f"accel_{axis} [g]" for axis in AXES}
-_SHIMMER = re.compile(r"(?:Shimmer_\w+?_)?(?:(Gyro|Accel(?:_LN|_WR)?)_([XYZ])|Timestamp\w*)_CAL")
-_GNSS_LOGGER = re.compile(rb"(?m)^# *UncalGyro,")
 
 
 def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
@@ -44,18 +41,10 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     which the preamble has the number per g. Sensor Logger: axes without the sensor, which is in the
     name of the file, and time in nanoseconds. Gyroflow (gcsv): scales in the preamble. Xsens DOT:
     a clock of 1 MHz, where MTi has 10 kHz. Kalibr, ulog2csv of PX4 and rostopic: units of time.
-    Shimmer: units in a line below the names.
 
     head: Beginning of the file.
-    Raises InputError at a log of GnssLogger: each of its lines is of one of several sensors.
     """
     names, preamble = layout.names, head[: layout.offset]
-    if _GNSS_LOGGER.search(head):
-        raise InputError(
-            f"{source} is a log of GnssLogger, with lines of several sensors: write those of one "
-            "to a file, e.g. (echo 'time [ns],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]'; "
-            f"grep ^UncalGyro, {source} | cut -d, -f3-6) > gyro.csv"
-        )
     if names[:1] == ("loopIteration",):
         return _of_blackbox(layout, preamble)
     if preamble.startswith(b"GYROFLOW IMU LOG"):
@@ -65,8 +54,6 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
         return replace(_renamed(layout, meant), scales=scales)
     if b"DOT" in preamble:
         return _renamed(layout, {"SampleTimeFine": "time [us]"})
-    if any(map(_SHIMMER.fullmatch, names)):
-        return _of_shimmer(layout, head)
     for meant in _RENAMED:
         if set(meant) <= set(names):
             return _renamed(layout, meant)
@@ -96,22 +83,3 @@ def _of_blackbox(layout: Layout, preamble: bytes) -> Layout:
         if steps and name.startswith("accSmooth"):
             scales[i] = 1.0 / max(int(steps[1]), 1)
     return replace(_renamed(layout, meant), scales=scales)
-
-
-def _of_shimmer(layout: Layout, head: bytes) -> Layout:
-    """Units from the line below the names; the low-noise accelerometer, where there are two."""
-    row = head[layout.offset :].partition(b"\n")[0]
-    units = [unit.strip(' "\r') for unit in row.decode(errors="replace").split(layout.delimiter)]
-    if "deg/s" not in units and "m/(s^2)" not in units:
-        return layout
-    meant = {}
-    has_low_noise = any("Accel_LN_" in name for name in layout.names)
-    for name, unit in zip(layout.names, units, strict=False):
-        found = _SHIMMER.fullmatch(name)
-        if found and found[1] and not (found[1] == "Accel_WR" and has_low_noise):
-            unit = unit.replace("(s^2)", "s^2")
-            meant[name] = f"{found[1][:5].lower().rstrip('_')}_{found[2].lower()} [{unit}]"
-        elif found and not found[1] and unit == "ms":
-            meant[name] = "time [ms]"
-    offset, line = layout.offset + len(row) + 1, layout.line + 1
-    return replace(_renamed(layout, meant), offset=offset, line=line)
